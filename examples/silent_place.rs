@@ -4,7 +4,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use uav_relay::channel::{AirGround, Channel};
-use uav_relay::optimiser::plan::silent_place;
+use uav_relay::planning::silent_place;
 use uav_relay::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
 /// 2 GHz, excess losses of 0.1 dB and 21 dB as factors. A number out of range fails the build.

@@ -15,15 +15,31 @@ pub mod flight;
 mod geodetic;
 #[cfg(feature = "upload")]
 pub mod ground;
+#[cfg(not(feature = "internals"))]
+mod guard;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod guard;
 mod jitter;
 mod line;
 pub mod mission;
 mod node;
+#[cfg(not(feature = "internals"))]
+mod optimiser;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod optimiser;
+#[cfg(not(feature = "internals"))]
+mod place;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod place;
 pub mod planning;
 pub mod pointing;
+#[cfg(not(feature = "internals"))]
+mod power_ratio;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod power_ratio;
 mod relay;
 mod root;
@@ -31,11 +47,19 @@ pub mod sensing;
 pub mod serial;
 mod settings;
 mod side;
+#[cfg(not(feature = "internals"))]
+mod sir;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod sir;
 mod sites;
 mod stats;
 pub mod time;
 mod view;
+#[cfg(not(feature = "internals"))]
+mod wire;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod wire;
 mod without_quorum;
 
@@ -46,6 +70,8 @@ pub use field::{Field, FieldPoint};
 pub use geodetic::Geodetic;
 #[cfg(feature = "upload")]
 pub use ground::{FlownMission, Ground, Progress};
+pub use guard::HoldReason;
+pub use guard::config::{Geofence, GuardConfig};
 pub use line::LineError;
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::round::state::Phase;
@@ -63,9 +89,11 @@ pub use time::{Duration, Instant};
 pub use view::{View, ViewId};
 #[cfg(feature = "auth")]
 pub use wire::auth::{Auth, Key};
-pub use wire::frame::FrameBuf;
+pub use wire::crc::CRC_32C;
+pub use wire::digest::MissionId;
+pub use wire::frame::{FrameBuf, MAX_FRAME};
 #[cfg(feature = "upload")]
-pub use wire::upload::Upload;
+pub use wire::upload::{Upload, UploadError};
 pub use without_quorum::WithoutQuorum;
 
 #[cfg(doctest)]

@@ -1,5 +1,16 @@
 //! Places in the air, and what stands there.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 /// A place in the air.
 ///
 /// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
@@ -29,6 +40,7 @@ impl Placement {
     }
 
     /// Where it is across the line.
+    #[doc(hidden)]
     pub const fn cross_section(self) -> CrossSection {
         CrossSection {
             y_m: self.y_m,

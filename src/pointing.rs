@@ -11,7 +11,8 @@ use crate::mission::Mission;
 use crate::place::Placement;
 
 /// No angle of a [`Bearing`] is farther off than this, rad: 0.17 degrees.
-pub const MAX_ERROR_RAD: f32 = 0.002_967;
+#[cfg(test)]
+const MAX_ERROR_RAD: f32 = 0.002_967;
 
 /// The direction and distance of a place as a relay sees it.
 ///

@@ -1,5 +1,16 @@
 //! A ratio that keeps its distance from its neighbours.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 /// A ratio of powers and path losses as the sum of two f32, so that a target next to it keeps its full distance from it.
 ///
 /// A target gamma is compared with a gain A through gamma - A; with A rounded to one f32 that difference would be wrong

@@ -8,6 +8,17 @@
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
 //! `host-tests/tests/placement/main.rs`.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 mod turn;
 
 pub use turn::{Extremum, first_hop_ceiling, first_hop_turn};

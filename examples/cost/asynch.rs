@@ -9,9 +9,9 @@ use core::task::{Context, Poll, Waker};
 
 use cortex_m_semihosting::hprintln;
 use embedded_io_async::{ErrorType, Read, Write};
+use uav_relay::MAX_FRAME;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, byte_time};
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{FrameBuf, Instant, Mission, Phase, Relay, Settings};
 
 use super::counter::{instructions, relay, sends};

@@ -6,10 +6,10 @@ use cortex_m_semihosting::debug;
 use uav_relay::FrameBuf;
 use uav_relay::Identity;
 use uav_relay::Instant;
+use uav_relay::MAX_FRAME;
 use uav_relay::Mission;
 use uav_relay::Relay;
 use uav_relay::Settings;
-use uav_relay::wire::frame::MAX_FRAME;
 
 /// SysTick's largest value.
 pub(crate) const TOP: u32 = 0x00FF_FFFF;

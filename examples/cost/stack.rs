@@ -4,12 +4,12 @@ use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::FrameBuf;
 use uav_relay::Instant;
+use uav_relay::MAX_FRAME;
 use uav_relay::Mission;
 use uav_relay::Phase;
 use uav_relay::Port;
 use uav_relay::Relay;
 use uav_relay::Settings;
-use uav_relay::wire::frame::MAX_FRAME;
 
 use super::counter::relay;
 use super::missions::mission;

@@ -5,13 +5,13 @@ use uav_relay::Auth;
 use uav_relay::FrameBuf;
 use uav_relay::Ground;
 use uav_relay::Instant;
+use uav_relay::MAX_FRAME;
 use uav_relay::Mission;
 use uav_relay::Port;
 use uav_relay::Settings;
 use uav_relay::Side;
 use uav_relay::Upload;
 use uav_relay::Wiring;
-use uav_relay::wire::frame::MAX_FRAME;
 
 use super::auth::KEY;
 use super::counter::{instructions, relay, sends};

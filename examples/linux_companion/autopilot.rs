@@ -11,12 +11,11 @@ use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::clearance::Named;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
+use uav_relay::flight::autopilot::{Address, Signing, Stamp};
 use uav_relay::flight::autopilot::{
     Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, WaitReason,
 };
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::mavlink::frame::Address;
-use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Event, Instant, Placement, Relay, Sites};
 

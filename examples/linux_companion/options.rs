@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use uav_relay::GuardConfig;
+use uav_relay::MAX_FRAME;
 use uav_relay::flight::autopilot::carrot::Pace;
-use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::byte_time;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Adjust, ChannelLoad, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings,
     Wiring,

@@ -4,9 +4,9 @@
 use std::fmt;
 
 use serde_json::json;
-use uav_relay::guard::config::Geofence;
+use uav_relay::Geofence;
 use uav_relay::sensing::belief::{Belief, Told};
-use uav_relay::wire::digest::digest;
+
 use uav_relay::{
     Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, Stats, Upload,
 };
@@ -54,7 +54,7 @@ impl Report {
             identity,
             fence,
             relays: mission.relays(),
-            digest: digest(mission),
+            digest: mission.digest(),
         }
     }
 

@@ -5,16 +5,15 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use uav_relay::wire::crc::CRC_32C;
-use uav_relay::wire::digest::digest;
-use uav_relay::wire::upload::LENGTH;
+use uav_relay::CRC_32C;
+
 use uav_relay::{Instant, Mission, Upload};
 
 use crate::kept::Kept;
 use uav_relay_linux::log::Log;
 
 /// Bytes of the file.
-const STORED: usize = LENGTH + 4;
+const STORED: usize = Upload::LENGTH + 4;
 
 /// What was uploaded to relays that were loaded with `mission`; `None` if there is no `file`.
 ///
@@ -28,7 +27,7 @@ pub(crate) fn load(file: &Path, mission: &Mission) -> Result<Option<Upload>, Str
         Err(error) => return Err(named(&format!("cannot be read: {error}"))),
     };
     let upload = parse(&bytes).ok_or_else(|| named("is damaged, or no upload"))?;
-    let loaded = digest(mission);
+    let loaded = mission.digest();
     if upload.base() != loaded || upload.config().relays != mission.relays() {
         let base = upload.base();
         return Err(named(&format!(
@@ -39,7 +38,7 @@ pub(crate) fn load(file: &Path, mission: &Mission) -> Result<Option<Upload>, Str
 }
 
 fn parse(bytes: &[u8]) -> Option<Upload> {
-    let (upload, check) = bytes.split_at_checked(LENGTH)?;
+    let (upload, check) = bytes.split_at_checked(Upload::LENGTH)?;
     Upload::decode(upload).filter(|_| *check == sum(upload))
 }
 
@@ -68,7 +67,7 @@ impl Uploads {
     /// Has it written down by the next [`tend`](Self::tend).
     pub(crate) fn take(&mut self, upload: &Upload) {
         let mut bytes = [0; STORED];
-        let (body, check) = bytes.split_at_mut(LENGTH);
+        let (body, check) = bytes.split_at_mut(Upload::LENGTH);
         // It has room for every upload.
         upload.encode(body);
         check.copy_from_slice(&sum(body));

@@ -7,7 +7,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use uav_relay::wire::crc::CRC_32C;
+use uav_relay::CRC_32C;
 use uav_relay::{Instant, RecordError, Relay, ViewRecord};
 
 use crate::gate::Gate;

@@ -1,7 +1,7 @@
 //! Log lines for what keeps the drone from its place.
 
 use serde_json::json;
-use uav_relay::guard::HoldReason;
+use uav_relay::HoldReason;
 use uav_relay::{Duration, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;

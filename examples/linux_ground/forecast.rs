@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant as Clock};
 
+use uav_relay::MAX_FRAME;
 use uav_relay::flight::axis::Axis;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Auth, Event, Geodetic, Identity, Instant, Interference, Key, Method, Mission, Placement, Port,
     Profile, Relay, Settings, Sites, Upload,

@@ -3,8 +3,8 @@
 use core::fmt;
 
 use clap::Args;
+use uav_relay::UploadError;
 use uav_relay::flight::axis::Axis;
-use uav_relay::wire::upload::UploadError;
 use uav_relay::{
     Band, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Sites, Upload,
 };

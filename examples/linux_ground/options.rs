@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
-use uav_relay::wire::upload::UploadError;
+use uav_relay::UploadError;
 use uav_relay::{Adjust, Duration, Mission, Side, Sites, Upload, Wiring};
 use uav_relay_linux::command;
 use uav_relay_linux::config::{self, Beyond, Given, Override};

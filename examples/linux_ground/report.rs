@@ -1,10 +1,9 @@
 //! What the station says, one line each.
 
 use serde_json::json;
-use uav_relay::guard::config::GuardConfig;
-use uav_relay::wire::digest::digest;
 use uav_relay::{
-    FlownMission, Ground, Instant, Mission, MissionConfig, Progress, Side, Stats, Upload,
+    FlownMission, Ground, GuardConfig, Instant, Mission, MissionConfig, Progress, Side, Stats,
+    Upload,
 };
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
@@ -16,7 +15,7 @@ use crate::options::Plan;
 /// Who listens where.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     let (end, relays, network) = (name(plan.end), plan.loaded.mission.relays(), plan.network);
-    let (base, baud) = (digest(&plan.loaded.mission), plan.baud);
+    let (base, baud) = (plan.loaded.mission.digest(), plan.baud);
     let tty = plan.tty.display();
     log.say(
         Instant::ZERO,
@@ -182,7 +181,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             stats.mission,
             format!(
                 "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
-                digest(&plan.loaded.mission)
+                plan.loaded.mission.digest()
             ),
         ),
         (
@@ -225,7 +224,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
         // A relay that flies another mission says no more than that it is there.
         None if stats.handshakes > 0 => format!(
             "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
-            digest(&plan.loaded.mission)
+            plan.loaded.mission.digest()
         ),
         None => format!(
             "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",

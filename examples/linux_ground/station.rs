@@ -4,8 +4,8 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 
 use rustix::event::PollFlags;
 use serde_json::{Value, json};
+use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::{Log, Source};

@@ -10,15 +10,15 @@ use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::{Interrupt, USART1, interrupt};
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::Serial;
+use uav_relay::GuardConfig;
 use uav_relay::flight::autopilot::Autopilot as Link;
+use uav_relay::flight::autopilot::FrameBytes;
 use uav_relay::flight::autopilot::carrot::Pace;
+#[cfg(feature = "mavlink-signing")]
+use uav_relay::flight::autopilot::{Signing, Stamp};
 #[cfg(feature = "upload")]
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::course::Course;
-use uav_relay::flight::mavlink::outgoing::FrameBytes;
-#[cfg(feature = "mavlink-signing")]
-use uav_relay::flight::mavlink::signing::{Signing, Stamp};
-use uav_relay::guard::config::GuardConfig;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay, Side};
 

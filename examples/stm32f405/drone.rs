@@ -1,9 +1,9 @@
 //! The drone, whatever its links are: what it is by its configuration.
 
-use uav_relay::guard::config::GuardConfig;
-use uav_relay::wire::auth::Auth;
+use uav_relay::Auth;
+use uav_relay::GuardConfig;
 #[cfg(feature = "auth")]
-use uav_relay::wire::auth::Key;
+use uav_relay::Key;
 use uav_relay::{Instant, Relay, Settings, Wiring};
 #[cfg(feature = "auth")]
 use uav_relay_kept::{epoch, journal::Journal};

@@ -3,7 +3,7 @@
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::USART1;
 use stm32f4xx_hal::rcc::Rcc;
-use uav_relay::guard::config::GuardConfig;
+use uav_relay::GuardConfig;
 use uav_relay::{Event, Instant, Mission, Relay};
 
 use super::config::Sites;

@@ -3,8 +3,8 @@
 use host_tests::flights::settle;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::optimiser::plan::silent_place;
 use uav_relay::optimiser::retreat::Retreat;
+use uav_relay::planning::silent_place;
 use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};

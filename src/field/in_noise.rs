@@ -21,6 +21,10 @@ use super::{Field, FieldPoint};
 /// A field, and the noise it is heard in.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(
+    unreachable_pub,
+    reason = "public through `optimiser` with the feature `internals`"
+)]
 pub struct InNoise<'a> {
     field: &'a Field,
     noise_w: f32,
@@ -28,7 +32,7 @@ pub struct InNoise<'a> {
 
 impl Field {
     /// The field as it is heard by receivers with noise of `noise_w` watts, 0 to 1.
-    pub const fn in_noise(&self, noise_w: f32) -> InNoise<'_> {
+    pub(crate) const fn in_noise(&self, noise_w: f32) -> InNoise<'_> {
         InNoise {
             field: self,
             noise_w,
@@ -47,7 +51,7 @@ impl InNoise<'_> {
     }
 
     /// Upsilon at `x_m`, 1/W, as [`Field::upsilon`] has it without noise.
-    pub const fn upsilon(&self, x_m: f32) -> f32 {
+    pub(crate) const fn upsilon(&self, x_m: f32) -> f32 {
         match self.field.around(x_m) {
             (left, Some(right)) => super::between(self.point(left), self.point(right), x_m),
             (end, None) => self.of(end.upsilon_per_w),
@@ -55,22 +59,22 @@ impl InNoise<'_> {
     }
 
     /// The largest Upsilon anywhere: what is larger without noise is so with it.
-    pub const fn largest(&self) -> f32 {
+    pub(crate) const fn largest(&self) -> f32 {
         self.of(self.field.largest)
     }
 
     /// Whether Upsilon is the same everywhere.
-    pub const fn is_constant(&self) -> bool {
+    pub(crate) const fn is_constant(&self) -> bool {
         !(self.of(self.field.smallest) < self.largest())
     }
 
     /// The points of the table, without noise.
-    pub const fn points(&self) -> &'static [FieldPoint] {
+    pub(crate) const fn points(&self) -> &'static [FieldPoint] {
         self.field.points
     }
 
     /// One of them with it.
-    pub const fn point(&self, point: FieldPoint) -> FieldPoint {
+    pub(crate) const fn point(&self, point: FieldPoint) -> FieldPoint {
         FieldPoint {
             x_m: point.x_m,
             upsilon_per_w: self.of(point.upsilon_per_w),

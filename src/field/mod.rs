@@ -8,7 +8,7 @@
 pub mod estimate;
 mod in_noise;
 
-pub use in_noise::InNoise;
+pub(crate) use in_noise::InNoise;
 
 /// The most points a field may have.
 pub const MAX_POINTS: usize = 1024;

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
 //! | [`course`] | that line for a mission, and how fast it is flown |
-//! | [`mavlink`] | the bytes that autopilots speak |
+//! | `mavlink` | the bytes that autopilots speak |
 //! | [`autopilot`] | where to fly, who flies, and where the drone is |
 //!
 //! ```
@@ -28,4 +28,8 @@
 pub mod autopilot;
 pub mod axis;
 pub mod course;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod mavlink;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod mavlink;

@@ -52,7 +52,7 @@ const QUESTIONS: u8 = 3;
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-/// use uav_relay::wire::frame::MAX_FRAME;
+/// use uav_relay::MAX_FRAME;
 /// use uav_relay::{Auth, Ground, Instant, Interference, Interferer, Key, Mission, MissionConfig, Progress, Side, Upload, Wiring};
 ///
 /// # fn example(loaded: &Mission, mut send: impl FnMut(&[u8]), received: &[u8]) -> Result<Progress, Box<dyn core::error::Error>> {

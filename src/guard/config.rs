@@ -54,7 +54,7 @@ pub struct GuardConfig {
     /// How far off its setpoint a relay may be reported that hovers there, m in each coordinate: 0 to 1e3. This much is taken from the separation at
     /// each of two relays.
     pub hover_m: f32,
-    /// Time after [`Guard::steer`](super::Guard::steer) gave a setpoint within which the relay flies toward it: the way of the setpoint to
+    /// Time after `Guard::steer` gave a setpoint within which the relay flies toward it: the way of the setpoint to
     /// the flight controller, and the time to stop from the greatest speed. With the autopilot link it is
     /// [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
@@ -71,7 +71,7 @@ impl GuardConfig {
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
-    /// use uav_relay::guard::config::GuardConfig;
+    /// use uav_relay::GuardConfig;
     ///
     /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
     /// assert!(guard.is_valid());

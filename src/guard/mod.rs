@@ -84,6 +84,17 @@
 //!   linked around those that are silent, so that rule 9 holds it back.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 mod association;
 pub mod config;
 mod fence;

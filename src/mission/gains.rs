@@ -6,12 +6,14 @@ use crate::power_ratio::PowerRatio;
 impl Mission {
     /// What multiplies the inverse interference of a place ([`crate::sir::quiet`]) on the first hop: `p_t` / `p_MSI`, in a field
     /// `p_t` `Upsilon_max` / eta.
+    #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
     /// What multiplies it on a hop that a relay of `power_w` watts feeds: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field
     /// `p_u` `Upsilon_max` / `mu_los`.
+    #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }

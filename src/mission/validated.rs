@@ -6,6 +6,7 @@ use super::parts::{Heading, Interference, Interferer, within};
 use super::unknown::{FAR, even_gains};
 use crate::field::{Field, InNoise};
 use crate::power_ratio::PowerRatio;
+use crate::wire::digest::digest;
 
 /// A validated mission, with what is derived from it once.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -219,6 +220,13 @@ impl Mission {
         &self.config
     }
 
+    /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
+    ///
+    /// It detects mistakes, not attacks: two different missions have the same digest once in 65 536.
+    pub fn digest(&self) -> u16 {
+        digest(self)
+    }
+
     /// Number of relays N.
     pub const fn relays(&self) -> u16 {
         self.config.relays
@@ -247,7 +255,7 @@ impl Mission {
     }
 
     /// The field as the receivers hear it, with their noise, where there is one.
-    pub const fn heard(&self) -> Option<InNoise<'_>> {
+    pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
             Some(field) => Some(field.in_noise(self.config.noise_w)),
             None => None,

@@ -28,7 +28,7 @@ pub enum Sample {
     Heard {
         /// Where the drone was: at most 100 D from the transmitter in each coordinate.
         at: Placement,
-        /// That power, W: 1e-30 to 1e6 ([`MEASURED_W`](crate::sensing::level::MEASURED_W)) above the noise.
+        /// That power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
     },
     /// The same at the ground transmitter, handed to relay 1, or to any of the first four.

@@ -9,6 +9,17 @@
 //!
 //! The node walks the same functions one hop a relay.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 pub mod joint;
 pub mod ladder;
 pub mod local;

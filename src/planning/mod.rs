@@ -2,8 +2,15 @@
 //!
 //! | for | files |
 //! | --- | --- |
-//! | one relay alone | [`single`]: Theorems 1 to 3, Algorithm 3 |
+//! | one relay alone | `single`: Theorems 1 to 3, Algorithm 3 |
 //! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
 
 pub mod fleet;
+#[cfg(not(feature = "internals"))]
+mod single;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod single;
+
+pub use crate::optimiser::plan::silent_place;
+pub use crate::optimiser::search::Infeasible;

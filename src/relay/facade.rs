@@ -264,7 +264,7 @@ impl Relay {
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
-    /// use uav_relay::wire::frame::MAX_FRAME;
+    /// use uav_relay::MAX_FRAME;
     /// use uav_relay::{Instant, Settings};
     ///
     /// let mut relay = relay(Settings::default());

@@ -35,7 +35,7 @@ impl Relay {
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
-    /// use uav_relay::guard::config::GuardConfig;
+    /// use uav_relay::GuardConfig;
     /// use uav_relay::{Instant, Placement, Settings};
     ///
     /// # #[cfg(feature = "guard")] {

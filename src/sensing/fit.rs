@@ -3,6 +3,17 @@
 //! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is what is left of the sums, over
 //! the places beyond the unknowns; four places' worth of what the operator expects is put to it, for of few places little is left.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 use super::factor::Factor;
 use super::nearest::nearest;
 use super::sums::Sums;

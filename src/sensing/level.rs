@@ -1,5 +1,16 @@
 //! How strong the interference is at an end of the chain, on the ground; and what powers may be measured anywhere.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 /// The least and the largest interference that may be measured, W, at a relay less the noise of its receiver. The square of each, and of
 /// the ratio of any two, taken as [`sensing`](crate::sensing) takes them, is a finite number; what is outside is refused.
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);

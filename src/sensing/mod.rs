@@ -14,12 +14,12 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | `terms` | the four terms of a place, and the coefficients of a source |
-//! | [`sums`] | what a pass adds up along the chain |
+//! | `sums` | what a pass adds up along the chain |
 //! | `listener` | what one relay has heard, place by place, and how it fades |
-//! | [`level`] | what the transmitter and the receiver hear, on the ground |
+//! | `level` | what the transmitter and the receiver hear, on the ground |
 //! | `average` | a mean that fades |
 //! | `factor` | a 4 x 4 system, solved |
-//! | [`fit`] | the source that the sums speak of, how sure that is, and when none does |
+//! | `fit` | the source that the sums speak of, how sure that is, and when none does |
 //! | `nearest` | the source nearest to sums of something else |
 //! | [`belief`] | what the chain flies by, and when another fit takes its place |
 //! | `track` | the velocity of an interferer that moves |
@@ -35,10 +35,24 @@ pub mod belief;
 pub(crate) mod doubt;
 mod ends;
 mod factor;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod fit;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod fit;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod level;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod level;
 pub(crate) mod listener;
 mod nearest;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod sums;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod sums;
 pub(crate) mod terms;
 pub(crate) mod track;
+
+pub use fit::Unfit;

@@ -1,5 +1,16 @@
 //! What a pass adds up along the chain: all that a fit needs to know of what was heard, in eighteen numbers.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 use super::terms::Terms;
 use crate::root::sqrt;
 

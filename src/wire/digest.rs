@@ -77,7 +77,7 @@ const fn low_half(crc: u32) -> u16 {
 pub struct MissionId {
     /// The operator's number of an uploaded mission, from 1; 0 is the mission that was loaded before flight.
     pub version: u16,
-    /// [`digest`] of the mission, with all its relays.
+    /// `digest` of the mission, with all its relays.
     pub digest: u16,
 }
 

@@ -2,6 +2,17 @@
 //! the addresses, [`message`] is what neighbours say, [`digest`] how they tell missions apart, [`auth`] how they tell
 //! members from others, `upload` how a newer mission is told, [`node_number`] which nodes there can be. `FORMAT.md` beside this file has byte tables and examples.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 pub mod auth;
 #[cfg(feature = "auth")]
 mod blake2s;

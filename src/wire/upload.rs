@@ -5,7 +5,7 @@
 //! numbered by, and it is of one interferer: a field does not fit into a frame.
 
 use super::digest::{MissionId, between, digest, of};
-pub use super::message::UPLOAD as LENGTH;
+use super::message::UPLOAD;
 use crate::line::{self, LineError};
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 use crate::sites::Sites;
@@ -69,6 +69,9 @@ impl core::fmt::Display for UploadError {
 impl core::error::Error for UploadError {}
 
 impl Upload {
+    /// Bytes of an encoded upload.
+    pub const LENGTH: usize = UPLOAD;
+
     /// `config` as version `version`, 1 to 65535, for relays that were loaded with `base`. Where rounding has put eta of its channel
     /// a bit outside of the other two factors, it becomes the nearer of them.
     ///

@@ -73,7 +73,7 @@ mod types;
 #[cfg(not(target_os = "none"))]
 mod write;
 
-use uav_relay::wire::crc::CRC_32C;
+use uav_relay::CRC_32C;
 use uav_relay::{FieldPoint, Identity, Interferer, Method, Mission, MissionConfig};
 
 use reader::Reader;

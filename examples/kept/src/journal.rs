@@ -12,7 +12,7 @@
 //!
 //! An erase stops the CPU. [`Journal::tidy`] does it at a start; in flight [`Journal::keep`] does it only where it is told that it may.
 
-use uav_relay::wire::crc::CRC_32C;
+use uav_relay::CRC_32C;
 
 /// A word in which nothing is written.
 pub const BLANK: u32 = u32::MAX;

@@ -1,7 +1,7 @@
 //! A frame, taken apart.
 
+use uav_relay::CRC_32C;
 use uav_relay::wire::auth::TAG;
-use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, Header};
 use uav_relay::wire::message::{Message, MessageError};

@@ -3,10 +3,10 @@
 
 use std::collections::VecDeque;
 
+use uav_relay::CRC_32C;
+use uav_relay::MAX_FRAME;
 use uav_relay::SetupError;
 use uav_relay::channel::AirGround;
-use uav_relay::wire::crc::CRC_32C;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Band, Channel, Duration, Identity, Instant, Interference, Interferer, Mission, MissionConfig,
     Port, Profile, Relay, Settings, Wiring,

@@ -145,7 +145,7 @@ fn what_was_left_out_is_refused() {
     );
     let mission = paper(5);
     let guarded = Settings {
-        guard: Some(uav_relay::guard::config::GuardConfig::of(
+        guard: Some(uav_relay::GuardConfig::of(
             &mission,
             mission.config().common,
         )),

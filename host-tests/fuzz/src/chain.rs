@@ -5,7 +5,7 @@ mod uploads;
 
 use std::collections::VecDeque;
 
-use uav_relay::wire::auth::Auth;
+use uav_relay::Auth;
 use uav_relay::{Duration, Instant, Mission, Placement, Port, Sample, Settings, Wiring};
 
 use super::input::Input;

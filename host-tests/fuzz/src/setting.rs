@@ -1,12 +1,12 @@
 //! A mission and the settings of a relay, from a fuzzer's bytes: within the ranges the crate takes, up to their ends.
 
+use uav_relay::GuardConfig;
 use uav_relay::channel::AirGround;
-use uav_relay::guard::config::GuardConfig;
-use uav_relay::wire::auth::{Auth, Key};
 use uav_relay::{
     Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local,
     Measure, Method, Mission, MissionConfig, Placement, Profile, Schedule, Settings, Wiring,
 };
+use uav_relay::{Auth, Key};
 
 use super::input::Input;
 

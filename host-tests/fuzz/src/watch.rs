@@ -4,9 +4,9 @@
 mod frames;
 mod number;
 
-use uav_relay::guard::config::GuardConfig;
-use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::wire::upload::Upload;
+use uav_relay::GuardConfig;
+use uav_relay::MAX_FRAME;
+use uav_relay::Upload;
 use uav_relay::{
     Event, Identity, Instant, Method, Mission, MissionConfig, Placement, Port, Relay, Sample,
     Settings, Side, Sites, Stats, ViewId,

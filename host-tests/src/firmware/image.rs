@@ -32,7 +32,7 @@ pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     if smallest {
         command.args(["--no-default-features", "--features", "defmt"]);
     } else {
-        command.args(["--features", "defmt,async"]);
+        command.args(["--features", "defmt,async,internals"]);
     }
     for example in examples {
         command.args(["--example", example]);

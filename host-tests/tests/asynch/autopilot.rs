@@ -18,6 +18,7 @@ use mavlink::dialects::common::{
     SET_POSITION_TARGET_GLOBAL_INT_DATA, TIMESYNC_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+use uav_relay::GuardConfig;
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, Clock};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
@@ -25,7 +26,6 @@ use uav_relay::flight::autopilot::{
     Autopilot, AutopilotEvent, FlightMode, Kind, Release, ReleaseCause,
 };
 use uav_relay::flight::axis::Axis;
-use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Duration, Geodetic, Instant, Mission, Placement, Relay, Settings, Side, Sites};
 
 use crate::time::Time;

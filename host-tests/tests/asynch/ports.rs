@@ -95,7 +95,7 @@ fn deframed(bytes: &[u8]) -> [usize; 2] {
         match deframer.push(byte) {
             Some(Ok(plain)) => {
                 let (body, sum) = plain.split_at(plain.len() - 4);
-                let whole = uav_relay::wire::crc::CRC_32C.checksum(body).to_le_bytes() == *sum;
+                let whole = uav_relay::CRC_32C.checksum(body).to_le_bytes() == *sum;
                 counted[usize::from(!whole)] += 1;
             }
             Some(Err(_)) => counted[1] += 1,

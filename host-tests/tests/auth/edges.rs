@@ -1,8 +1,8 @@
 //! Counters and epochs at their limits, with frames that only somebody who has the key can make.
 
 use host_tests::fixtures::mission;
+use uav_relay::MAX_FRAME;
 use uav_relay::SetupError;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};

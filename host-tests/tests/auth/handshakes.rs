@@ -1,7 +1,7 @@
 //! What recorded handshakes can do: at most delay a first contact until the true one comes.
 
 use rand::seq::IndexedRandom;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{Event, Instant, Port, Side, Wiring};
 
 use super::frames::plain;

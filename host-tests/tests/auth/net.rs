@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use host_tests::fixtures::mission;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{
     Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, Mission,
     MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,

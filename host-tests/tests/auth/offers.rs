@@ -3,8 +3,8 @@
 use host_tests::fixtures::mission;
 use rand::RngExt;
 use rand::seq::IndexedRandom;
+use uav_relay::Upload;
 use uav_relay::ground::Progress;
-use uav_relay::wire::upload::LENGTH;
 use uav_relay::{Identity, Instant, Port, Relay, Settings, Side, Wiring};
 
 use super::frames::{HEADER, Plain, SIGNED, TAG, nonce, plain};
@@ -20,9 +20,9 @@ pub(crate) fn is_offer(frame: &Plain) -> bool {
 
 /// The body of an offer of a mission that is none of those that were uploaded.
 fn offered(relays: u16, version: u16) -> Vec<u8> {
-    let mut body = [0; LENGTH];
+    let mut body = [0; Upload::LENGTH];
     let len = newer(&mission(relays), version).encode(&mut body).unwrap();
-    assert_eq!((len, body[0]), (LENGTH, OFFER));
+    assert_eq!((len, body[0]), (Upload::LENGTH, OFFER));
     // Which hello it answers is not kept with an upload.
     [&body[..], &version.to_le_bytes()].concat()
 }

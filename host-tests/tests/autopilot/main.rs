@@ -357,7 +357,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
 #[test]
 fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
     use uav_relay::Event;
-    use uav_relay::guard::HoldReason::Unheard;
+    use uav_relay::HoldReason::Unheard;
 
     let texts_since = |vehicle: &Vehicle, from: Instant| -> Vec<String> {
         let texts = vehicle.said.iter().filter_map(|(at, said)| match said {
@@ -415,7 +415,7 @@ fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
 /// Reasons come and go while an agreement spreads.
 #[test]
 fn a_reason_that_does_not_last_is_not_told() {
-    use uav_relay::guard::HoldReason::Close;
+    use uav_relay::HoldReason::Close;
 
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.run(2_000);
@@ -435,7 +435,7 @@ fn a_reason_that_does_not_last_is_not_told() {
 
 #[test]
 fn the_operator_reads_why_the_guard_holds_the_relay_back() {
-    use uav_relay::guard::HoldReason::{Order, Unheard};
+    use uav_relay::HoldReason::{Order, Unheard};
 
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     let order = "relay: waits, wrong order with the next drone";

@@ -2,8 +2,8 @@
 
 use sha2::{Digest as _, Sha256};
 use uav_relay::flight::autopilot::trust::Mistrust;
+use uav_relay::flight::autopilot::{Signing, Stamp};
 use uav_relay::flight::mavlink::frame::checksum;
-use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 use uav_relay::flight::mavlink::table;
 
 use super::*;

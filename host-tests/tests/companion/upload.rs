@@ -2,7 +2,6 @@
 
 use rustix::process::Signal;
 use uav_relay::Upload;
-use uav_relay::wire::upload::LENGTH;
 use uav_relay_scenario::mission;
 use uav_relay_scenario::{Interference, Scenario, Source};
 
@@ -153,8 +152,8 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
 fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
     let [base, new] = [base, config].map(|scenario| mission::mission(scenario, 1, 1e-4).unwrap().0);
     let upload = Upload::new(&base, 5, *new.config()).unwrap();
-    let mut bytes = vec![0; LENGTH];
-    assert_eq!(upload.encode(&mut bytes), Some(LENGTH));
+    let mut bytes = vec![0; Upload::LENGTH];
+    assert_eq!(upload.encode(&mut bytes), Some(Upload::LENGTH));
     let check = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(check.to_le_bytes());
     bytes
@@ -185,7 +184,7 @@ fn a_file_that_is_of_no_use_is_named_and_not_used() {
         (good.clone(), None),
         (damaged, Some("is damaged, or no upload; not used")),
         (
-            good[..LENGTH].to_vec(),
+            good[..Upload::LENGTH].to_vec(),
             Some("is damaged, or no upload; not used"),
         ),
         (Vec::new(), Some("is damaged, or no upload; not used")),

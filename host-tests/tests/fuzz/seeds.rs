@@ -10,7 +10,7 @@
 use std::fs;
 
 use serde::Deserialize;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{Identity, Instant, Port, Relay, Settings};
 use uav_relay_fuzz::input::Input;
 use uav_relay_fuzz::watch::NETWORK;

@@ -2,8 +2,8 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use uav_relay::GuardConfig;
 use uav_relay::Side;
-use uav_relay::guard::config::GuardConfig;
 
 use uav_relay_sim::simulator::drones::Point;
 

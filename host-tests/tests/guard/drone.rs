@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use uav_relay::GuardConfig;
 use uav_relay::guard::Guard;
-use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Instant, Placement, Side};
 use uav_relay_sim::simulator::drones::{Body, Point};
 

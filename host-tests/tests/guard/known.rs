@@ -1,8 +1,8 @@
 //! A chain that is as tight as it can be shifts at once, and how long that takes.
 
-use uav_relay::guard::HoldReason;
-use uav_relay::guard::config::{Geofence, GuardConfig};
+use uav_relay::HoldReason;
 use uav_relay::{Duration, Side};
+use uav_relay::{Geofence, GuardConfig};
 
 use uav_relay_sim::simulator::drones::Point;
 

@@ -21,8 +21,8 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{Duration, Side};
+use uav_relay::{Geofence, GuardConfig};
 
 use uav_relay_sim::simulator::drones::Point;
 

@@ -2,9 +2,9 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use uav_relay::GuardConfig;
 use uav_relay::Side;
 use uav_relay::guard::Fence;
-use uav_relay::guard::config::GuardConfig;
 
 use uav_relay_sim::simulator::drones::Point;
 

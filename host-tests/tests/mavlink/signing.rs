@@ -3,9 +3,9 @@
 use host_tests::python;
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;
+use uav_relay::flight::autopilot::{Flaw, Signing, Stamp};
 use uav_relay::flight::mavlink::frame::checksum;
 use uav_relay::flight::mavlink::outgoing::Outgoing;
-use uav_relay::flight::mavlink::signing::{Flaw, Signing, Stamp};
 use uav_relay::flight::mavlink::table;
 
 use super::ours::framed;

@@ -3,7 +3,7 @@
 use host_tests::flights::{eight_apart, exact};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::guard::config::GuardConfig;
+use uav_relay::GuardConfig;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 

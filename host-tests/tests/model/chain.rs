@@ -1,8 +1,8 @@
 //! The relays, connected, and the clock: after every turn of a main loop the rules are checked.
 
 use proptest::prop_assert;
+use uav_relay::MAX_FRAME;
 use uav_relay::Phase;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Duration, Event, Instant, Port, Relay, Side};
 
 use super::Checked;

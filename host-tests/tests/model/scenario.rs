@@ -2,11 +2,11 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::wire::auth::{Auth, Key};
 use uav_relay::{
     Adjust, Identity, Instant, Local, Measure, Method, Mission, MissionConfig, Profile, Relay,
     Settings,
 };
+use uav_relay::{Auth, Key};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::joint::scenario as joint_scenario;
 use uav_relay_oracle::random::{Chain, Style, link as random_link, log_uniform};

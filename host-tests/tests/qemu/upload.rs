@@ -8,7 +8,7 @@ use host_tests::firmware::emulator::{Kept, SPEED};
 use host_tests::firmware::journal::{Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
 use host_tests::firmware::uploads::{SECTORS, WORDS, kept};
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
 use uav_relay_scenario::{Interference, Scenario, Source};
 use uav_relay_sim::simulator::faults::Faults;

@@ -1,8 +1,8 @@
 //! Numbers, missions and settings from the whole of their stated ranges, their ends as often as all between.
 
 use rand::{Rng, RngExt};
+use uav_relay::GuardConfig;
 use uav_relay::channel::AirGround;
-use uav_relay::guard::config::GuardConfig;
 use uav_relay::{
     Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local,
     Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,

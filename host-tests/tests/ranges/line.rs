@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
+use uav_relay::MAX_FRAME;
 use uav_relay::sensing::belief::Belief;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Duration, Event, Identity, Instant, Mission, Phase, Placement, Port, Relay, Settings, Wiring,
 };

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::guard::config::GuardConfig;
+use uav_relay::GuardConfig;
 use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
 
 use crate::draw::signed;

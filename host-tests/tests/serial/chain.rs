@@ -1,8 +1,8 @@
 //! A chain of relays on mock ports, run on a virtual clock; and the same chain without any ports, to compare with.
 
 use host_tests::fixtures;
+use uav_relay::MAX_FRAME;
 use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Duration, Event, FrameBuf, Instant, Mission, Placement, Port, Relay, Settings, Side, Wiring,
 };

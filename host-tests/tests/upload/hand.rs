@@ -1,8 +1,8 @@
 //! What a single relay does with an upload, and the ground with its answers.
 
+use uav_relay::MAX_FRAME;
+use uav_relay::UploadError;
 use uav_relay::ground::Progress;
-use uav_relay::wire::frame::MAX_FRAME;
-use uav_relay::wire::upload::{LENGTH, UploadError};
 use uav_relay::{
     Auth, Event, Field, FieldPoint, Ground, Identity, Key, Port, Relay, Settings, ViewId, Wiring,
 };
@@ -99,11 +99,11 @@ fn an_upload_says_what_is_wrong_with_it() {
 fn what_is_stored_is_read_back_and_nothing_else() {
     let base = mission(3);
     let stored = new_place(&base, 9);
-    let mut bytes = [0; LENGTH];
-    assert_eq!(stored.encode(&mut bytes), Some(LENGTH));
-    assert_eq!(stored.encode(&mut [0; LENGTH - 1]), None);
+    let mut bytes = [0; Upload::LENGTH];
+    assert_eq!(stored.encode(&mut bytes), Some(Upload::LENGTH));
+    assert_eq!(stored.encode(&mut [0; Upload::LENGTH - 1]), None);
     assert_eq!(Upload::decode(&bytes), Some(stored));
-    for len in 0..LENGTH {
+    for len in 0..Upload::LENGTH {
         assert_eq!(Upload::decode(&bytes[..len]), None);
     }
     let mut longer = bytes.to_vec();

@@ -3,8 +3,8 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+use uav_relay::GuardConfig;
 use uav_relay::ground::Progress;
-use uav_relay::guard::config::GuardConfig;
 use uav_relay::{Band, Event, FlownMission, LineError, Profile, Settings};
 
 use super::wires::Wires;

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use uav_relay::MAX_FRAME;
 use uav_relay::ground::Progress;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{
     Auth, Event, FlownMission, Ground, Identity, Key, Placement, Port, Relay, Settings, Wiring,
 };

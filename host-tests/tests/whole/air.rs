@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{
     Auth, Event, Identity, Instant, Key, Mission, Phase, Port, Relay, Settings, Upload, ViewRecord,
     Wiring,

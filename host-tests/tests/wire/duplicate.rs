@@ -1,7 +1,7 @@
 //! Claims to a node number: what a relay without a key makes of them, and what one with a key makes of frames under its number.
 
+use uav_relay::MAX_FRAME;
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Auth, Event, Identity, Instant, Key, Port, Relay, Settings, Wiring};
 
 use super::codec::Said;

@@ -4,9 +4,9 @@ use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
 use blake2::digest::{FixedOutput, Mac};
 use host_tests::fixtures::{NETWORK, paper};
+use uav_relay::MAX_FRAME;
 use uav_relay::wire::auth::{Auth, Key, TAG};
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Duration, Identity, Instant, Mission, Port, Relay, Settings, Wiring};
 
 use super::codec::{Greeting, Said, header, sealed, wire};

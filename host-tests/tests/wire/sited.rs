@@ -2,13 +2,13 @@
 //! along another.
 
 use host_tests::fixtures::paper;
-use uav_relay::guard::config::{Geofence, GuardConfig};
+use uav_relay::UploadError;
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::upload::UploadError;
 use uav_relay::{
     Duration, Event, Geodetic, Instant, LineError, Mission, Placement, Port, Relay, Settings,
     Sites, Upload, Wiring,
 };
+use uav_relay::{Geofence, GuardConfig};
 
 use super::adopted::adopts;
 use super::codec::{Fenced, Said};
@@ -247,7 +247,7 @@ fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has
             now = now + Duration::from_millis(100);
             relay.handle_position(now, now, Placement::on_line(x_m, 20.0));
             relay.handle_timeout(now);
-            let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+            let mut frame = [0; uav_relay::MAX_FRAME];
             while relay.poll_transmit(now, &mut frame).is_some() {}
         }
         now

@@ -2,8 +2,8 @@
 //! what is left after a reboot. `ground` has what Tx and Rx say.
 
 use host_tests::fixtures::paper;
+use uav_relay::UploadError;
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::upload::UploadError;
 use uav_relay::{
     Duration, Event, Instant, LineError, Mission, MissionConfig, Port, Relay, Settings, Upload,
     Wiring,

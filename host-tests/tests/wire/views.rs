@@ -75,7 +75,6 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
                 } else {
                     relay.clone()
                 };
-                let before = counted(after.stats());
                 let said = &one_of_each(FIRST, own.wrapping_add(off))[kind];
                 after.handle_bytes(now, port, &framed(4, port, said));
                 let stale = known && neighbour == 5;

@@ -3,9 +3,17 @@
 use crate::geodetic::Geodetic;
 
 /// The shortest line: the units of a latitude turn it by a thousandth.
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unreachable_pub, reason = "public with the feature `internals`")
+)]
 pub const SHORTEST_M: f64 = 10.0;
 
 /// The longest line whose accuracy is known.
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unreachable_pub, reason = "public with the feature `internals`")
+)]
 pub const LONGEST_M: f64 = 100_000.0;
 
 /// What is wrong with a pair of sites.
@@ -16,12 +24,12 @@ pub enum AxisError {
     Tx(Geodetic),
     /// The latitude or longitude of the receiver is not on earth.
     Rx(Geodetic),
-    /// The sites are nearer to each other than [`SHORTEST_M`].
+    /// The sites are nearer to each other than 10 m.
     TooShort {
         /// The distance, m.
         distance_m: f64,
     },
-    /// The sites are farther from each other than [`LONGEST_M`].
+    /// The sites are farther from each other than 100 km.
     TooLong {
         /// The distance, m: of the chord.
         distance_m: f64,

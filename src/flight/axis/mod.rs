@@ -40,7 +40,12 @@ use crate::sites::Sites;
 use angle::{UNIT, turned};
 use vector::{Vector, radius};
 
-pub use error::{AxisError, LONGEST_M, SHORTEST_M};
+pub use error::AxisError;
+#[cfg(not(feature = "internals"))]
+use error::{LONGEST_M, SHORTEST_M};
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub use error::{LONGEST_M, SHORTEST_M};
 
 /// How far from the line a place may be, and before and behind its ends, m.
 pub const AROUND_M: f32 = 5_000.0;

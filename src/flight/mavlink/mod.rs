@@ -13,6 +13,17 @@
 //! A number that no enum has, and a message that the table has not, cost nothing but their bytes. MAVLink 1 is not read; an autopilot
 //! that begins with it changes to MAVLink 2 as soon as it has heard a frame of that.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 pub mod frame;
 pub mod incoming;
 pub mod outgoing;

@@ -1,6 +1,6 @@
 //! The paper's eq. (Opt) and Problem 1: how many relays it takes until the reaches of a pass end within the last hop.
 //!
-//! No chain gets farther than the reaches do (see [`pass`](crate::optimiser::pass)), so n relays whose reaches do not end near enough
+//! No chain gets farther than the reaches do (see `pass`), so n relays whose reaches do not end near enough
 //! cannot meet the target. The printed search begins with two relays; one may do.
 
 use super::Fewest;

@@ -3,13 +3,17 @@
 //! | interference | relays | file | how good |
 //! | --- | --- | --- | --- |
 //! | one interferer | any | [`farthest`] | exact where it says so: no chain with one relay fewer meets the target |
-//! | a field | all alike | [`ranges`] | exact, in an uneven field too, which the paper leaves to an exhaustive search |
+//! | a field | all alike | `ranges` | exact, in an uneven field too, which the paper leaves to an exhaustive search |
 //! | a field | other | [`farthest`] | what Algorithm 4 finds; not proven |
 //!
 //! A least separation can only raise the number: a number that is the same without it is proven, any other is not.
 //! Nothing here is meant for a relay's main loop; nothing allocates either.
 
 pub mod farthest;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod ranges;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod ranges;
 
 use crate::mission::{MAX_RELAYS, Mission, Profile};
@@ -47,7 +51,7 @@ const HALVINGS: u8 = 32;
 ///
 /// `profile_of` gives what relay 1..=N holds. Equal to an exhaustive count wherever `proven`:
 /// `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay, and once more all
-/// of them where they must keep a distance; in a field at most 32 chains of [`ranges`].
+/// of them where they must keep a distance; in a field at most 32 chains of `ranges`.
 ///
 /// # Errors
 /// [`Infeasible`] when no number of relays meets it; [`most`] has what they can meet.

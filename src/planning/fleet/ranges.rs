@@ -3,6 +3,17 @@
 //! More equals never meet less where they may stand as close as they like, and N of them meet a target if and only if the ranges
 //! of [`retreat`](crate::optimiser::retreat) end in a place that the first hop reaches.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 use super::Fewest;
 use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::optimiser::walk::Walk;

@@ -3,6 +3,17 @@
 //! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at some place: above Tx (C_1),
 //! above Rx (C_2), and at the bottom of SIR_1's valley (C_3). The paper writes them out; here they are the SIRs' own formulas.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 use super::Two;
 use crate::mission::{Mission, Profile};
 use crate::sir::{Extremum, first_hop_turn};

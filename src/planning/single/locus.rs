@@ -16,6 +16,17 @@
 //!  Worked out in f64, and so exact to the last place of the f32
 //! that comes out. Accuracy: `the_locus_is_where_the_hops_are_equal` in `host-tests/tests/theorems/`.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 use crate::mission::Mission;
 
 /// The altitudes, m, lower first, at which a relay of `power_w` watts at `x_m` has SIR_1 = SIR_2: the paper's h^- and h^+.

@@ -14,6 +14,17 @@
 //! SIR_2 rises with x and falls with the altitude, always. Where receivers have noise SIR_1 may turn once more, and the best place of
 //! Theorem 3 may lie inside the box (`touching`); the mission's noise is in all of them but [`noise`], which has its own.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        dead_code,
+        unused_imports,
+        clippy::trivially_copy_pass_by_ref,
+        unreachable_pub,
+        reason = "the tests of this workspace use these items through the feature `internals`"
+    )
+)]
+
 pub mod aside;
 mod corridor;
 mod edge;
@@ -21,7 +32,15 @@ mod edge_noise;
 pub mod free;
 pub mod given_altitude;
 pub mod given_x;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod guide;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod guide;
+#[cfg(not(feature = "internals"))]
+pub(crate) mod locus;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod locus;
 pub mod noise;
 pub mod stochastic;

@@ -28,7 +28,7 @@ pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
 
 /// As it is stored: without what it answers, which says nothing of the mission.
 impl Upload {
-    /// Writes it as it is to be stored, [`LENGTH`](crate::wire::upload::LENGTH) bytes, into `buffer`; `None` if it does not fit.
+    /// Writes it as it is to be stored, [`Upload::LENGTH`] bytes, into `buffer`; `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         write(&(tag::OFFER, OfferBody::of(self)), buffer)
     }

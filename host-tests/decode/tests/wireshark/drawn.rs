@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use uav_relay::wire::crc::CRC_32C;
+use uav_relay::CRC_32C;
 use uav_relay_decode::format::{Field, Format, Kind};
 
 /// A frame of the message of tag `kind`; one above the last is a handshake.

@@ -3,9 +3,9 @@
 
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;
+use uav_relay::flight::autopilot::{Signing, Stamp};
 use uav_relay::flight::mavlink::incoming::Incoming;
 use uav_relay::flight::mavlink::parser::{Parser, Received};
-use uav_relay::flight::mavlink::signing::{Signing, Stamp};
 
 use crate::input::Input;
 

@@ -1,6 +1,6 @@
 //! What stands around a body.
 
-use uav_relay::wire::crc::CRC_32C;
+use uav_relay::CRC_32C;
 
 /// Who sends a frame to whom, as words: what stands in the top bits of an address goes on the wire too.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -7,9 +7,9 @@ use crate::simulator::drones::Point;
 use crate::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
 use crate::simulator::setup::Setup;
 use clap::Args;
+use uav_relay::GuardConfig;
 use uav_relay::Instant;
 use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
-use uav_relay::guard::config::GuardConfig;
 
 use super::times::span;
 

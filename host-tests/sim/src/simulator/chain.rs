@@ -24,8 +24,8 @@ pub use state::Chain;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use uav_relay::MAX_FRAME;
 use uav_relay::SetupError;
-use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Instant, Placement, Sample};
 
 use judge::Touched;

@@ -2,9 +2,9 @@
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
+use uav_relay::CRC_32C;
 use uav_relay::SetupError;
 use uav_relay::wire::auth::TAG;
-use uav_relay::wire::crc::CRC_32C;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::{MissionId, digest};
 use uav_relay::wire::frame::{self, HEADER, Header, MAX_FRAME};

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{
     Auth, Event, Ground, Identity, Instant, Key, Mission, Port, Relay, Settings, Wiring,
 };

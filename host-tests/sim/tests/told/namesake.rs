@@ -121,7 +121,7 @@ fn forged_frames_have_nobody_stand_down() {
     let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
     air.run(60);
     let mut liar = relay(&mission, 2, auth([1; 32], 99), air.now);
-    let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+    let mut frame = [0; uav_relay::MAX_FRAME];
     for _ in 0..60 {
         while let Some(transmit) = liar.poll_transmit(air.now, &mut frame) {
             air.play(&frame[..transmit.len]);

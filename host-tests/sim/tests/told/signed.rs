@@ -27,7 +27,7 @@ fn two_forged_handshakes_are_noise() {
     let mission = mission(3);
     let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
     let mut stranger = relay(&mission, 2, auth([1; 32], 9), air.now);
-    let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+    let mut frame = [0; uav_relay::MAX_FRAME];
     air.run(30);
     for _ in 0..2 {
         let transmit = stranger.poll_transmit(air.now, &mut frame).unwrap();
@@ -96,7 +96,7 @@ fn a_neighbour_that_is_heard_at_both_ports_is_told() {
         .unwrap()
     };
     let (mut middle, mut head) = (of(2), of(1));
-    let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+    let mut frame = [0; uav_relay::MAX_FRAME];
     let now = uav_relay::Instant::from_millis(6_000);
     while let Some(at) = head.poll_timeout().filter(|at| *at <= now) {
         head.handle_timeout(at);

@@ -1,7 +1,7 @@
 //! An offer that was withheld in a live session and is played later.
 
 use crate::air::mission;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{
     Ground, Interference, Interferer, Mission, MissionConfig, Progress, Settings, Side, Upload,
     Wiring,

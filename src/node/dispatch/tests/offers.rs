@@ -10,7 +10,9 @@ use crate::time::Duration;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Hello, Message, Poll, Proposal};
-use crate::wire::upload::{LENGTH, Upload};
+use crate::wire::upload::Upload;
+
+const LENGTH: usize = Upload::LENGTH;
 
 /// The first view that relay 1 proposes.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);

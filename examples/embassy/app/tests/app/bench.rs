@@ -17,7 +17,7 @@ use relay_app::board::Board;
 use relay_app::drone::{Refused, Room};
 use uav_relay::asynch::Clock as _;
 use uav_relay::channel::AirGround;
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{
     Auth, Band, Event, Identity, Instant, Interference, Interferer, Key, Method, Mission,
     MissionConfig, Placement, Port, Profile, Relay, Settings, Wiring,

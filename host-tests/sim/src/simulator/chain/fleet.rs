@@ -1,8 +1,8 @@
 //! Drones with autopilots: each step they fly on and talk with the links of their relays, which say where to fly and hear where they are.
 
+use uav_relay::HoldReason;
 use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::guard::HoldReason;
 use uav_relay::{Duration, Instant, Side};
 
 use super::super::drones::{Nearest, Point, apart};

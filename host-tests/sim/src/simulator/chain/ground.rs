@@ -1,6 +1,6 @@
 //! The ground's end of an upload.
 
-use uav_relay::wire::frame::MAX_FRAME;
+use uav_relay::MAX_FRAME;
 use uav_relay::{Port, Side, Wiring};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;

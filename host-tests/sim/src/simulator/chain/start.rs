@@ -1,7 +1,7 @@
 //! A relay of the run that is switched on.
 
 use uav_relay::SetupError;
-use uav_relay::wire::upload::Upload;
+use uav_relay::Upload;
 use uav_relay::{Identity, Instant, Relay, Settings, ViewRecord};
 
 use super::super::forge::NETWORK;

@@ -1,7 +1,7 @@
 //! The state of a run: its relays, the ground, the drones, and what is still to happen.
 
 use rand_chacha::ChaCha8Rng;
-use uav_relay::wire::upload::Upload;
+use uav_relay::Upload;
 use uav_relay::{Instant, Placement, Relay};
 
 use super::super::attack::Attacker;

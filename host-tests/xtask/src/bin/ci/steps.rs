@@ -106,6 +106,10 @@ pub(crate) fn all() -> Vec<Step> {
         environment: &[("RUSTDOCFLAGS", "-D warnings")],
         ..step("documentation", "cargo doc --workspace --no-deps --locked")
     });
+    steps.push(step(
+        "public items",
+        "cargo run --quiet --package uav-relay-xtask --bin items",
+    ));
     steps.extend(firmware());
     steps.extend(embassy());
     steps.push(step(
@@ -152,7 +156,7 @@ fn clippy() -> Vec<Step> {
         on_target("clippy, target, no features", "--no-default-features"),
         on_target(
             "clippy, target, its log, asynchronous",
-            "--features defmt,async",
+            "--features defmt,async,internals",
         ),
     ]
 }

@@ -8,7 +8,7 @@ use super::image::{build, run};
 use super::row::{Row, row};
 
 pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
-    let counted = count(&build("cost", &[])?)?;
+    let counted = count(&build("cost", &["--features", "internals"])?)?;
     let figure = |name: &str| figure(&counted, name);
     let settled = [
         "settled",
@@ -48,7 +48,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     rows.extend(table(&counted, SIGNED)?);
     rows.extend(table(&counted, UPLOADED)?);
     // An image of its own: with more in it the compiler makes other choices in all of it.
-    let runners = count(&build("cost", &["--features", "async"])?)?;
+    let runners = count(&build("cost", &["--features", "async,internals"])?)?;
     rows.extend(table(&runners, RUNNERS)?);
     rows.extend(table(&runners, FLOWN)?);
     Ok(rows)

@@ -1,0 +1,28 @@
+//! Counts the items of the library's public interface, in the `all.html` that `cargo doc` has written, and fails above [`MOST`].
+
+use std::path::Path;
+use std::process::ExitCode;
+
+/// The largest permitted number of public items.
+const MOST: usize = 120;
+
+fn main() -> ExitCode {
+    let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    let page = Path::new(&target).join("doc/uav_relay/all.html");
+    let items = match std::fs::read_to_string(&page) {
+        // Links with `#` lead to the sections of the page itself.
+        Ok(text) => {
+            text.matches("<li><a href=\"").count() - text.matches("<li><a href=\"#").count()
+        }
+        Err(error) => {
+            eprintln!("{}: {error}; run `cargo doc` first", page.display());
+            return ExitCode::FAILURE;
+        }
+    };
+    println!("{items} public items, at most {MOST}");
+    if items == 0 || items > MOST {
+        eprintln!("hide what only tests of the workspace use behind the feature `internals`");
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}
