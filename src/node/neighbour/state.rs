@@ -11,9 +11,9 @@
 //! taken is paired with until its hello names this relay and hears it, or anything else comes from it: then it is `Linked`. A hello of the
 //! linked one that names this relay but does not hear it ends nothing, since a run of lost frames is measured by silence.
 //! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
-//! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out. Where two links cross, as
-//! 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other, neither of the two parts could go on: of them that of the node nearest to Rx is
-//! given up, 4 takes 3, and 2 is left out.
+//! relays hang together, or all that the last view had beyond the node taken: then the link that is missing is on the other side of the node
+//! taken, and it is left out. Where two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other, neither of the two parts
+//! could go on: of them that of the node nearest to Rx is given up, 4 takes 3, and 2 is left out.
 //!
 //! While it pairs or searches, it sends hellos that ask to the four nearest nodes there, the one taken among them: as many as three relays in
 //! a row may be lost at once. Where a node is taken after `probe_after` it has to be heard all through that; of several the nearest one counts.
