@@ -94,10 +94,9 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
     assert!(worst.is_empty(), "{worst:?}");
 }
 
-/// Any link, and any times up and down that add up to 5 s to 300 s: 138 of 150 cost a tenth of the time at most. At the others a relay that was
-/// left out hears its old neighbour while the link is up, and is taken in again each time.
+/// Any link, with times up and down that add up to 5 s to 300 s. The limits in RESULTS.md name the seeds below 90 %, the first of which is 206.
 #[test]
-fn most_flapping_links_cost_a_tenth_of_the_time_at_most() {
+fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));
     let mut all: Vec<(f64, u64, String)> = (first..first + count)
         .into_par_iter()
@@ -120,7 +119,7 @@ fn most_flapping_links_cost_a_tenth_of_the_time_at_most() {
         100.0 * median,
         &all[..all.len().min(8)]
     );
-    assert!(6 * below as u64 <= count && median > 0.99, "{all:?}");
+    assert!(below == 0 && median > 0.99, "{all:?}");
 }
 
 /// Relay 2 of four was loaded with another mission.

@@ -93,6 +93,8 @@ impl Node {
             return;
         }
         let pairs = hello.neighbour == own;
+        // The candidate leads to all relays of the last view beyond the node taken, except that node: they have closed up without it.
+        let all_but_one = hello.behind > 1 && hello.behind.checked_add(1) == Some(there);
         let candidate = Candidate {
             node: from,
             distance: from.abs_diff(own),
@@ -100,7 +102,7 @@ impl Node {
             pairs,
             nearer: from.abs_diff(own) < neighbour.node().abs_diff(own),
             ready: hello.ready,
-            longer: hello.behind > there,
+            longer: hello.behind > there || all_but_one,
         };
         if neighbour.consider(candidate, now, settings) {
             let tells = neighbour.tells_found();

@@ -1,10 +1,22 @@
-//! Links that come and go: how long a node is to be heard before it is taken, and before it is said to be heard.
+//! Damping of flapping links: how long a node has to be heard before it is taken, and before the hellos say that it is heard.
 //!
-//! A link that was lost more often than is forgiven is held down: it is as if nothing came over it, until its node has been heard all through
-//! a time that is twice as long after every other loss, up to six times `dead_after`. The hellos of this relay say so, so that nobody
-//! makes room for a node that could not be linked.
+//! Each side counts the losses of the links to its four nearest nodes. A link with more than two losses is held down: its node is neither
+//! taken nor reported as heard until it has been heard without a gap for `dead_after`, and for twice as long after every further loss, up to
+//! six times `dead_after`. Hellos leave out links that are held down, so that no other relay makes room for a node that could not be linked.
+//!
+//! | state of the side | event | losses |
+//! | --- | --- | --- |
+//! | linked | neighbour lost, few frames lost on the channel | of its link: one more |
+//! | linked | neighbour lost, many frames lost on the channel | unchanged, unless the link is held down or its node is then silent for longer than `dead_after` |
+//! | without a neighbour | candidate heard again after a silence of more than `dead_after` | of its link: one more |
+//! | without a neighbour | first answer of any candidate, `probe_after` after the search began or later | of all links: at least those of the link that was lost last |
+//!
+//! The last row is a partition: no candidate answered, so that all links of the side were down together. If each link were counted alone,
+//! the chain would close over the second nearest node once the nearest one is held down, and every link would be forgiven two losses.
+//!
+//! A side forgets the losses of a link 32 times `dead_after` after the last one.
 
-use super::hearing::mask;
+use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
@@ -48,23 +60,37 @@ impl Heard {
     }
 }
 
-/// A link that was lost.
+/// State of the link to one node.
 #[derive(Clone, Copy, Debug)]
-struct Loss {
-    /// How far away its node is, 0 for none.
-    distance: u16,
-    at: Instant,
-    /// Since when the node is back.
+struct Link {
+    /// Time of the last loss.
+    lost_at: Instant,
+    /// Frames since the last loss; `None` before the first one.
     back: Option<Heard>,
     losses: u8,
-    /// Time since the loss before.
+    /// True if `losses` does not include the last loss, because the channel was bad.
+    excused: bool,
+    /// True if the last loss was an outage: no frame arrived for longer than `dead_after` after it.
+    was_down: bool,
+    /// Time between the last two losses.
     apart: Duration,
 }
 
-impl Loss {
+impl Link {
+    const fn new(now: Instant) -> Self {
+        Self {
+            lost_at: now,
+            back: None,
+            losses: 0,
+            excused: false,
+            was_down: false,
+            apart: Duration::from_micros(0),
+        }
+    }
+
     /// Number of losses that are not forgotten yet.
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
-        if self.distance == 0 || now.since(self.at) >= settings.dead_after.times(MEMORY) {
+        if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
             0
         } else {
             self.losses
@@ -80,31 +106,46 @@ impl Loss {
         let span = settings.dead_after.times(times);
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
+
+    /// Records a loss after `losses` earlier ones. `counted` is true if the new loss is added to them.
+    fn lose(&mut self, losses: u8, counted: bool, now: Instant) {
+        *self = Self {
+            lost_at: now,
+            back: None,
+            losses: losses.saturating_add(u8::from(counted)),
+            excused: !counted,
+            was_down: false,
+            apart: if self.losses == 0 {
+                Duration::from_micros(0)
+            } else {
+                now.since(self.lost_at)
+            },
+        };
+    }
 }
 
-/// What is remembered of the links on one side: the last two that were lost.
+/// Losses of the links on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
     /// A node that may be taken once it has been heard for long enough.
     candidate: Option<Heard>,
-    last: Loss,
-    before: Loss,
+    links: [Link; CANDIDATES as usize],
 }
 
 impl Damping {
     pub(super) const fn new(now: Instant) -> Self {
-        let none = Loss {
-            distance: 0,
-            at: now,
-            back: None,
-            losses: 0,
-            apart: Duration::from_micros(0),
-        };
         Self {
             candidate: None,
-            last: none,
-            before: none,
+            links: [Link::new(now); CANDIDATES as usize],
         }
+    }
+
+    fn link(&self, distance: u16) -> Option<&Link> {
+        self.links.get(usize::from(distance).wrapping_sub(1))
+    }
+
+    fn link_mut(&mut self, distance: u16) -> Option<&mut Link> {
+        self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
     /// The node `distance` places away is lost: one more of a link that comes and goes, or the first one for long. Where many frames are
@@ -112,60 +153,89 @@ impl Damping {
     ///
     /// Where another link on this side is one that comes and goes, so is this one: both lead across the same gap.
     pub(super) fn lose(&mut self, distance: u16, counts: bool, now: Instant, settings: &Settings) {
-        if distance != self.last.distance {
-            core::mem::swap(&mut self.last, &mut self.before);
+        let most = self.links.iter().map(|link| link.recent(now, settings));
+        let most = most.max().filter(|most| *most > FORGIVEN).unwrap_or(0);
+        if let Some(link) = self.link_mut(distance) {
+            let known = link.recent(now, settings).max(most);
+            link.lose(known, counts || known > FORGIVEN, now);
         }
-        let other = self.before.recent(now, settings);
-        let (own, apart) = if distance == self.last.distance {
-            (self.last.recent(now, settings), now.since(self.last.at))
-        } else {
-            (0, Duration::from_micros(0))
-        };
-        let known = if other > FORGIVEN {
-            own.max(other)
-        } else {
-            own
-        };
-        let counts = counts || known > FORGIVEN;
-        self.last = Loss {
-            distance,
-            at: now,
-            back: None,
-            losses: known.saturating_add(u8::from(counts)),
-            apart,
-        };
     }
 
-    /// A frame has come from the node `distance` places away.
-    pub(super) fn hear(&mut self, distance: u16, now: Instant, settings: &Settings) {
-        for lost in [&mut self.last, &mut self.before] {
-            if distance == lost.distance {
-                lost.back = Some(Heard::again(lost.back, distance, now, settings));
+    /// Records a frame from the node `distance` places away.
+    ///
+    /// `asks` is the start of the search while the side has no neighbour. All candidates are asked during a search, so a candidate that has
+    /// answered and is then silent for longer than `dead_after` counts as lost.
+    pub(super) fn hear(
+        &mut self,
+        distance: u16,
+        asks: Option<Instant>,
+        now: Instant,
+        settings: &Settings,
+    ) {
+        if asks.is_some_and(|asks| self.is_gap(asks, now, settings)) {
+            self.share(now, settings);
+        }
+        let Some(link) = self.link_mut(distance) else {
+            return;
+        };
+        let last = link.back.map_or(link.lost_at, |back| back.last);
+        if now.since(last) > settings.dead_after {
+            if link.back.is_some() && asks.is_some_and(|asks| last >= asks) {
+                link.lose(link.recent(now, settings), true, now);
+                link.was_down = true;
+            } else if link.back.is_none() && (link.losses > 0 || link.excused) {
+                link.was_down = true;
+                link.losses = link.losses.saturating_add(u8::from(link.excused));
+                link.excused = false;
+            }
+        }
+        link.back = Some(Heard::again(link.back, distance, now, settings));
+    }
+
+    /// Returns true if no candidate has answered since the search began at `since`, at least `probe_after` ago.
+    fn is_gap(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
+        let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
+        now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
+    }
+
+    /// Raises the losses of all links to those of the link that was lost last, because all of them cross the same gap.
+    fn share(&mut self, now: Instant, settings: &Settings) {
+        let lost = self.links.iter();
+        let lost = lost.filter(|link| link.recent(now, settings) > 0);
+        if let Some(last) = lost.max_by_key(|link| link.lost_at).copied() {
+            for link in &mut self.links {
+                link.losses = link.losses.max(last.losses);
+                link.lost_at = last.lost_at;
+                link.apart = last.apart;
+                link.back = None;
             }
         }
     }
 
     /// Whether the link to the node `distance` places away is held down.
     pub(super) fn holds(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
-        let links = [&self.last, &self.before];
-        let mut held = links.iter().filter(|lost| lost.distance == distance);
-        held.any(|lost| lost.holds(now, settings))
+        let link = self.link(distance);
+        link.is_some_and(|link| link.holds(now, settings))
     }
 
     /// Returns true if a link on this side comes and goes slowly: it has been lost more often than is forgiven, and stays for long each time,
     /// so that it is worth to notice early when it is lost again.
     pub(super) fn is_slow(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW);
-        let is_slow = |lost: &Loss| lost.recent(now, settings) > FORGIVEN && lost.apart >= slow;
-        is_slow(&self.last) || is_slow(&self.before)
+        let is_slow = |link: &Link| link.recent(now, settings) > FORGIVEN && link.apart >= slow;
+        self.links.iter().any(is_slow)
+    }
+
+    /// Returns true if the last loss of the link to the node `distance` places away was an outage.
+    pub(super) fn was_down(&self, distance: u16) -> bool {
+        self.link(distance).is_some_and(|link| link.was_down)
     }
 
     /// The nodes whose links are held down: bit 0 is the nearest one.
     pub(super) fn held(&self, now: Instant, settings: &Settings) -> u8 {
-        [&self.last, &self.before]
-            .iter()
-            .filter(|lost| lost.holds(now, settings))
-            .fold(0, |held, lost| held | mask(lost.distance))
+        (1..=CANDIDATES)
+            .filter(|distance| self.holds(*distance, now, settings))
+            .fold(0, |held, distance| held | mask(distance))
     }
 
     /// No candidate is heard any more.
@@ -191,5 +261,119 @@ impl Damping {
         let heard = Heard::again(self.candidate, distance, now, settings);
         self.candidate = Some(heard);
         now.since(heard.since) >= settings.probe_after.max(more)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Damping;
+    use crate::settings::Settings;
+    use crate::time::{Duration, Instant};
+
+    fn seconds(s: u64) -> Duration {
+        Duration::from_millis(1_000 * s)
+    }
+
+    /// The side at second 1 000.
+    fn begun() -> (Damping, Instant, Settings) {
+        let now = Instant::ZERO + seconds(1_000);
+        (Damping::new(now), now, Settings::default())
+    }
+
+    /// The link to the nearest node is lost; the side searches, and the nodes at `heard` answer during the whole outage of 40 s.
+    fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
+        let search = *now;
+        side.lose(1, true, search, settings);
+        for _ in 0..40 {
+            *now = *now + seconds(1);
+            for distance in heard {
+                side.hear(*distance, Some(search), *now, settings);
+            }
+        }
+        side.hear(1, Some(search), *now, settings);
+    }
+
+    #[test]
+    fn the_third_loss_of_a_link_holds_it_down_for_dead_after() {
+        let (mut side, mut now, settings) = begun();
+        for losses in 1..=3 {
+            outage(&mut side, &mut now, &[], &settings);
+            assert_eq!(side.holds(1, now, &settings), losses > 2, "{losses}");
+        }
+        for _ in 0..15 {
+            assert!(side.holds(1, now, &settings));
+            now = now + seconds(1);
+            side.hear(1, None, now, &settings);
+        }
+        assert!(!side.holds(1, now, &settings));
+    }
+
+    #[test]
+    fn a_partition_holds_all_links_down() {
+        let (mut side, mut now, settings) = begun();
+        for losses in 1..=3 {
+            assert_eq!(side.held(now, &settings), 0, "{losses}");
+            outage(&mut side, &mut now, &[], &settings);
+        }
+        assert_eq!(side.held(now, &settings), 0b1111);
+    }
+
+    #[test]
+    fn an_outage_during_which_another_candidate_answers_holds_one_link_down() {
+        let (mut side, mut now, settings) = begun();
+        for _ in 0..3 {
+            outage(&mut side, &mut now, &[2, 3, 4], &settings);
+        }
+        assert_eq!(side.held(now, &settings), 0b0001);
+    }
+
+    #[test]
+    fn a_candidate_that_is_silent_during_a_search_is_lost() {
+        let (mut side, mut now, settings) = begun();
+        let search = now;
+        for second in 0..180 {
+            now = now + seconds(1);
+            side.hear(2, Some(search), now, &settings);
+            // Answers for 20 s, and is silent for 40 s.
+            if second % 60 < 20 {
+                side.hear(1, Some(search), now, &settings);
+            }
+        }
+        assert!(!side.holds(1, now, &settings));
+        now = now + seconds(1);
+        side.hear(1, Some(search), now, &settings);
+        assert!(side.holds(1, now, &settings));
+        assert!(!side.holds(2, now, &settings));
+    }
+
+    #[test]
+    fn a_silent_candidate_of_a_linked_side_is_not_lost() {
+        let (mut side, mut now, settings) = begun();
+        for _ in 0..5 {
+            now = now + seconds(60);
+            side.hear(1, None, now, &settings);
+        }
+        assert_eq!(side.held(now, &settings), 0);
+    }
+
+    #[test]
+    fn a_loss_is_an_outage_after_a_silence_of_more_than_dead_after() {
+        let (mut side, now, settings) = begun();
+        side.lose(1, false, now, &settings);
+        side.hear(1, Some(now), now + seconds(15), &settings);
+        assert!(!side.was_down(1));
+        side.lose(1, false, now + seconds(20), &settings);
+        let again = now + seconds(36);
+        side.hear(1, Some(now + seconds(20)), again, &settings);
+        assert!(side.was_down(1));
+    }
+
+    #[test]
+    fn a_link_that_was_never_lost_was_not_down() {
+        let (mut side, now, settings) = begun();
+        side.hear(1, Some(now), now + seconds(100), &settings);
+        assert!(!side.was_down(1));
+        side.hear(2, None, now + seconds(200), &settings);
+        assert!(!side.was_down(2));
     }
 }

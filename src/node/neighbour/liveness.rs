@@ -106,10 +106,13 @@ impl Liveness {
     }
 
     /// Begins anew with another node. The longest run of open questions is kept, with the one that has just ended: if that node was not lost
-    /// after all, so many questions were too few. Where its link `flaps` slowly, the run was an outage of the link, and says nothing of the channel.
-    pub(crate) fn renew(&mut self, now: Instant, flaps: bool) {
+    /// after all, so many questions were too few. If the link `was_down`, the run that has ended measures an outage of the link and not the
+    /// channel, and is dropped. If the link `flaps` slowly, the earlier runs are dropped, too.
+    pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             QUESTIONS
+        } else if was_down {
+            self.longest
         } else {
             self.longest.max(self.unanswered)
         };

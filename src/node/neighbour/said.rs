@@ -13,9 +13,10 @@ const UNHEARD: u8 = 8;
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Whether the node `distance` places away is heard, and hears this relay.
+    /// Returns true if the node `distance` places away and this relay hear each other, and the link is not held down.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
-        let known = mask(distance) & self.both_ways.recent(now, settings) != 0;
+        let held = self.damping.held(now, settings);
+        let known = mask(distance) & self.both_ways.recent(now, settings) & !held != 0;
         known || self.is_mutual() && self.distance == distance && self.liveness.is_there()
     }
 
@@ -55,7 +56,7 @@ impl Neighbour {
     /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
     pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
         self.hearing.add(distance, now, settings);
-        self.damping.hear(distance, now, settings);
+        self.damping.hear(distance, self.asks_all(), now, settings);
         if taken {
             self.liveness.met();
         }

@@ -2,26 +2,27 @@
 //!
 //! | state | the node taken is lost | its hello does not name this relay | a hello comes from a node not taken that hears this relay | time passes |
 //! | --- | --- | --- | --- | --- |
-//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after `probe_after`, if it is better | without a quorum for three times `dead_after`, and every four times from then on, `Searching` |
+//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after `probe_after`, if it is better and its link is not held down | without a quorum for three times `dead_after`, and every four times from then on, `Searching` |
 //! | `Pairing` | `Searching` | - | as above | after a span `Searching`; without a quorum as above |
-//! | `Searching` | - | - | taken, a farther one not before nearer ones could be heard; one that was given up for want of a quorum after `probe_after` | after a span `NoPeer` |
-//! | `NoPeer` | - | - | taken, if it takes this relay; else after `probe_after` | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
+//! | `Searching` | - | - | taken unless its link is held down, a farther one not before nearer ones could be heard; one that was given up for want of a quorum after `probe_after` | after a span `NoPeer` |
+//! | `NoPeer` | - | - | taken unless its link is held down, if it takes this relay; else after `probe_after` | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
 //!
 //! A span is `dead_after` less `probe_after`, or as long as a run of lost frames may be by what the channel has shown. A node that has been
 //! taken is paired with until its hello names this relay and hears it, or anything else comes from it: then it is `Linked`. A hello of the
 //! linked one that names this relay but does not hear it ends nothing, since a run of lost frames is measured by silence.
 //! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
-//! relays hang together: then the link that is missing is on the other side of the node taken, and it is left out. Where two links cross, as
-//! 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other, neither of the two parts could go on: of them that of the node nearest to Rx is
-//! given up, 4 takes 3, and 2 is left out.
+//! relays hang together, or all that the last view had beyond the node taken: then the link that is missing is on the other side of the node
+//! taken, and it is left out. Where two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other, neither of the two parts
+//! could go on: of them that of the node nearest to Rx is given up, 4 takes 3, and 2 is left out.
 //!
 //! While it pairs or searches, it sends hellos that ask to the four nearest nodes there, the one taken among them: as many as three relays in
 //! a row may be lost at once. Where a node is taken after `probe_after` it has to be heard all through that; of several the nearest one counts.
-//! After a third loss on one side the link that was lost is held down (`damping`): its node is not taken, and not said to be heard, until it
-//! has been heard for `dead_after`, and twice as long after every other loss up to six times, so that a link that comes and goes disturbs
-//! the chain less and less. A loss is forgotten after 32 times `dead_after` without another. To a neighbour that is lost, on wires, nothing
-//! but questions is sent until something comes from it. A node that has come back is a reason for a new view `probe_after` later: the other one beside it may be
-//! about to take it, too.
+//! A link is held down after its third loss (`damping`): its node is not taken, and hellos do not report it as heard, until it
+//! has been heard for `dead_after`, and twice as long after every further loss up to six times, so that a flapping link disturbs
+//! the chain less and less. While the side has no neighbour, the loss of a candidate counts, too. If no candidate answers for `probe_after`,
+//! all links of the side share the losses of the link that was lost last. Losses are forgotten 32 times `dead_after` after the last one.
+//! To a neighbour that is lost, on wires, nothing but questions is sent until something comes from it. A node that has come back is a reason
+//! for a new view `probe_after` later: the other one beside it may be about to take it, too.
 
 use super::agreed::AgreedNodes;
 use super::candidate::Candidate;
@@ -63,6 +64,8 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// The node that was taken when the links were given up; 0 for none.
     given_up: u16,
+    /// Start of the last search.
+    searches_since: Instant,
     /// How far away the node taken is.
     pub(super) distance: u16,
     /// The nodes that have said that they hear this relay.
@@ -117,6 +120,7 @@ impl Neighbour {
         liveness: Liveness::NONE,
         damping: Damping::new(Instant::ZERO),
         given_up: 0,
+        searches_since: Instant::ZERO,
         distance: 0,
         both_ways: Hearing::new(Instant::ZERO),
         taken_by: [0; CANDIDATES as usize],
@@ -346,8 +350,17 @@ impl Neighbour {
         self.near = Some(now);
     }
 
+    /// Returns the start of the search while this side has no neighbour and asks all candidates.
+    pub(super) const fn asks_all(&self) -> Option<Instant> {
+        match self.state {
+            NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
+            NeighbourState::Linked | NeighbourState::Pairing { .. } => None,
+        }
+    }
+
     const fn search(&mut self, now: Instant) {
         self.node = 0;
+        self.searches_since = now;
         self.state = NeighbourState::Searching { since: now };
         self.damping.clear();
         self.hellos.owe_all();
@@ -422,7 +435,8 @@ impl Neighbour {
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
         let flaps = self.damping.is_slow(now, settings);
-        self.liveness.renew(now, flaps);
+        let was_down = self.damping.was_down(self.distance);
+        self.liveness.renew(now, was_down, flaps);
         self.damping.clear();
         self.look_at = Some(now + self.tick);
         true
