@@ -85,7 +85,7 @@ impl Cable {
 
 /// A companion that is polled, or on the asynchronous runner.
 enum Companion {
-    Polled(Autopilot),
+    Polled(Box<Autopilot>),
     Async(Runner),
 }
 
@@ -157,7 +157,7 @@ impl Flight {
         self.companion = Some(if self.is_async {
             Companion::Async(Runner::new(link, sites(), self.now))
         } else {
-            Companion::Polled(link)
+            Companion::Polled(Box::new(link))
         });
     }
 

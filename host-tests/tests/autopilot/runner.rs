@@ -26,9 +26,12 @@ impl Clock for Now {
     }
 
     async fn sleep_until(&self, at: Instant) {
-        poll_fn(|_| match self.0.get() >= at {
-            true => Poll::Ready(()),
-            false => Poll::Pending,
+        poll_fn(|_| {
+            if self.0.get() >= at {
+                Poll::Ready(())
+            } else {
+                Poll::Pending
+            }
         })
         .await;
     }

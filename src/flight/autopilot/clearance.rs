@@ -5,9 +5,9 @@
 //!
 //! | command to this system and component | result |
 //! | --- | --- |
-//! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`](super::AutopilotEvent::LostCleared) |
+//! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
 //! | the same again, numbered as a repetition | accepted, and nothing else |
-//! | any other numbers | denied: [`AutopilotEvent::ClearRefused`](super::AutopilotEvent::ClearRefused) |
+//! | any other numbers | denied: [`AutopilotEvent::ClearRefused`] |
 
 use heapless::Vec;
 
