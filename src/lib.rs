@@ -87,8 +87,9 @@ pub use sites::Sites;
 pub use stats::Stats;
 pub use time::{Duration, Instant};
 pub use view::{View, ViewId};
+pub use wire::auth::Auth;
 #[cfg(feature = "auth")]
-pub use wire::auth::{Auth, Key};
+pub use wire::auth::Key;
 pub use wire::crc::CRC_32C;
 pub use wire::digest::MissionId;
 pub use wire::frame::{FrameBuf, MAX_FRAME};

@@ -140,6 +140,13 @@ impl Damping {
         }
     }
 
+    /// Begins at `now`, in place: a copy on the stack would be the largest one of a start.
+    pub(super) fn begin(&mut self, now: Instant) {
+        for link in &mut self.links {
+            *link = Link::new(now);
+        }
+    }
+
     fn link(&self, distance: u16) -> Option<&Link> {
         self.links.get(usize::from(distance).wrapping_sub(1))
     }

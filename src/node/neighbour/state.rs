@@ -159,7 +159,7 @@ impl Neighbour {
         settings: &Settings,
     ) {
         self.liveness = Liveness::new(now);
-        self.damping = Damping::new(now);
+        self.damping.begin(now);
         self.both_ways = Hearing::new(now);
         self.hearing = Hearing::new(now);
         self.jitter = Jitter::new(seed);
