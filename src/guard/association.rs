@@ -374,9 +374,9 @@ impl KeepOut {
         self
     }
 
-    /// Returns the reason for a limit, or a wait, at this side.
-    pub(super) const fn reason(&self, otherwise: HoldReason) -> HoldReason {
-        if self.unflown.is_some() {
+    /// Returns the reason for a limit, or a wait, at this side: `otherwise`, unless the neighbour `node` has told that it is not flown.
+    pub(super) fn reason(&self, node: u16, otherwise: HoldReason) -> HoldReason {
+        if self.unflown.is_some_and(|(unflown, _)| unflown == node) {
             HoldReason::NotFlown
         } else {
             otherwise

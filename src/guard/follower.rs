@@ -128,6 +128,7 @@ impl FenceFollower {
             self.association.due |= !fence.says(Fence::UNPLACED);
             return;
         }
+        self.keep_out.flies();
         if self.association.heard == 0 {
             self.association.meet(fence.association);
         } else if fence.association != self.association.heard && self.association.stray() {
@@ -139,7 +140,6 @@ impl FenceFollower {
         if !self.association.knows(fence.association, fence.echo) {
             return;
         }
-        self.keep_out.flies();
         self.association.hear_open(fence);
         self.target_m = fence.target_m;
         let ahead = fence.number.wrapping_sub(self.number);
@@ -261,13 +261,14 @@ impl FenceFollower {
             return Some(HoldReason::Order);
         }
         let target_m = own.target_m();
-        if self.keep_out.bars(own) {
-            return Some(HoldReason::NotFlown);
-        }
         let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.is_across();
-        if stays || limit.is_some_and(|limit| target_m < limit) {
-            return Some(self.keep_out.reason(HoldReason::Lost));
+        let bars = self.keep_out.bars(own);
+        if stays || bars || limit.is_some_and(|limit| target_m < limit) {
+            return Some(
+                self.keep_out
+                    .reason(self.association.node, HoldReason::Lost),
+            );
         }
         if self.association.is_none() {
             return None;

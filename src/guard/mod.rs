@@ -524,12 +524,20 @@ impl Guard {
     /// Returns the reason for a setpoint that has stood for long on its way toward `side`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
-        let (clear, keep_out) = match side {
-            Side::Upstream => (self.follower.is_clear(own), &self.follower.keep_out),
-            Side::Downstream => (self.owner.is_clear(own), &self.owner.keep_out),
+        let (clear, keep_out, association) = match side {
+            Side::Upstream => (
+                self.follower.is_clear(own),
+                &self.follower.keep_out,
+                &self.follower.association,
+            ),
+            Side::Downstream => (
+                self.owner.is_clear(own),
+                &self.owner.keep_out,
+                &self.owner.association,
+            ),
         };
         let waits = own.waits(side, clear);
-        waits.then(|| keep_out.reason(HoldReason::Pending))
+        waits.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
     /// Inputs that were refused: not a number, or out of range. It stays at its maximum.

@@ -198,6 +198,7 @@ impl FenceOwner {
             self.association.due |= !fence.says(Fence::UNPLACED);
             return;
         }
+        self.keep_out.flies();
         if !self.is_heard() && fence.echo == self.association.own {
             self.association.meet(fence.association);
             self.association.due = true;
@@ -211,7 +212,6 @@ impl FenceOwner {
             self.association.due |= self.association.is_absent();
             return;
         }
-        self.keep_out.flies();
         self.association.hear_open(fence);
         if fence.says(Fence::UNPLACED) {
             return;
@@ -355,13 +355,14 @@ impl FenceOwner {
             return Some(HoldReason::Order);
         }
         let target_m = own.target_m();
-        if self.keep_out.bars(own) {
-            return Some(HoldReason::NotFlown);
-        }
         let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.is_across();
-        if stays || limit.is_some_and(|limit| target_m > limit) {
-            return Some(self.keep_out.reason(HoldReason::Lost));
+        let bars = self.keep_out.bars(own);
+        if stays || bars || limit.is_some_and(|limit| target_m > limit) {
+            return Some(
+                self.keep_out
+                    .reason(self.association.node, HoldReason::Lost),
+            );
         }
         if self.association.is_none() {
             return None;

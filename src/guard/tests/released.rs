@@ -172,6 +172,21 @@ fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
     }
 }
 
+/// A neighbour that has told its place alone, before it was in an association, and then fell silent is a lost one.
+#[test]
+fn one_that_began_and_fell_silent_is_lost() {
+    let mut row = Row::new();
+    let now = row.all[1].now;
+    row.all[1].guard = Guard::new(config(), [Some(1), Some(3)], 99, now);
+    row.all[1].guard.position(now, at(200.0));
+    row.talk();
+    row.all[0].guard.link(Side::Downstream, None);
+    row.all[0].guard.commit(at(195.0));
+    assert!(row.setpoint(0) < Some(195.0));
+    let reason = row.all[0].guard.hold_reason(Side::Downstream);
+    assert_eq!(reason, Some(HoldReason::Lost));
+}
+
 /// What it told in its pilot's hands, and comes late, makes it no obstacle again.
 #[test]
 fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
