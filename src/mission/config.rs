@@ -1,8 +1,8 @@
-//! The parameters of a mission as plain numbers.
+//! Parameters of a mission as plain numbers: interference, altitudes, what a relay brings along; and the error that names one that is refused.
 
-use super::error::MissionError;
-use super::parts::{Band, Interference, Profile};
 use crate::channel::Channel;
+use crate::field::Field;
+use crate::place::{CrossSection, Station};
 
 /// The most relays a mission may have; addresses on the wire are 12 bits wide.
 pub const MAX_RELAYS: u16 = 1000;
@@ -57,4 +57,210 @@ impl MissionConfig {
         }
         Ok(())
     }
+}
+
+/// Which parameter of a [`MissionConfig`](crate::MissionConfig) was refused, and its range.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MissionError {
+    /// `relays` is not within 1 to [`MAX_RELAYS`](crate::mission::MAX_RELAYS).
+    Relays,
+    /// `distance_m` is not within 1 to 1e6.
+    Distance,
+    /// `min_separation_m` is not within 0 to 1e5.
+    Separation,
+    /// The relays, `min_separation_m` (and a rounding of 5e-7 `distance_m`) apart, are longer than `distance_m`.
+    TooManyForDistance,
+    /// `tx_power_w` is not within 1e-6 to 1e6.
+    TxPower,
+    /// `common.altitude_m` is not within 0.1 to 1e5, or `common.power_w` not within 1e-6 to 1e6.
+    Common,
+    /// `band` is not in order, not within 0.1 to 1e5, or leaves out `common.altitude_m`.
+    Band,
+    /// `lateral` is not in order, not within -1e5 to 1e5, or leaves out 0.
+    Lateral,
+    /// `interferer.power_w` is not within 1e-6 to 1e9.
+    InterfererPower,
+    /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
+    InterfererPlace,
+    /// `noise_w` is not within 0 to 1, or is above 1e12 times what of the interferer arrives a metre from it.
+    Noise,
+    /// The crate was built without its feature `field`.
+    Field,
+    /// `tolerance` is not within 1e-6 to 0.1.
+    Tolerance,
+}
+
+impl core::fmt::Display for MissionError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Relays => "relays must be within 1 to 1000",
+            Self::Distance => "distance_m must be within 1 to 1e6",
+            Self::Separation => "min_separation_m must be within 0 to 1e5",
+            Self::TooManyForDistance => {
+                "(relays - 1) x min_separation_m must not be above distance_m"
+            }
+            Self::TxPower => "tx_power_w must be within 1e-6 to 1e6",
+            Self::Common => {
+                "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6"
+            }
+            Self::Band => {
+                "band must be within 0.1 to 1e5, from least to most, with common.altitude_m in it"
+            }
+            Self::Lateral => "lateral must be within -1e5 to 1e5, from least to most, with 0 in it",
+            Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
+            Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
+            Self::Noise => {
+                "noise_w must be within 0 to 1, and at most 1e12 times what of the interferer arrives a metre from it"
+            }
+            Self::Field => "a field of interference needs the feature `field`",
+            Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
+        })
+    }
+}
+
+impl core::error::Error for MissionError {}
+
+/// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Interferer {
+    /// Transmit power, W.
+    pub power_w: f32,
+    /// Place along the line from Tx (0) to Rx (D), m; before Tx or beyond Rx too.
+    pub x_m: f32,
+    /// Distance from that line, m: to its right above 0, to its left below.
+    pub y_m: f32,
+}
+
+impl Interferer {
+    /// Whether it is of a power that is taken.
+    pub(super) const fn is_powered(&self) -> bool {
+        within(self.power_w, 1e-6, 1e9)
+    }
+
+    /// Whether it is at a place that is taken.
+    pub(super) const fn is_placed(&self) -> bool {
+        within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
+    }
+
+    /// Whether all its numbers are within their ranges.
+    pub const fn is_valid(&self) -> bool {
+        self.is_powered() && self.is_placed()
+    }
+}
+
+/// What degrades the hops.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Interference {
+    /// One transmitter at a known place.
+    Source(Interferer),
+    /// Interference that is only known as a distribution along x.
+    Field(Field),
+    /// One transmitter, and nobody knows where. Until the relays have found it ([`crate::Settings::listen`]) they spread evenly.
+    Unknown,
+}
+
+/// Which way the places of a chain are worked out, one relay after the other, and hence who begins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Heading {
+    /// From relay 1 on: Algorithm 1, where an interferer is known. The SIR of a hop tells where its *receiver* may stand.
+    TowardRx,
+    /// From relay N on: Algorithm 4, in a field. Where the receiver stands, its interference tells where the *sender* may.
+    TowardTx,
+}
+
+/// What a relay may choose from: altitudes, or distances to the side.
+///
+/// ```
+/// use uav_relay::Band;
+///
+/// let altitudes = Band { least_m: 20.0, most_m: 120.0 };
+/// assert_eq!(altitudes.nearest(300.0), 120.0);
+/// assert!(Band::at(20.0).is_single());
+/// ```
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Band {
+    /// The lowest, m.
+    pub least_m: f32,
+    /// The highest, m: at least `least_m`.
+    pub most_m: f32,
+}
+
+impl Band {
+    /// No room to the side: relays stay in the vertical plane through transmitter and receiver, as in the paper.
+    pub const NONE: Self = Self::at(0.0);
+
+    /// The band that is a single number.
+    pub const fn at(at_m: f32) -> Self {
+        Self {
+            least_m: at_m,
+            most_m: at_m,
+        }
+    }
+
+    /// The number in it that is nearest to `at_m`.
+    pub const fn nearest(self, at_m: f32) -> f32 {
+        if at_m >= self.most_m {
+            self.most_m
+        } else if at_m > self.least_m {
+            at_m
+        } else {
+            self.least_m
+        }
+    }
+
+    /// From the lowest to the highest, m.
+    pub const fn span_m(self) -> f32 {
+        self.most_m - self.least_m
+    }
+
+    /// Whether there is nothing to choose.
+    pub const fn is_single(self) -> bool {
+        !(self.least_m < self.most_m)
+    }
+
+    /// Whether it is a band of altitudes: in order, and within 0.1 to 1e5.
+    pub(super) const fn is_of_altitudes(self) -> bool {
+        within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
+    }
+
+    /// Whether it is room beside the line: in order, within -1e5 to 1e5, and the line itself in it.
+    pub(super) const fn is_room_beside(self) -> bool {
+        within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
+    }
+}
+
+/// What one relay brings along: its altitude and its transmit power.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Profile {
+    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
+    pub altitude_m: f32,
+    /// Transmit power, W: 1e-6 to 1e6.
+    pub power_w: f32,
+}
+
+impl Profile {
+    /// Whether both numbers are within their ranges.
+    pub const fn is_valid(&self) -> bool {
+        within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
+    }
+
+    /// The relay that flies at this altitude right above the line.
+    pub const fn on_line(self) -> Station {
+        Station {
+            at: CrossSection::on_line(self.altitude_m),
+            power_w: self.power_w,
+        }
+    }
+}
+
+/// Whether `value` is a number in [`least`, `most`].
+pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
+    value >= least && value <= most
 }

@@ -1,11 +1,15 @@
 //! A mission whose parameters have been checked, and what is asked of it.
+//!
+//! Of a mission follow the power ratios of its hops, the least steps between its relays, and a mission with the interference that the relays have
+//! found, or with none known.
 
-use super::config::MissionConfig;
-use super::error::MissionError;
-use super::parts::{Heading, Interference, Interferer, within};
-use super::unknown::{FAR, even_gains};
+use super::config::{
+    FINEST_STEP, Heading, Interference, Interferer, MissionConfig, MissionError, ROUNDING, within,
+};
 use crate::field::{Field, InNoise};
 use crate::power_ratio::PowerRatio;
+use crate::root::sqrt;
+use crate::sensing::belief::{Belief, Spread};
 use crate::wire::digest::digest;
 
 /// A validated mission, with what is derived from it once.
@@ -316,4 +320,186 @@ impl Mission {
         };
         Self { config, ..*self }
     }
+}
+
+impl Mission {
+    /// What multiplies the inverse interference of a place ([`crate::sir::quiet`]) on the first hop: `p_t` / `p_MSI`, in a field
+    /// `p_t` `Upsilon_max` / eta.
+    #[doc(hidden)]
+    pub const fn tx_gain(&self) -> PowerRatio {
+        self.tx_gain
+    }
+
+    /// What multiplies it on a hop that a relay of `power_w` watts feeds: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field
+    /// `p_u` `Upsilon_max` / `mu_los`.
+    #[doc(hidden)]
+    pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
+        PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
+    }
+
+    /// K of the last hop, m^2: SIR at the receiver = K / squared distance to the relay of `power_w` watts that feeds it.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a float that fits by the ranges of the mission"
+    )]
+    #[inline(never)] // called from many places
+    pub const fn receiver_gain(&self, power_w: f32) -> f32 {
+        (power_w as f64 * self.receiver_gain_per_w) as f32
+    }
+
+    /// What the last hop's K is worth against the first hop's gain, m^2: (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2).
+    pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
+        f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
+    }
+
+    /// Power that Tx's signal has at a relay whose squared distance is `squared_m2`, W.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a float that fits by the ranges of the mission"
+    )]
+    pub(crate) fn first_hop_power_w(&self, squared_m2: f32) -> f32 {
+        let loss = self.config.channel.eta() * f64::from(squared_m2);
+        (f64::from(self.config.tx_power_w) / loss) as f32
+    }
+}
+
+impl Mission {
+    /// The least step in x between neighbours that are `across_squared` m^2 apart across the line: what keeps the separation
+    /// asked for.
+    pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
+        let apart = self.config.min_separation_m;
+        if !(across_squared > 0.0) {
+            return apart;
+        }
+        sqrt(apart * apart - across_squared)
+    }
+
+    /// The same with room for rounding.
+    pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
+        self.step_of(self.least_step(across_squared))
+    }
+
+    /// The last place on its way that leaves the relays after `index` room to stand `min_separation_m` apart, m.
+    ///
+    /// `across_squared` is how far apart across the line two neighbours among them may be, m^2: that much they need not be along
+    /// x.
+    pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
+        self.end_after(self.behind(index), self.least_step(across_squared))
+    }
+
+    /// The same where whoever comes after may stand as close as they like.
+    pub(crate) fn end_freely(&self, index: u16) -> f32 {
+        self.end_after(self.behind(index), 0.0)
+    }
+
+    /// How many relays come after `index` on the way of a pass.
+    fn behind(&self, index: u16) -> f32 {
+        f32::from(match self.heading() {
+            Heading::TowardRx => self.config.relays.saturating_sub(index),
+            Heading::TowardTx => index.saturating_sub(1),
+        })
+    }
+
+    /// The last place of relay `index` toward Rx that leaves those after it their separation, m.
+    pub(crate) fn latest(&self, index: u16) -> f32 {
+        self.latest_at(index, self.config.min_separation_m)
+    }
+
+    /// The same where those may stand as close as they like.
+    pub(crate) fn latest_freely(&self, index: u16) -> f32 {
+        self.latest_at(index, 0.0)
+    }
+
+    fn latest_at(&self, index: u16, least: f32) -> f32 {
+        let after = f32::from(self.config.relays.saturating_sub(index));
+        self.config.distance_m - after * self.step_of(least)
+    }
+
+    /// What a step between two that must be `least` apart takes with its rounding, m.
+    fn step_of(&self, least: f32) -> f32 {
+        let distance_m = self.config.distance_m;
+        if least > 0.0 {
+            least + distance_m * ROUNDING
+        } else {
+            distance_m * FINEST_STEP
+        }
+    }
+
+    fn end_after(&self, behind: f32, least: f32) -> f32 {
+        let (distance_m, step) = (self.config.distance_m, self.step_of(least));
+        match self.heading() {
+            Heading::TowardRx => (distance_m - behind * step).max(0.0),
+            Heading::TowardTx => (behind * step).min(distance_m),
+        }
+    }
+}
+
+/// A hop half as long as the others.
+const HALF_AS_LONG: f64 = 0.25;
+
+impl Mission {
+    /// The interferer, where it is known and not one that stands for none.
+    pub const fn known_source(&self) -> Option<Interferer> {
+        match self.config.interference {
+            Interference::Source(interferer) => Some(interferer),
+            _ => None,
+        }
+    }
+
+    /// The same mission, whose interference is `own` or what is believed instead.
+    ///
+    /// # Errors
+    /// [`MissionError`] where what is believed is out of range.
+    pub(crate) fn believing(
+        &self,
+        own: Interference,
+        belief: &Belief,
+    ) -> Result<Self, MissionError> {
+        let (interference, spread, receiver_w) = match *belief {
+            Belief::Mission => (own, Spread::Even, 0.0),
+            Belief::Unknown(spread) => (Interference::Unknown, spread, 0.0),
+            Belief::Source { source, receiver_w } => {
+                (Interference::Source(source), Spread::Even, receiver_w)
+            }
+        };
+        let config = MissionConfig {
+            interference,
+            ..self.config
+        };
+        let mut mission = Self::try_new(config)?;
+        if receiver_w > 0.0 {
+            let eta = config.channel.eta();
+            let heard = f64::from(receiver_w) + f64::from(config.noise_w);
+            mission.receiver_gain_per_w = 1.0 / (eta * heard);
+        }
+        match spread {
+            Spread::Even => {}
+            Spread::TowardTx => {
+                mission.tx_gain = PowerRatio::new(mission.tx_gain.wide() * HALF_AS_LONG);
+            }
+            Spread::TowardRx => mission.receiver_gain_per_w *= HALF_AS_LONG,
+        }
+        Ok(mission)
+    }
+}
+
+/// What takes the place of an interferer that nobody knows: one so far away that it is the same everywhere, (X - x)^2 + Y^2 to 1e-7.
+pub(super) const FAR: Interferer = Interferer {
+    power_w: 1.0,
+    x_m: 0.0,
+    y_m: 1e7,
+};
+
+/// One over the square of its distance.
+const FAR_AWAY: f64 = 1e-14;
+
+/// The gains of a mission that knows nothing, of relays of `power_w`: on every hop SIR = (D / d)^2, so that the best places are even ones.
+pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
+    let squared = distance_m as f64 * distance_m as f64;
+    let power_w = power_w as f64;
+    (
+        squared * FAR_AWAY,
+        squared * FAR_AWAY / power_w,
+        squared / power_w,
+    )
 }

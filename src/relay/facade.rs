@@ -1,20 +1,25 @@
-//! Bytes and time in; frames and events out.
+//! The relay: bytes and time in, frames and events out, and records of votes and uploads that a firmware keeps over a reboot.
 
-use super::incoming::{self, Addressed};
+use super::incoming;
+use super::incoming::Addressed;
 use super::port::{Port, Transmit};
 #[cfg(feature = "auth")]
 use super::signed;
 use crate::event::Event;
 use crate::mission::Mission;
 use crate::node::Node;
+use crate::node::view::record::{RecordError, ViewRecord};
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Instant, MonotonicClock};
 use crate::wire::deframe::{DeframeError, Deframer};
-use crate::wire::frame::{self, FrameBuf, Header};
+use crate::wire::frame;
+use crate::wire::frame::{FrameBuf, Header};
 #[cfg(feature = "auth")]
 use crate::wire::session::Session;
+#[cfg(feature = "upload")]
+use crate::wire::upload::{Upload, UploadError};
 
 /// One relay's share of the placement, sans-IO.
 ///
@@ -351,5 +356,62 @@ impl Relay {
     pub fn poll_timeout(&self) -> Option<Instant> {
         let due = self.node.poll_timeout()?;
         Some(self.clock.external(due))
+    }
+}
+
+impl Relay {
+    /// What it has said in the votes on views, to be stored whenever it has changed, *before* [`poll_transmit`](Self::poll_transmit) is
+    /// called: a promise that is forgotten is none. Constant work.
+    pub const fn view_record(&self) -> ViewRecord {
+        self.node.view_record()
+    }
+
+    /// Has a relay that has just been made, and was handed nothing but an upload yet, stand by what it had said before it was
+    /// switched off in flight: the [`view_record`](Self::view_record) that was stored last.
+    ///
+    /// Constant work.
+    ///
+    /// # Errors
+    /// [`RecordError::Base`] if it was stored by a relay that was loaded with another mission, [`RecordError::Begun`] if the relay
+    /// has begun to talk or to compute. Nothing has changed then.
+    pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
+        self.node.resume_view(self.clock.advance(now), record)
+    }
+}
+
+#[cfg(feature = "upload")]
+impl Relay {
+    /// Has a relay that has just been made, and was handed nothing yet, fly `upload`: the newest that it had stored on
+    /// [`Event::Uploaded`](crate::Event::Uploaded) before it was switched off. [`Relay::new`] still takes the mission that was loaded
+    /// before flight.
+    ///
+    /// Constant work.
+    ///
+    /// # Errors
+    /// [`UploadError::Base`] if it was stored for another mission than the one that was loaded, [`UploadError::Line`] if there is no
+    /// line on earth for it, [`UploadError::Begun`] if the relay has begun to talk or to compute. Nothing has changed then.
+    pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
+        self.node.resume(upload)
+    }
+
+    /// Takes a new mission that has come another way than over the link; the chain adopts it as one that has.
+    ///
+    /// Constant work.
+    ///
+    /// # Errors
+    /// [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays, [`UploadError::Line`] if
+    /// there is no line on earth for it, [`UploadError::Old`] if a mission as new as that is held.
+    pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
+        self.node.handle_upload(self.clock.advance(now), upload)
+    }
+
+    /// The newest mission held, flown or not yet, if it was uploaded.
+    pub fn upload(&self) -> Option<&Upload> {
+        self.node.upload()
+    }
+
+    /// The version of the mission that it flies: 0 for the one that was loaded before flight.
+    pub fn version(&self) -> u16 {
+        self.node.member().active.version
     }
 }

@@ -13,14 +13,11 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | `terms` | the four terms of a place, and the coefficients of a source |
 //! | `sums` | what a pass adds up along the chain |
-//! | `listener` | what one relay has heard, place by place, and how it fades |
+//! | `listener` | what one relay has heard, place by place, in the four terms of 1 / I, and how it fades |
 //! | `level` | what the transmitter and the receiver hear, on the ground |
-//! | `average` | a mean that fades |
 //! | `factor` | a 4 x 4 system, solved |
-//! | `fit` | the source that the sums speak of, how sure that is, and when none does |
-//! | `nearest` | the source nearest to sums of something else |
+//! | `fit` | the source that the sums speak of, or the one nearest to them, how sure that is, and when none does |
 //! | [`belief`] | what the chain flies by, and when another fit takes its place |
 //! | `track` | the velocity of an interferer that moves |
 //! | `doubt` | the relay whose measurements do not fit those of the others |
@@ -30,7 +27,6 @@
 //! own (shadowing). So each place counts once, with the weight 1 / v^2, however long a relay hovers there. How good all this is:
 //! `host-tests/tests/sensing/`.
 
-pub(crate) mod average;
 pub mod belief;
 pub(crate) mod doubt;
 mod ends;
@@ -46,13 +42,11 @@ pub(crate) mod level;
 #[doc(hidden)]
 pub mod level;
 pub(crate) mod listener;
-mod nearest;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod sums;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod sums;
-pub(crate) mod terms;
 pub(crate) mod track;
 
 pub use fit::Unfit;

@@ -1,16 +1,15 @@
 //! One serial port: what comes in, what waits to go out, and who drives the line.
+//!
+//! Faults on this side are counted.
 
-use core::convert::Infallible;
-
-use embedded_hal::digital::{ErrorType, OutputPin};
-use heapless::Deque;
-
-use super::port::SerialPort;
-use super::stats::SerialStats;
+use super::port::{Fault, SerialPort};
 use crate::relay::{Port, Relay};
 use crate::stats::bump;
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::wire::frame::MAX_FRAME;
+use core::convert::Infallible;
+use embedded_hal::digital::{ErrorType, OutputPin};
+use heapless::Deque;
 
 /// The most bytes, or failed reads, that one poll takes from one port.
 pub const READ_LIMIT: usize = 64;
@@ -254,5 +253,44 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         let stuck = self.clock.internal(now).since(self.moved_at);
         let pause = stuck.min(longest).max(self.byte_time);
         (!self.waiting.is_empty()).then(|| now + pause)
+    }
+}
+
+/// Counters of one link since it was made; each stays at its maximum once it gets there.
+///
+/// What is wrong with frames that did arrive is counted in [`Stats`](crate::Stats).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SerialStats {
+    /// Bytes lost because they were not read in time.
+    pub overrun: u32,
+    /// Bytes without a stop bit.
+    pub framing: u32,
+    /// Bytes with the wrong parity.
+    pub parity: u32,
+    /// Bytes from a noisy line.
+    pub noise: u32,
+    /// Reads that failed for any other reason.
+    pub other: u32,
+    /// Writes, and questions whether the last byte had left, that failed; the bytes are offered again.
+    pub write: u32,
+    /// Times the driver-enable pin could not be set; it is tried again.
+    pub pin: u32,
+    /// Frames that did not fit behind those that wait: the port takes nothing. The relay repeats what matters.
+    pub dropped: u32,
+    /// Frames for a port that is not there: the relay's [`Wiring`](crate::Wiring) is not the one of this driver.
+    pub unrouted: u32,
+}
+
+impl SerialStats {
+    /// Counts a read that failed.
+    pub(crate) fn read_failed(&mut self, fault: Fault) {
+        bump(match fault {
+            Fault::Overrun => &mut self.overrun,
+            Fault::Framing => &mut self.framing,
+            Fault::Parity => &mut self.parity,
+            Fault::Noise => &mut self.noise,
+            Fault::Other => &mut self.other,
+        });
     }
 }

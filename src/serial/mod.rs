@@ -3,9 +3,8 @@
 //! | file | one idea |
 //! | --- | --- |
 //! | [`port`] | a port that never blocks, made of [`embedded_hal_nb`] ([`Nb`]) or [`embedded_io`] ([`Io`]) |
-//! | [`link`] | one port with the frames that wait for it and its driver-enable pin |
+//! | [`link`] | one port with the frames that wait for it and its driver-enable pin; local faults, counted |
 //! | [`queue`] | bytes between an interrupt and the main loop, for a UART that holds one byte |
-//! | [`stats`] | local faults, counted |
 //! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One call
@@ -97,14 +96,13 @@ pub mod link;
 pub mod port;
 pub mod queue;
 mod ring;
-pub mod stats;
 
 use embedded_hal::digital::OutputPin;
 
+pub use link::SerialStats;
 pub use link::{NoPin, READ_LIMIT, SerialLink, byte_time};
 pub use port::{Fault, Io, Nb, SerialPort};
 pub use queue::{ByteQueues, InterruptEnd, Pend, QueuedPort, queue_depth};
-pub use stats::SerialStats;
 
 use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;

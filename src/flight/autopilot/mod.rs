@@ -4,18 +4,15 @@
 //! | --- | --- |
 //! | `link` | the link: bytes, setpoints and the time in; frames, places and events out |
 //! | [`state`] | who flies: the table of states |
-//! | `kind` | whose autopilot it is |
-//! | `vehicle` | what the autopilot has said of itself |
+//! | `vehicle` | which autopilot it is, what it has said of itself, and what its radio hears |
 //! | `clock` | the autopilot's clock, on the relay's; the relay's own |
 //! | `echo` | how late the link is |
-//! | `mode` | flight modes, why the drone was released, why it cannot be engaged |
+//! | `mode` | flight modes, why the drone was released, why it cannot be engaged; events |
 //! | `streams` | the messages that it is asked for |
 //! | `target` | what it is told to fly to, and how often |
 //! | [`carrot`] | the target on its way to the setpoint |
 //! | `astray` | a drone that is far from its line |
 //! | `clearance` | the operator's command to clear lost relays |
-//! | `event` | what the firmware is told |
-//! | `noise` | what a radio hears between frames |
 //! | `report` | what the operator reads |
 //! | [`trust`] | whom it believes: signatures |
 //!
@@ -26,11 +23,8 @@ pub mod carrot;
 pub mod clearance;
 mod clock;
 mod echo;
-mod event;
-mod kind;
 mod link;
 mod mode;
-mod noise;
 mod report;
 pub mod state;
 mod streams;
@@ -39,10 +33,10 @@ pub mod trust;
 mod vehicle;
 
 pub use astray::OffLine;
-pub use event::AutopilotEvent;
-pub use kind::Kind;
 pub use link::Autopilot;
+pub use mode::AutopilotEvent;
 pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};
+pub use vehicle::Kind;
 pub use vehicle::Position;
 
 pub use super::mavlink::frame::Address;

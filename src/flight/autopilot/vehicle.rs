@@ -1,8 +1,7 @@
-//! What the autopilot has said of itself.
+//! What the autopilot has said of itself: PX4 or ArduCopter, its state, the drone's position, and what a SiK radio hears there.
 
 use super::clock::RemoteClock;
 use super::echo::Echo;
-use super::kind::Kind;
 use super::mode::FlightMode;
 use super::state::Observed;
 use crate::flight::axis::Axis;
@@ -10,7 +9,9 @@ use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::Incoming;
 use crate::flight::mavlink::outgoing::SET_MESSAGE_INTERVAL;
 use crate::flight::mavlink::parser::Received;
+use crate::flight::mavlink::sik::noise_w;
 use crate::geodetic::Geodetic;
+use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
@@ -348,5 +349,54 @@ impl Vehicle {
         all.chain(self.echo.next_timeout(now))
             .filter(|at| *at > now)
             .min()
+    }
+}
+
+/// `MAV_TYPE` of what can hover and is flown by ArduCopter: with other vehicles the same number is another mode.
+const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
+
+/// Whose autopilot it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Kind {
+    /// PX4: OFFBOARD grants control, for as long as targets are streamed.
+    Px4,
+    /// ArduCopter: GUIDED grants control, and a target holds for good.
+    ArduCopter,
+}
+
+impl Kind {
+    /// By `MAV_AUTOPILOT` and `MAV_TYPE`.
+    pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
+        match autopilot {
+            12 => Some(Self::Px4),
+            3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),
+            _ => None,
+        }
+    }
+}
+
+/// Whether this crate was built to make anything of it.
+const SENSING: bool = cfg!(feature = "sensing");
+
+/// The newest that nobody has taken.
+#[derive(Clone, Debug)]
+pub(super) struct RadioNoise(Option<(Placement, f32)>);
+
+impl RadioNoise {
+    pub(super) const NONE: Self = Self(None);
+
+    /// Takes what was received, if it is of that.
+    pub(super) fn hear(&mut self, now: Instant, received: &Received, vehicle: &Vehicle) {
+        if SENSING && let Some(Incoming::RadioStatus { noise, .. }) = received.message {
+            let heard = vehicle.place_in_air(now).zip(noise_w(noise));
+            self.0 = heard.or(self.0);
+        }
+    }
+
+    /// Hands it in.
+    pub(super) fn take(&mut self) -> Option<Sample> {
+        let (at, power_w) = self.0.take()?;
+        Some(Sample::Heard { at, power_w })
     }
 }

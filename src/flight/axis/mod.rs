@@ -28,7 +28,6 @@
 //! (`places_agree_with_geodesics` in `host-tests/tests/axis`); there and back within one unit of [`Geodetic`]. The distance of a far point:
 //! within 0.2 % anywhere on earth, and 0.002 % up to 1000 km (`distances_agree_with_geodesics`, as above).
 
-mod angle;
 mod error;
 #[cfg(test)]
 mod tests;
@@ -37,7 +36,7 @@ mod vector;
 use crate::geodetic::{Geodetic, to_integer};
 use crate::place::Placement;
 use crate::sites::Sites;
-use angle::{UNIT, turned};
+use vector::{UNIT, turned};
 use vector::{Vector, radius};
 
 pub use error::AxisError;

@@ -1,13 +1,19 @@
-//! A message that has come in: whether it is one to say to this relay, and to which layer.
+//! Messages received: which are for this relay, on which side their sender is, and which layer handles each.
+//!
+//! A decision changes the view, and perhaps the mission, of this relay. A tag shows that its sender is there.
 
 use super::state::Node;
-use crate::event::About;
-use crate::node::context::Effects;
-#[cfg(feature = "upload")]
+use crate::event::{About, Event};
+use crate::mission::{Heading, Mission};
+use crate::node::context::{Decided, Effects};
+use crate::node::duplicate::Duplicated;
 use crate::node::mission_update::takes_uploads;
+use crate::node::neighbour::hearing::CANDIDATES;
+use crate::settings::{Method, Wiring};
 use crate::side::Side;
 use crate::stats::bump;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
+use crate::wire::digest::MissionId;
 use crate::wire::message::Message;
 
 impl Node {
@@ -199,5 +205,210 @@ impl Node {
             let node = neighbour.node();
             self.raise_about(About::Back, side, node);
         }
+    }
+}
+
+#[cfg(feature = "auth")]
+impl Node {
+    /// Node `from` at `side` has made itself known, for the first time if `first`: then what waits for an answer from there is
+    /// said again.
+    pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {
+        if self.ground_side(from).is_some() {
+            return;
+        }
+        if self.layers.neighbours.at(side).node() != from {
+            if first {
+                // What was to be said to it before could not be read there.
+                self.owe_hello(side, from, true);
+            }
+            return;
+        }
+        if first && side == self.onward() {
+            self.layers.resend();
+        }
+    }
+
+    /// Node `from` at `side` has said that it is there, and not shown that it has heard this relay.
+    pub(crate) fn called(&mut self, side: Side, from: u16) {
+        self.is_signed_right(side, from);
+        if self.searches() {
+            self.says_it_hears(side, from, false);
+        }
+    }
+
+    /// A handshake under the number of node `from` at `side` was signed with another key, or altered.
+    pub(crate) fn is_forged(&mut self, side: Side, from: u16) {
+        let distance = from.abs_diff(self.member.node);
+        if self.layers.neighbours.at_mut(side).is_forged(distance) {
+            self.raise_about(About::Key, side, from);
+        }
+    }
+
+    /// Node `from` at `side` has the key.
+    pub(crate) fn is_signed_right(&mut self, side: Side, from: u16) {
+        let distance = from.abs_diff(self.member.node);
+        self.layers
+            .neighbours
+            .at_mut(side)
+            .is_signed_right(distance);
+    }
+
+    /// Node `from` at `side` goes on with an older epoch than it had.
+    pub(crate) fn went_back(&mut self, side: Side, from: u16) {
+        self.raise_about(About::Epoch, side, from);
+    }
+}
+
+impl Node {
+    /// Where passes go to, and where they come from.
+    pub(super) const fn onward(&self) -> Side {
+        Side::onward(self.member.mission.heading())
+    }
+
+    pub(super) const fn back(&self) -> Side {
+        Side::back(self.member.mission.heading())
+    }
+
+    /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
+    /// one, or the ground where it may upload missions.
+    pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
+        if let Some(side) = self.ground_side(sender) {
+            return Some(side);
+        }
+        let own = self.member.node;
+        let near = sender.abs_diff(own) <= if self.searches() { CANDIDATES } else { 1 };
+        if !near || sender == own || sender < 1 || sender > self.member.all {
+            return None;
+        }
+        Some(if sender < own {
+            Side::Upstream
+        } else {
+            Side::Downstream
+        })
+    }
+
+    /// On which side `node` is, if it is the ground transmitter or receiver and near enough to be heard.
+    pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
+        let (own, all) = (self.member.node, self.member.all);
+        let most = match self.member.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => CANDIDATES,
+        };
+        let near = takes_uploads(&self.member) && node.abs_diff(own) <= most;
+        match node {
+            0 if near => Some(Side::Upstream),
+            _ if near && node == all.saturating_add(1) => Some(Side::Downstream),
+            _ => None,
+        }
+    }
+
+    /// Whether others than the neighbours of the mission can be heard.
+    pub(super) fn searches(&self) -> bool {
+        self.member.settings.wiring == Wiring::Shared
+    }
+
+    /// Node `from` was heard at the port of side `through`: at that of the other side than its own, it may be heard at both.
+    pub(crate) fn hear_at_both(&mut self, now: Instant, through: Side, from: u16) {
+        let Some(side) = self.side_of(from).filter(|side| *side != through) else {
+            return;
+        };
+        let settings = self.member.settings;
+        if self.layers.neighbours.at(side).is_there()
+            && self
+                .duplicate
+                .should_report(now, Duplicated::Neighbour, &settings)
+        {
+            self.raise_about(About::Index, side, from);
+        }
+    }
+}
+
+impl Node {
+    /// What came of a proposal is known: how many relays there are, or that they are too few.
+    pub(super) fn decided(&mut self, now: Instant, decided: Decided) {
+        let Some(proposed) = self.layers.view.proposed() else {
+            return;
+        };
+        let (place, id) = (proposed.place, proposed.mission_id);
+        let leads = place == 1;
+        let (relays, lease_left) = match decided {
+            Decided::Granted { relays, lease_left } => (relays, lease_left),
+            Decided::Earlier => {
+                if leads {
+                    self.layers.view.asking.ask(now);
+                }
+                return;
+            }
+            Decided::Refused => {
+                if !core::mem::replace(&mut self.telemetry.told_refused, true) {
+                    self.raise(Event::NoQuorum);
+                }
+                return self.layers.neighbours.refuse();
+            }
+        };
+        let mission = self.layers.update.mission_of(&self.member, id);
+        let mission = mission.and_then(|mission| mission.with_relays(relays).ok());
+        let Some(mission) = mission else {
+            return self.layers.view.asking.ask(now);
+        };
+        let before = self.member.mission.relays();
+        self.member.index = match mission.heading() {
+            Heading::TowardRx => place,
+            Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
+        };
+        self.member.view = proposed.view;
+        self.fly(now, mission, id);
+        self.layers.view.heard_of(proposed.view);
+        let (back, onward) = (self.back(), self.onward());
+        self.layers.neighbours.at_mut(back).agree_with_proposer();
+        self.layers.neighbours.at_mut(onward).agree(place == relays);
+        let works = self.member.settings.method == Method::Joint;
+        let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
+        let views = (proposed.view, proposed.base.id);
+        self.layers.lease.renew(now, views, rest, relays < before);
+        if leads {
+            self.layers.lease.commit();
+        }
+        self.layers.round.renew(rest, leads, works);
+        bump(&mut self.telemetry.stats.views);
+        self.telemetry.told_lapsed = false;
+        self.telemetry.told_refused = false;
+        self.raise(Event::Reformed);
+        if id != self.layers.update.latest() {
+            // A newer one has come in the meantime.
+            self.layers.view.asking.ask(now);
+        }
+    }
+
+    /// Flies `mission` from now on, which is that of `id`.
+    fn fly(&mut self, now: Instant, mission: Mission, id: MissionId) {
+        if id == self.member.active {
+            // With other relays.
+            self.member.mission = mission;
+            return;
+        }
+        self.adopt(mission, id, Some(now));
+        self.raise(Event::Adopted);
+    }
+
+    /// `mission` is another one than before, and the one held; since `now` if the relay has flown another one. Between other sites no place
+    /// is what it was: there is none to be at until the chain has agreed on new ones, and the guard begins anew.
+    pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
+        self.member.mission = mission;
+        self.member.interference = *mission.interference();
+        self.member.active = id;
+        #[cfg(feature = "upload")]
+        {
+            if self.member.fly_between(self.layers.update.sites()) {
+                self.layers.round.discard_place();
+                self.steering.leave_line(now);
+            }
+            self.steering.set_box(self.member.geofence());
+        }
+        #[cfg(not(feature = "upload"))]
+        let _ = now;
+        let common = mission.config().common;
+        let profile = self.member.settings.profile.unwrap_or(common);
+        self.layers.round.load(profile);
     }
 }

@@ -1,12 +1,13 @@
-//! What a relay holds, and how its layers come to know of each other.
+//! State of a relay: its five layers, events and counters, and how the effects of one layer reach the others.
+//!
+//! A relay whose part of the chain has no quorum gives its links up after a while and searches anew.
+//! Two parts that are interleaved, as 1 - 3 - 5 and 2 - 4 are, or a part of which no relay takes the one that could lead it back, would
+//! keep their links for good. One that has no quorum has nothing to lose by them.
 
-use super::adrift::Adrift;
 use super::identity::Echo;
-use super::layers::Layers;
-use super::telemetry::Telemetry;
-use crate::event::{About, Event};
+use crate::event::{About, Event, Pending};
 use crate::mission::Mission;
-use crate::node::context::{Effects, Member};
+use crate::node::context::{Context, Effects, Member};
 use crate::node::duplicate::DuplicateIndex;
 use crate::node::lease::Lease;
 use crate::node::mission_update::MissionUpdate;
@@ -15,12 +16,13 @@ use crate::node::round::Round;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::steering::Steering;
+use crate::node::timing::first_pass;
 use crate::node::view::change::ViewChange;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// A relay's share of the protocol.
 #[derive(Clone, Debug)]
@@ -254,6 +256,100 @@ impl Node {
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.round.restart(&context);
             self.apply(now, effects);
+        }
+    }
+}
+
+/// The layers of one relay.
+#[derive(Clone, Debug)]
+pub(super) struct Layers {
+    pub(super) neighbours: Neighbours,
+    pub(super) view: ViewChange,
+    pub(super) lease: Lease,
+    pub(super) update: MissionUpdate,
+    pub(super) round: Round,
+}
+
+impl Layers {
+    /// What a layer is handed. It borrows the member alone, which stands beside the layers: any of them can be lent while it lasts.
+    pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
+        let onward = Side::onward(member.mission.heading());
+        Context {
+            now,
+            member,
+            latest: self.update.latest(),
+            end: self.neighbours.at(onward).has_no_peer(),
+            held: self.lease.held(now),
+        }
+    }
+
+    /// What could not be said to the neighbour after can be now.
+    pub(super) fn resend(&mut self) {
+        self.view.resend();
+        self.round.resend();
+    }
+}
+
+/// What the firmware is told.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Telemetry {
+    pub(super) events: Pending,
+    pub(super) stats: Stats,
+    /// Whether a lapse of the lease, and a refusal, have been told since a view was agreed on.
+    pub(super) told_lapsed: bool,
+    pub(super) told_refused: bool,
+}
+
+/// So many times `dead_after` a part without a quorum keeps its links, at first and at most.
+const FIRST: u32 = 3;
+const MOST: u32 = 4;
+
+/// Since when there is no quorum, and how often the links were given up since.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Adrift {
+    /// When the links are given up; `None` where there is a quorum.
+    at: Option<Instant>,
+    again: bool,
+}
+
+impl Adrift {
+    pub(super) const NONE: Self = Self {
+        at: None,
+        again: false,
+    };
+
+    pub(super) const fn next_timeout(&self) -> Option<Instant> {
+        self.at
+    }
+}
+
+impl Node {
+    /// The part that this relay is in has been refused a view, or has one.
+    pub(super) fn drift(&mut self, now: Instant) {
+        if !self.searches() || !self.layers.view.has_no_quorum() {
+            self.adrift = Adrift::NONE;
+        } else if self.adrift.at.is_none() {
+            self.adrift.at = Some(now + self.keeps_links_for());
+        }
+    }
+
+    /// How long links are kept without a quorum.
+    fn keeps_links_for(&self) -> Duration {
+        let settings = &self.member.settings;
+        let times = if self.adrift.again { MOST } else { FIRST };
+        let pass = first_pass(settings, self.member.all);
+        settings.dead_after.times(times).max(pass)
+    }
+
+    /// Gives the links up if it is time to.
+    pub(super) fn search_anew(&mut self, now: Instant) {
+        if self.adrift.at.is_none_or(|at| now < at) {
+            return;
+        }
+        self.adrift.again = true;
+        self.adrift.at = Some(now + self.keeps_links_for());
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).give_up(now);
         }
     }
 }

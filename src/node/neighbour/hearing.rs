@@ -1,4 +1,4 @@
-//! Which nodes on one side were heard lately, and what was so of each of them in a row.
+//! Nodes on one side that were heard lately, what held for each of them in a row, and the hellos that are owed to them.
 
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -106,5 +106,41 @@ impl Hearing {
         self.before = if old { 0 } else { self.now };
         self.now = 0;
         self.since = now;
+    }
+}
+
+/// Candidates that are owed a hello, and those of them that are asked for one: bit 0 is the nearest node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Hellos {
+    owed: u8,
+    asks: u8,
+}
+
+impl Hellos {
+    pub(super) const NONE: Self = Self { owed: 0, asks: 0 };
+
+    /// To the candidate `distance` nodes away, which may be one that asks.
+    pub(super) const fn owe(&mut self, distance: u16, ask: bool) {
+        let bit = mask(distance);
+        self.owed |= bit;
+        if ask {
+            self.asks |= bit;
+        }
+    }
+
+    /// To all of them, all asked.
+    pub(super) const fn owe_all(&mut self) {
+        self.owed = 0x0F;
+        self.asks = 0x0F;
+    }
+
+    /// The nearest candidate that is owed one: how many nodes away, and whether it is asked.
+    pub(super) fn take(&mut self) -> Option<(u16, bool)> {
+        let distance = (1..=CANDIDATES).find(|distance| self.owed & mask(*distance) != 0)?;
+        let bit = mask(distance);
+        self.owed &= !bit;
+        let ask = self.asks & bit != 0;
+        self.asks &= !bit;
+        Some((distance, ask))
     }
 }

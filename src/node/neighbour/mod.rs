@@ -2,27 +2,14 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`state`] | which node is taken for the neighbour on one side: its state table |
-//! | `said` | what the nodes on one side say: whom they hear, and whom they take |
-//! | `outgoing` | the heartbeats and hellos that they are owed |
-//! | [`candidate`] | a node that is not taken, as its hello has it |
-//! | [`hearing`] | which nodes were heard lately |
+//! | [`state`] | which node is taken for the neighbour on one side: its state table, what the nodes there say, and what they are owed |
+//! | [`hearing`] | which nodes were heard lately, and which hellos wait to be sent |
 //! | `damping` | links that come and go |
-//! | `agreed` | who was there when a view was decided on |
-//! | `decided` | what a decision on a view makes of who is there |
-//! | `hellos`, `signs` | what waits to be sent |
 //! | [`liveness`] | when a neighbour counts as lost |
 
-mod agreed;
-pub(crate) mod candidate;
 mod damping;
-mod decided;
 pub(crate) mod hearing;
-mod hellos;
 pub(crate) mod liveness;
-mod outgoing;
-mod said;
-mod signs;
 pub(crate) mod state;
 
 use super::timing::earliest;

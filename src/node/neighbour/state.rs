@@ -23,15 +23,15 @@
 //! all links of the side share the losses of the link that was lost last. Losses are forgotten 32 times `dead_after` after the last one.
 //! To a neighbour that is lost, on wires, nothing but questions is sent until something comes from it. A node that has come back is a reason
 //! for a new view `probe_after` later: the other one beside it may be about to take it, too.
+//!
+//! The side also holds what the nodes there say in their hellos, the nodes of the last view, and the heartbeats and hellos that are owed.
 
-use super::agreed::AgreedNodes;
-use super::candidate::Candidate;
 use super::damping::Damping;
+use super::hearing::Hellos;
 use super::hearing::{CANDIDATES, Hearing, InRow, ToldOf, mask};
-use super::hellos::Hellos;
 use super::liveness::{Liveness, patience, tick};
-use super::signs::Signs;
 use crate::jitter::Jitter;
+use crate::node::context::Proposer;
 use crate::node::timing::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
@@ -440,5 +440,267 @@ impl Neighbour {
         self.damping.clear();
         self.look_at = Some(now + self.tick);
         true
+    }
+}
+
+/// A node that is not taken, and hears this relay.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four things that its hello says"
+)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) node: u16,
+    /// How many places away it is, and whether toward Rx.
+    pub(crate) distance: u16,
+    pub(crate) downstream: bool,
+    /// Whether it takes this relay for its neighbour.
+    pub(crate) pairs: bool,
+    /// Whether it is nearer than the one taken.
+    pub(crate) nearer: bool,
+    /// Whether it has somebody beyond it.
+    pub(crate) ready: bool,
+    /// Whether more relays hang together by it than by the one taken.
+    pub(crate) longer: bool,
+}
+
+impl Candidate {
+    /// How many nodes there may be between it and the one that was lost.
+    pub(super) const fn beyond(self) -> u16 {
+        self.distance.saturating_sub(2)
+    }
+
+    /// Whether it is to take the place of another one.
+    pub(super) const fn is_better(self) -> bool {
+        if self.nearer { self.ready } else { self.longer }
+    }
+}
+
+impl Neighbour {
+    /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
+    pub(crate) fn has_changed(&self, now: Instant) -> bool {
+        let changed = self.node != self.agreed.counted();
+        changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
+    }
+
+    /// Whether it is who was there when the view was agreed on.
+    pub(crate) const fn is_agreed(&self) -> bool {
+        self.node == self.agreed.node()
+    }
+
+    /// A proposal has come from whoever is there, or begins here: then nobody is to be before this relay.
+    pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
+        self.agreed.proposed_by(proposer, self.node);
+    }
+
+    /// The proposal that came from this side was granted.
+    pub(crate) const fn agree_with_proposer(&mut self) {
+        self.agreed.agree_with_proposer();
+    }
+
+    /// Leaves the view: nobody is here in it.
+    pub(crate) const fn leave(&mut self) {
+        self.agreed.agree(0);
+    }
+
+    /// It was not granted: there is nothing to ask again until somebody else is there.
+    pub(crate) const fn refuse(&mut self) {
+        self.agreed.refuse(self.node);
+    }
+
+    /// The proposal that was granted goes on to whoever is there, or ends here.
+    pub(crate) const fn agree(&mut self, ends: bool) {
+        self.agreed.agree(if ends { 0 } else { self.node });
+    }
+}
+
+/// The nodes on one side by what was decided on views, 0 for none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AgreedNodes {
+    /// The node that was there when the view was agreed on.
+    in_view: u16,
+    /// The node that was there when a proposal was decided last, granted or not.
+    counted: u16,
+    /// The node that the last proposal came from.
+    proposer: u16,
+}
+
+impl AgreedNodes {
+    pub(super) const fn on(node: u16) -> Self {
+        Self {
+            in_view: node,
+            counted: node,
+            proposer: node,
+        }
+    }
+
+    /// The node that was there when the view was agreed on.
+    pub(super) const fn node(self) -> u16 {
+        self.in_view
+    }
+
+    /// The node that was there when a proposal was decided last, granted or not.
+    pub(super) const fn counted(self) -> u16 {
+        self.counted
+    }
+
+    /// A proposal has come from `node`, which is there, or begins here: then nobody is to be before this relay.
+    pub(super) const fn proposed_by(&mut self, proposer: Proposer, node: u16) {
+        self.proposer = match proposer {
+            Proposer::Itself => 0,
+            Proposer::Neighbour => node,
+        };
+    }
+
+    /// The proposal that came from this side was granted.
+    pub(super) const fn agree_with_proposer(&mut self) {
+        self.agree(self.proposer);
+    }
+
+    /// A proposal was granted with `node` on this side.
+    pub(super) const fn agree(&mut self, node: u16) {
+        self.in_view = node;
+        self.counted = node;
+    }
+
+    /// It was not granted: there is nothing to ask again until somebody else than `node` is there.
+    pub(super) const fn refuse(&mut self, node: u16) {
+        self.counted = node;
+    }
+}
+
+/// What waits to be sent to the neighbour, apart from passes and what comes back of them.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Signs {
+    /// A question whether it is there.
+    pub(super) ask: bool,
+    /// The answer to its question of that number, 0 for none.
+    pub(super) answer: u16,
+}
+
+impl Signs {
+    pub(super) const NONE: Self = Self {
+        ask: false,
+        answer: 0,
+    };
+}
+
+/// So many times in a row a node has to say that it does not hear this relay: an answer or two may be lost.
+const UNHEARD: u8 = 8;
+
+/// Handshakes in a row under a node's number that are signed with another key.
+#[cfg(feature = "auth")]
+const FORGED: u8 = 3;
+
+impl Neighbour {
+    /// Returns true if the node `distance` places away and this relay hear each other, and the link is not held down.
+    pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
+        let held = self.damping.held(now, settings);
+        let known = mask(distance) & self.both_ways.recent(now, settings) & !held != 0;
+        known || self.is_mutual() && self.distance == distance && self.liveness.is_there()
+    }
+
+    /// Whether the neighbour here is linked, and less than `distance` places away.
+    pub(crate) fn comes_along(&self, distance: u16) -> bool {
+        self.is_mutual() && self.liveness.is_there() && self.distance < distance
+    }
+
+    /// Whether the neighbour here is linked, and more than `distance` places away.
+    pub(crate) fn goes_past(&self, distance: u16) -> bool {
+        self.is_mutual() && self.liveness.is_there() && self.distance > distance
+    }
+
+    /// Node `distance` places away has said which one it takes on this side, and whether it hears this relay.
+    pub(crate) fn says(
+        &mut self,
+        distance: u16,
+        neighbour: u16,
+        hears: bool,
+        now: Instant,
+        settings: &Settings,
+    ) {
+        if let Some(taken) = self.taken_by.get_mut(usize::from(distance).wrapping_sub(1)) {
+            *taken = neighbour;
+        }
+        if hears {
+            self.both_ways.add(distance, now, settings);
+        }
+    }
+
+    /// The node that the one `distance` places away takes on this side, as it said last; 0 for none.
+    pub(crate) fn taken_by(&self, distance: u16) -> u16 {
+        let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
+        known.copied().unwrap_or(0)
+    }
+
+    /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
+    pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
+        self.hearing.add(distance, now, settings);
+        self.damping.hear(distance, self.asks_all(), now, settings);
+        if taken {
+            self.liveness.met();
+        }
+    }
+
+    /// The nodes that were heard lately, without one whose link is held down: bit 0 is the nearest one.
+    pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
+        let held = self.damping.held(now, settings);
+        self.hearing.recent(now, settings) & !held
+    }
+
+    /// The node `distance` nodes away has said whether it hears this relay; whether it does not, for the last of so many times in a row.
+    pub(crate) fn says_it_hears(&mut self, distance: u16, heard: bool) -> bool {
+        self.unheard.count(distance, !heard, UNHEARD)
+    }
+
+    /// The node `distance` nodes away is of another mission; whether that is to be told.
+    pub(crate) fn is_stranger(&mut self, distance: u16, now: Instant) -> bool {
+        self.strangers.tell(distance, now)
+    }
+
+    /// A handshake under the number of the node `distance` nodes away was signed with another key; whether that is certain now.
+    #[cfg(feature = "auth")]
+    pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
+        self.forged.count(distance, true, FORGED)
+    }
+
+    /// The node `distance` nodes away has the key.
+    #[cfg(feature = "auth")]
+    pub(crate) fn is_signed_right(&mut self, distance: u16) {
+        self.forged.count(distance, false, FORGED);
+    }
+}
+
+impl Neighbour {
+    /// The neighbour asks for a sign of life, with a question of that number.
+    pub(crate) const fn asked(&mut self, number: u16) {
+        if number != 0 {
+            self.signs.answer = number;
+        }
+    }
+
+    /// The neighbour has answered the question of that number: when that was asked.
+    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
+        self.liveness.answered(number)
+    }
+
+    /// A heartbeat that is owed: to which node, the number of its question and that of the one it answers.
+    pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
+        let Signs { ask, answer } = core::mem::take(&mut self.signs);
+        if !(ask || answer != 0) || self.node == 0 {
+            return None;
+        }
+        let question = if ask { self.liveness.ask(now) } else { 0 };
+        Some((self.node, question, answer))
+    }
+
+    /// Owes a hello to the candidate `distance` nodes away, which may be one that asks.
+    pub(crate) const fn owe(&mut self, distance: u16, ask: bool) {
+        self.hellos.owe(distance, ask);
+    }
+
+    /// The nearest candidate that is owed a hello: how many nodes away, and whether it is asked.
+    pub(crate) fn take_hello(&mut self) -> Option<(u16, bool)> {
+        self.hellos.take()
     }
 }

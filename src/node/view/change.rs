@@ -9,14 +9,17 @@
 //! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again after
 //! `probe_after` or later ([`Asking`]), and alone not before its own vote would suffice. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
 //! later one is asked for.
+//!
+//! The proposal is sent onward and the decision back. What is due later is to send one of them again, or to ask for a view.
 
 use super::asking::Asking;
-use super::electorate::{self, Electorate, Outcome};
-use super::proposed::{Conclusion, Proposed, ViewDue};
+use super::electorate;
+use super::electorate::{Electorate, Outcome};
 use super::record::{RecordError, ViewRecord};
 use crate::node::context::{Context, Decided, Effects, Member, Proposer};
 use crate::node::numbering::Stragglers;
-use crate::node::retransmit::Retransmit;
+use crate::node::retransmit::{Again, Retransmit};
+use crate::node::timing::earliest;
 use crate::time::Instant;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
@@ -410,4 +413,178 @@ impl ViewChange {
             ..Effects::NONE
         }
     }
+}
+
+impl ViewChange {
+    /// What could not be said to the neighbour after can be now.
+    pub(crate) fn resend(&mut self) {
+        self.due.proposal |= self.state == ViewState::Proposed;
+    }
+
+    /// Whether the proposal is to be sent onward, to node `to`; it is taken for sent then.
+    pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
+        let proposal = self.awaited()?.view;
+        if !core::mem::take(&mut self.due.proposal) {
+            return None;
+        }
+        let proposed = self.proposed.as_mut()?;
+        if *proposed.handed_to.get_or_insert(to) != to {
+            self.abandon(context, proposal);
+            return None;
+        }
+        let proposed = *proposed;
+        let way = context.way(context.member.all);
+        self.retransmit.sent(context.now, way);
+        Some(Message::Proposal(Proposal {
+            mission_id: proposed.mission_id,
+            view: proposed.view,
+            place: proposed.place,
+            poll: proposed.poll,
+        }))
+    }
+
+    /// What is to be sent back; it is taken for sent then.
+    pub(crate) fn take_back(&mut self) -> Option<Message> {
+        let proposed = self.proposed?;
+        if core::mem::take(&mut self.due.decision) && self.state != ViewState::Proposed {
+            return Some(Message::Decision(Decision {
+                mission_id: proposed.mission_id,
+                proposal: proposed.view,
+                place: proposed.place,
+                there: proposed.there,
+                base: proposed.base,
+                view: proposed.decided,
+                lease_left: proposed.lease_left,
+            }));
+        }
+        core::mem::take(&mut self.due.busy).then_some(Message::Busy {
+            sweep: proposed.view.mark(),
+        })
+    }
+
+    /// A message is said to have arrived: whether it is the proposal.
+    pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
+        let known = self
+            .awaited()
+            .is_some_and(|proposed| proposed.view.mark() == number);
+        if known {
+            let way = context.way(context.member.all);
+            self.retransmit.arrived(context.now, way);
+        }
+        known
+    }
+}
+
+impl ViewChange {
+    /// `leads` tells whether nobody is before this relay, `fresh` whether nothing has come to it since it was switched on.
+    pub(crate) fn handle_timeout(
+        &mut self,
+        context: &Context<'_>,
+        leads: bool,
+        fresh: bool,
+    ) -> Effects {
+        let mut resent = false;
+        let hop_time = context.settings().hop_time;
+        match self.retransmit.take_due(context.now, hop_time) {
+            Some(Again::Onward) if self.state == ViewState::Proposed => {
+                self.due.proposal = true;
+                resent = true;
+            }
+            Some(Again::Back) => self.due.decision = true,
+            _ => {}
+        }
+        let effects = if self.asking.is_due(context.now) {
+            self.ask_again(context, leads, fresh)
+        } else {
+            Effects::NONE
+        };
+        Effects { resent, ..effects }
+    }
+
+    /// It has not come yet, or it is time to ask for a place in the chain.
+    fn ask_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
+        let settings = &context.member.settings;
+        if !self.asking.take_due(context.now, fresh, settings) {
+            return Effects::NONE;
+        }
+        if !leads {
+            return Effects {
+                ask: true,
+                ..Effects::NONE
+            };
+        }
+        let under_way = self.awaited().is_some_and(|proposed| {
+            proposed.view >= self.newest && proposed.mission_id == context.latest
+        });
+        let newest = self.newest.max(self.electorate.promised());
+        let next = newest.next_by(context.member.node);
+        let Some(view) = next.filter(|_| !under_way) else {
+            return Effects::NONE;
+        };
+        // A number is spent where something may come of it.
+        let Member { node, all, .. } = *context.member;
+        let alone = self.refused && context.end && context.settings().quorum;
+        if alone
+            && self
+                .electorate
+                .is_refused_alone(node, view, all, context.held)
+        {
+            self.wait_after_refusal(context);
+            return Effects::NONE;
+        }
+        self.heard_of(view);
+        let Some(effects) = self.propose(context, view, context.latest, 0, None) else {
+            return Effects::NONE;
+        };
+        Effects {
+            began: true,
+            proposed_by: Some(Proposer::Itself),
+            ..effects
+        }
+    }
+
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        earliest(self.asking.next_timeout(), self.retransmit.next_timeout())
+    }
+}
+
+/// A proposal, as one relay sees it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct Proposed {
+    /// The new view.
+    pub(crate) view: ViewId,
+    /// The mission that it is to fly.
+    pub(crate) mission_id: MissionId,
+    /// This relay's place in it, from 1 at the leader.
+    pub(crate) place: u16,
+    /// What it has gathered, this relay's voice included.
+    pub(super) poll: Poll,
+    /// The one node that it was handed on to: were it handed to another one, too, two views could bear its name.
+    pub(super) handed_to: Option<u16>,
+    /// The view that the decision follows, once that is known.
+    pub(crate) base: View,
+    /// How many have taken part in it, once that is known.
+    pub(super) there: u16,
+    /// What was decided on, once that is known; `None` if too few are there.
+    pub(super) decided: Option<View>,
+    pub(super) lease_left: u16,
+}
+
+/// What came of a proposal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Conclusion {
+    /// How many have taken part.
+    pub(super) there: u16,
+    /// The view that is followed.
+    pub(super) base: View,
+    pub(super) view: Option<View>,
+    pub(super) lease_left: u16,
+}
+
+/// What is to be sent.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub(super) struct ViewDue {
+    pub(super) proposal: bool,
+    pub(super) decision: bool,
+    pub(super) busy: bool,
 }

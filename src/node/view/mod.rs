@@ -24,11 +24,8 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | [`change`] | the states of a proposal and of the decision on it |
-//! | `timeouts` | what has run out: to say it again, to ask again, to propose |
-//! | `outgoing` | what is sent of it, onward and back |
+//! | [`change`] | the states of a proposal and of the decision on it, what is sent of it, and what is due |
 //! | [`asking`] | when this relay asks for a view |
-//! | [`proposed`] | a proposal, as one relay sees it |
 //! | [`electorate`] | who may decide, and what a relay has said in the votes |
 //! | [`record`] | that, as it is stored |
 //! | `model` | a test: all that can happen to a chain of three or four |
@@ -39,9 +36,6 @@ pub(crate) mod electorate;
 #[cfg(test)]
 #[cfg(not(target_os = "none"))]
 mod model;
-mod outgoing;
-pub(crate) mod proposed;
 pub(crate) mod record;
 #[cfg(test)]
 mod tests;
-mod timeouts;

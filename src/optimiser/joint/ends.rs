@@ -1,7 +1,7 @@
 //! The ends of a chain: the most that its first and last hop can meet, and the slack at Rx.
 
 use super::outlook::Outlook;
-use super::room::Room;
+use super::site::Room;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;

@@ -19,8 +19,27 @@
 //!
 //! and by ln gamma R = -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` holds the chains that come of
 //! these against an independent optimiser.
+//!
+//! # Coordinates
+//!
+//! Where a hop may end is a surface, the outside of which hears too little. Along most of a chain x is a smooth function of y and h
+//! on it; where the chain climbs straight up, or steps straight aside, it is h or y that is one of the other two.
+//!
+//! # Noise
+//!
+//! With noise a hop is replaced by one without that equals it next to one distance from the interferer.
+//!
+//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t lies above it: q(s) <= (s + nu t^2) / w^2. By it
+//!
+//! ```text
+//! q(s) >= c l   =>   s + nu t^2 >= c w^2 l
+//! ```
+//!
+//! and the right side is a hop without noise for the target c' = c w^2, with nu t^2 to spare: what it reaches is a ball for c' > 1, and a
+//! coordinate of its end follows from the other two by a square root. The ball holds all that is met, and touches its surface where
+//! s = t; found there again, it is Newton's rule in s.
 
-use super::axis::Triple;
+use crate::place::Placement;
 use crate::sir::square;
 
 /// A reach's derivatives, by where the hop begins, three coordinates, p, and by the two that are free of where it ends, w.
@@ -121,6 +140,101 @@ impl Bend {
         Self {
             q,
             twice: -4.0 * noise * inverse * q,
+        }
+    }
+}
+
+/// A coordinate.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) enum Coordinate {
+    #[default]
+    X,
+    Y,
+    H,
+}
+
+/// (x, y, h), or any three numbers of which each belongs to one coordinate.
+pub(crate) type Triple = [f32; 3];
+
+impl Coordinate {
+    /// This coordinate first, then the other two in their order.
+    #[inline(never)] // called from many places
+    pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
+        match self {
+            Self::X => [x, y, h],
+            Self::Y => [y, x, h],
+            Self::H => [h, x, y],
+        }
+    }
+
+    /// (x, y, h) again.
+    #[inline(never)] // called from many places
+    pub(crate) const fn back(self, [first, second, third]: Triple) -> Triple {
+        match self {
+            Self::X => [first, second, third],
+            Self::Y => [second, first, third],
+            Self::H => [second, third, first],
+        }
+    }
+
+    /// A symmetric matrix with this coordinate first.
+    pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
+        self.first_row(bend).map(|row| self.first(row))
+    }
+
+    /// The matrix by (x, y, h) again.
+    pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
+        let [a, b, c] = bend.map(|row| self.back(row));
+        match self {
+            Self::X => [a, b, c],
+            Self::Y => [b, a, c],
+            Self::H => [b, c, a],
+        }
+    }
+
+    const fn first_row(self, [x, y, h]: [Triple; 3]) -> [Triple; 3] {
+        match self {
+            Self::X => [x, y, h],
+            Self::Y => [y, x, h],
+            Self::H => [h, x, y],
+        }
+    }
+}
+
+/// The coordinates of a place.
+pub(super) const fn triple(place: Placement) -> Triple {
+    [place.x_m, place.y_m, place.altitude_m]
+}
+
+/// One place as seen from another.
+pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
+    [a - x, b - y, c - z]
+}
+
+/// A hop as a quadratic: s + spare >= c l.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tangent {
+    pub(super) c: f32,
+    /// c - 1.
+    pub(super) e: f32,
+    /// m^2.
+    pub(super) spare: f32,
+}
+
+impl Tangent {
+    /// Without noise.
+    pub(super) const fn free(c: f32, e: f32) -> Self {
+        Self { c, e, spare: 0.0 }
+    }
+
+    /// With noise of nu = `noise`, 1/m^2, at `s` m^2 from the interferer.
+    pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
+        let nus = noise * s;
+        let w = 1.0 + nus;
+        Self {
+            c: c * w * w,
+            e: e + c * nus * (2.0 + nus),
+            spare: nus * s,
         }
     }
 }

@@ -6,34 +6,26 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
-//! | `axis` | which coordinate of a place follows from the other two |
-//! | `hop` | how a hop's end moves with everything it depends on |
-//! | `tangent` | with noise, a hop that looks like one without |
+//! | `hop` | how a hop's end moves with everything it depends on, with noise and without, and which coordinate of it follows from the other two |
 //! | `outlook` | what the rest of the chain is worth, as the relay before it sees it |
 //! | `policy` | a relay's step, and how it follows what changed before it |
-//! | `room` | where a relay may fly across the line |
-//! | `site`, `weigh` | one relay and the hop into it: one relay's worth of the pass forward, and of the pass back |
+//! | `site`, `weigh` | one relay and the hop into it: one relay's worth of the pass forward, and of the pass back; the room of a relay across the line |
 //! | `ends` | what the first and the last hop can meet |
 //! | `ascent` | how far the target is raised, and what is taken of a step |
-//! | `starts`, `seek`, `cells` | where an ascent begins; the target of a chain that does not change; a place in six bytes |
+//! | `starts` | where an ascent begins, and at which target |
 //! | [`solver`] | a whole chain without a message |
 
 mod ascent;
-mod axis;
-mod cells;
 mod ends;
 mod hop;
 mod outlook;
 mod policy;
-mod room;
-mod seek;
 mod site;
 pub mod solver;
 mod starts;
-mod tangent;
 mod weigh;
 
-pub use room::Room;
+pub use site::Room;
 pub use solver::{Seat, Solver};
 
 /// The most relays of a chain that relays solve by the joint method; without the feature `altitude` they solve none.

@@ -5,8 +5,8 @@
 //! principle, and with second derivatives differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard
 //! and Todorov 2014).
 
-use super::axis::{Coordinate, Triple};
 use super::hop::Reach;
+use super::hop::{Coordinate, Triple};
 use super::policy::Policy;
 use crate::place::Placement;
 use crate::root::sqrt;

@@ -1,6 +1,6 @@
 //! What a relay does in one iteration of the joint method: its step, and how it follows what changed before it.
 
-use super::axis::{Coordinate, Triple};
+use super::hop::{Coordinate, Triple};
 use crate::root::sqrt;
 use crate::sir::square;
 

@@ -1,11 +1,11 @@
 //! One relay of a chain under trial, with the hop into it: where it goes.
+//!
+//! Places across the line are kept in six bytes each, and limited by the room that a relay has there.
 
-use super::axis::{Coordinate, Triple, triple};
 use super::ends::first_most;
+use super::hop::{Coordinate, Tangent, Triple, triple};
 use super::policy::Policy;
-use super::room::Room;
-use super::tangent::Tangent;
-use crate::mission::{Interferer, Mission};
+use crate::mission::{Band, Interferer, Mission};
 use crate::optimiser::spacing::Hop;
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
@@ -322,4 +322,88 @@ fn toward(
         y_m: best.y_m + share * wy,
         altitude_m: best.altitude_m + share * wh,
     })
+}
+
+/// The largest code of three bytes.
+const LAST: f32 = 16_777_215.0;
+
+/// One relay's (y, h), each in three bytes as a part of its room.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) struct Cell([u8; 6]);
+
+impl Cell {
+    /// The cell nearest to `at` in `room`.
+    pub(super) fn of(at: CrossSection, room: Room) -> Self {
+        let [a, b, c, _] = code(at.y_m, room.lateral).to_le_bytes();
+        let [d, e, f, _] = code(at.altitude_m, room.band).to_le_bytes();
+        Self([a, b, c, d, e, f])
+    }
+
+    /// Where that is.
+    pub(super) fn place(self, room: Room) -> CrossSection {
+        let Self([a, b, c, d, e, f]) = self;
+        CrossSection {
+            y_m: value([a, b, c, 0], room.lateral),
+            altitude_m: value([d, e, f, 0], room.band),
+        }
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "between 0 and LAST; the cast saturates"
+)]
+fn code(at: f32, band: Band) -> u32 {
+    if band.is_single() {
+        return 0;
+    }
+    ((at - band.least_m) / band.span_m() * LAST + 0.5).clamp(0.0, LAST) as u32
+}
+
+#[expect(clippy::cast_precision_loss, reason = "24 bits fit an f32")]
+fn value(bytes: [u8; 4], band: Band) -> f32 {
+    let code = u32::from_le_bytes(bytes) as f32;
+    if code >= LAST {
+        return band.most_m;
+    }
+    band.nearest(band.least_m + code * (band.span_m() / LAST))
+}
+
+/// Where a relay may fly across the line.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Room {
+    /// Distances to the side, m.
+    pub lateral: Band,
+    /// Altitudes, m.
+    pub band: Band,
+}
+
+impl Room {
+    /// All that the mission leaves.
+    pub const fn of(mission: &Mission) -> Self {
+        let config = mission.config();
+        Self {
+            lateral: config.lateral,
+            band: config.band,
+        }
+    }
+
+    /// The same for a relay that keeps to one altitude.
+    pub const fn at_altitude(self, altitude_m: f32) -> Self {
+        Self {
+            band: Band::at(altitude_m),
+            ..self
+        }
+    }
+
+    /// What of it is nearest to `at`.
+    #[inline(never)] // called from many places
+    pub const fn nearest(self, at: CrossSection) -> CrossSection {
+        CrossSection {
+            y_m: self.lateral.nearest(at.y_m),
+            altitude_m: self.band.nearest(at.altitude_m),
+        }
+    }
 }

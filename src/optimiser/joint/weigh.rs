@@ -1,10 +1,10 @@
 //! What the place of a relay is worth to the one before: one relay's worth of a pass back.
 
-use super::axis::{Coordinate, Triple, minus, triple};
 use super::hop::{Bend, Reach};
+use super::hop::{Coordinate, Triple, minus, triple};
 use super::outlook::Outlook;
 use super::policy::Policy;
-use super::room::Room;
+use super::site::Room;
 use super::site::Site;
 use crate::place::Placement;
 use crate::root::sqrt;

@@ -2,9 +2,9 @@
 
 use super::relay::{PROPOSED, Relay, all, came, id};
 use crate::node::context::{Decided, Effects};
+use crate::node::view::change::Proposed;
 use crate::node::view::change::ViewState;
 use crate::node::view::electorate::{Electorate, Held};
-use crate::node::view::proposed::Proposed;
 use crate::view::View;
 use crate::wire::message::{Decision, Message, Successor};
 

@@ -1,17 +1,18 @@
 //! The highest target of a chain as it is, and what comes after it is found.
+//!
+//! After a target the next start comes, with the shape that its chain begins with; after the last start the polish, in which one relay after
+//! the other tries another place, where the derivatives see none.
 
-use core::task::Poll;
-
-use super::chain::SolverContext;
-use super::polish::GAIN;
-use super::seat::Seat;
-use super::segment::last_of;
+use super::chain::{Seat, SolverContext, far_off, last_of};
 use super::state::Solver;
 use super::work::{Purpose, Work};
+use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
-use crate::optimiser::joint::seek::Seek;
-use crate::optimiser::joint::starts::Start;
+use crate::optimiser::joint::site::{Cell, MARGIN, Room};
+use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
+use crate::place::CrossSection;
+use core::task::Poll;
 
 /// How close to the optimum a start is judged, in ln gamma.
 pub(super) const JUDGED: f32 = 4e-6;
@@ -228,5 +229,187 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 )
             }
         }
+    }
+}
+
+/// Most relays of a chain that is polished, but where some keep to an altitude: the way of the others has kinks there.
+const POLISHED: u16 = 5;
+
+/// How often the moves of a polish are halved, and the first of them, as a part of the room.
+const HALVINGS: u16 = 12;
+const FIRST_MOVE: f32 = 0.25;
+
+/// What a move has to gain, in ln gamma, and how many are taken.
+pub(super) const GAIN: f32 = 2e-5;
+const MOVES: u8 = 200;
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    /// Whose move is tried, which of four ways, and how often it is halved.
+    pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
+        // A mission has relays; the compiler does not know that.
+        let relays = mission.relays().max(1);
+        let tried = self.moving / 6;
+        (tried % relays + 1, self.moving % 6, tried / relays)
+    }
+
+    /// Tries the next move of a chain that is polished and meets `sigma`: each alone by a part of its room, and by less and less. What
+    /// the derivatives do not see, since something else binds there, it may.
+    pub(super) fn polish(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        sigma: f32,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let (index, way, halved) = self.move_of(chain.mission);
+        let polished = chain.mission.relays() <= POLISHED || chain.holds();
+        if !polished || halved > HALVINGS || self.moved >= MOVES {
+            return Poll::Ready(Ok(libm::expf(sigma)));
+        }
+        let room = (chain.seat_of)(index).room;
+        self.kept = self.cell(index);
+        let part = FIRST_MOVE
+            * libm::ldexpf(1.0, -i32::from(halved))
+            * if way % 2 > 0 { 1.0 } else { -1.0 };
+        let mut at = self.kept.place(room);
+        if way < 2 {
+            at.altitude_m += part * room.band.span_m();
+        } else {
+            at.y_m += part * room.lateral.span_m();
+        }
+        let mut moved = Cell::of(at, room);
+        if way > 3 {
+            let other = if way == 4 {
+                index + 2
+            } else {
+                index.saturating_sub(2)
+            };
+            if other < 1 || other > chain.mission.relays() {
+                self.moving += 1;
+                return Poll::Pending;
+            }
+            moved = Cell::of(self.cell(other).place((chain.seat_of)(other).room), room);
+        }
+        if moved == self.kept {
+            self.moving += 1;
+            return Poll::Pending;
+        }
+        self.keep(index, 0.0, moved);
+        self.work = Work::Seek(Seek::down(sigma + GAIN, GAIN, 1.0, GAIN), Purpose::Move);
+        Poll::Pending
+    }
+}
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    /// The next start, or the end.
+    pub(super) fn begin(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let next = Start::number(self.number, Room::of(chain.mission));
+        let complete = !self.again && self.is_complete(chain.ceiling());
+        let Some(start) = next.filter(|_| !complete) else {
+            // All have been tried, or the others are no use.
+            let Some((_, number)) = self.best else {
+                return Poll::Ready(Err(Infeasible));
+            };
+            (self.number, self.again) = (number, true);
+            if let Some(sigma) = self.best_judged {
+                self.cells = self.best_cells;
+                self.restart();
+                self.work = self.judged(sigma, chain.ceiling());
+            }
+            return Poll::Pending;
+        };
+        let Some(start) = start else {
+            self.number += 1;
+            return Poll::Pending;
+        };
+        let floor = chain.floor();
+        if matches!(start, Start::Near)
+            && !self.again
+            && self.best.is_some_and(|(best, _)| best > floor)
+        {
+            self.number += 1;
+            return Poll::Pending;
+        }
+        if matches!(start, Start::Through { .. } | Start::Turns) && !self.walled {
+            self.number += 1;
+            return Poll::Pending;
+        }
+        if matches!(start, Start::Held { .. }) && !chain.holds() {
+            self.number += 1;
+            return Poll::Pending;
+        }
+        self.start = start;
+        self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
+        (self.judged_at, self.is_whole) = (None, true);
+        self.restart();
+        self.work = match start {
+            Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
+            Start::Turns => {
+                for index in 1..=chain.mission.relays() {
+                    let room = (chain.seat_of)(index).room;
+                    let apart_m = MARGIN * chain.mission.config().min_separation_m;
+                    let at = Start::in_turn(index, chain.interferer, room, apart_m);
+                    self.keep(index, 0.0, Cell::of(at, room));
+                }
+                let sigma = chain.ceiling() + 2.0 * CEILING;
+                Work::Seek(Seek::down(sigma, 0.1, 1.5, JUDGED), Purpose::Last)
+            }
+            Start::Arch { .. }
+            | Start::Around { .. }
+            | Start::Far
+            | Start::Through { .. }
+            | Start::Held { .. } => {
+                Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
+            }
+        };
+        Poll::Pending
+    }
+
+    /// Nothing came of the start.
+    pub(super) fn given_up(&mut self) -> Work {
+        self.number += 1;
+        Work::Begin
+    }
+
+    /// Where relay `index` is wanted on a pass that changes nothing, or gives the chain its first shape.
+    pub(super) fn shaped(
+        &self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+        room: Room,
+        target: f32,
+        purpose: Purpose,
+    ) -> CrossSection {
+        if purpose != Purpose::Start {
+            return self.cell(index).place(room);
+        }
+        let wanted = match self.start {
+            Start::Far => {
+                let top = far_off(chain, room);
+                let relays = f32::from(chain.mission.relays().saturating_sub(1).max(1));
+                let down = f32::from(index - 1) / relays;
+                CrossSection {
+                    y_m: top.y_m * (1.0 - down),
+                    altitude_m: top.altitude_m + down * (room.band.least_m - top.altitude_m),
+                }
+            }
+            start @ Start::Around { .. } => {
+                let c = chain.loudness(index, self.pass.from, target);
+                start.around(
+                    chain.distance_m(),
+                    chain.interferer,
+                    self.pass.from,
+                    c,
+                    room,
+                )
+            }
+            start @ Start::Held { level, .. } => CrossSection {
+                altitude_m: chain.altitude_between(index, level),
+                ..start.across(chain.distance_m(), self.pass.from.x_m, room)
+            },
+            start => start.across(chain.distance_m(), self.pass.from.x_m, room),
+        };
+        Cell::of(wanted, room).place(room)
     }
 }

@@ -11,13 +11,9 @@
 //! | --- | --- |
 //! | `state` | what a solver keeps, and one portion of its work |
 //! | `work` | what it is at, and what for |
-//! | `order` | which start comes next, and the shape it gives the chain |
-//! | `plain` | a pass that changes nothing |
-//! | `passes` | the pass back and the pass forward of an ascent |
-//! | `judge` | what comes after a target is found |
-//! | `sweep` | the chain by the rules of the sweep |
-//! | `polish` | one relay after the other tries another place |
-//! | `chain`, `segment`, `seat` | what the passes have in common; ten relays of a chain; what one brings along |
+//! | `passes` | the pass back and the pass forward of an ascent, a pass that changes nothing, and the rules of the sweep |
+//! | `judge` | what comes after a target is found: the next start, or the polish |
+//! | `chain` | what the passes have in common; ten relays of a chain; what one brings along |
 
 mod chain;
 mod judge;
@@ -30,15 +26,9 @@ mod judge;
     reason = "a test"
 )]
 mod kept;
-mod order;
 mod passes;
-mod plain;
-mod polish;
-mod seat;
-mod segment;
 mod state;
-mod sweep;
 mod work;
 
-pub use seat::Seat;
+pub use chain::Seat;
 pub use state::Solver;

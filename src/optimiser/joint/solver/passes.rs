@@ -1,17 +1,21 @@
 //! The pass back, which works out the policies, and the pass forward, which tries them.
+//!
+//! A plain pass changes nothing, or gives a chain its first shape. A sweep finds where relays may stand, and where they have to hold back.
 
-use super::chain::SolverContext;
-use super::seat::Seat;
-use super::segment::{SEGMENT, SEGMENT_RELAYS, Stage, last_of, relays_of};
+use super::chain::{SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of};
 use super::state::Solver;
-use super::work::{ForwardPass, Work};
+use super::work::{ForwardPass, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::AscentStep;
-use crate::optimiser::joint::axis::{Triple, minus, triple};
-use crate::optimiser::joint::cells::Cell;
+use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::Outlook;
 use crate::optimiser::joint::policy::Brief;
-use crate::place::Placement;
+use crate::optimiser::joint::site::{Cell, Room, Site};
+use crate::optimiser::joint::starts::Start;
+use crate::optimiser::spacing::{Hop, Stand};
+use crate::place::{CrossSection, Placement};
+use crate::root::sqrt;
+use core::task::Poll;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     pub(super) fn look_back(&mut self, mission: &Mission) -> Work {
@@ -176,5 +180,182 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             };
         }
         Some(())
+    }
+}
+
+/// Relays in one portion of a pass that changes nothing.
+const PLAIN: u16 = 20;
+
+/// What penalty a chain may have that is judged, in parts of D.
+const FORGIVEN: f32 = 5e-5;
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    /// Goes on with a pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
+    pub(super) fn plain(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        sigma: f32,
+        purpose: Purpose,
+        kept: bool,
+    ) -> Poll<Option<f32>> {
+        let target = libm::expf(sigma);
+        let relays = chain.mission.relays();
+        if purpose.is_sweep() && self.pass.done == 0 {
+            self.pass.end_m = self.end_m(chain.mission, chain.seat_of, 0);
+        }
+        for _ in 0..PLAIN {
+            let index = self.pass.done + 1;
+            if index > relays {
+                if purpose.is_sweep() {
+                    let power_w = (chain.seat_of)(relays).power_w;
+                    let reach_m = sqrt(chain.mission.receiver_gain(power_w) / target);
+                    let (slack, _) = Outlook::tail(reach_m, chain.distance_m(), self.pass.from);
+                    return Poll::Ready(Some(slack));
+                }
+                let (slack, _) = chain.tail(target, self.pass.from);
+                let penalty = self.pass.penalty;
+                if purpose == Purpose::Judge && penalty > FORGIVEN * chain.distance_m() {
+                    return Poll::Ready(Some(-penalty));
+                }
+                return Poll::Ready(Some(slack.min(self.ascent.spare_m()) - penalty));
+            }
+            let room = (chain.seat_of)(index).room;
+            let wanted = self.shaped(chain, index, room, target, purpose);
+            let from = self.pass.from;
+            let place = if purpose.is_sweep() {
+                let step = self.least_step(chain.mission, chain.seat_of, index);
+                self.pass.end_m = Self::end_after(chain.mission, self.pass.end_m, step);
+                if let Some(mark) = self.mark(index) {
+                    // From one pass back to the next nobody sees anything, and there is room.
+                    mark.slope = [from.x_m, 0.0, 0.0];
+                }
+                let hop = self.hop(chain, index, self.pass.end_m);
+                let reach = hop.reach(target, from.x_m);
+                self.pass.holds_back |= reach.is_none();
+                reach
+                    .or_else(|| hop.outermost(target, from.x_m))
+                    .map(|x_m| wanted.at(x_m))
+            } else {
+                let link = self.link(chain, index, from, room);
+                link.at(target, from.x_m, wanted).inspect(|at| {
+                    self.pass.penalty += link.penalty(target, *at);
+                })
+            };
+            let Some(place) = place else {
+                return Poll::Ready(None);
+            };
+            if kept {
+                self.keep(index, from.x_m, Cell::of(place.cross_section(), room));
+            }
+            self.pass.from = place;
+            self.pass.done = index;
+        }
+        Poll::Pending
+    }
+
+    /// Relay `index`, fed from `from`, as the start has it.
+    pub(super) fn link<'a>(
+        &self,
+        chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
+        index: u16,
+        from: Placement,
+        room: Room,
+    ) -> Site<'a> {
+        let link = chain.link(index, from, room);
+        match self.start {
+            Start::Through { .. } => link.unparted(),
+            _ => link,
+        }
+    }
+}
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    /// The hop to relay `index` of the chain as it is, by the rules of the sweep; no farther than `end_m`.
+    pub(super) fn hop(
+        &self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+        end_m: f32,
+    ) -> Hop {
+        let at = |index| self.at(index, (chain.seat_of)(index));
+        let before = if index > 1 {
+            at(index - 1)
+        } else {
+            CrossSection::default()
+        };
+        let sender = chain.sender(index, before.at(0.0));
+        Hop::new(
+            chain.mission,
+            chain.interferer,
+            sender,
+            index,
+            at(index),
+            0.0,
+        )
+        .ending(end_m)
+    }
+
+    /// The least step along x between relay `index` and the one before it, which keep their separation.
+    pub(super) fn least_step(
+        &self,
+        mission: &Mission,
+        seat_of: &impl Fn(u16) -> Seat,
+        index: u16,
+    ) -> f32 {
+        if index <= 1 {
+            return 0.0;
+        }
+        let at = |index| self.at(index, seat_of(index));
+        let across = at(index).apart_squared(at(index - 1));
+        mission.step_with_room(across)
+    }
+
+    /// The last place along x that leaves the relays after `index` of a solved chain their room, m: to the bit what the passes
+    /// by the rules of the sweep go by.
+    pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
+        let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
+        let first = mission.config().distance_m - steps.clone().sum::<f32>();
+        steps
+            .take(index.into())
+            .fold(first, |end_m, step| Self::end_after(mission, end_m, step))
+    }
+
+    pub(super) fn end_after(mission: &Mission, end_m: f32, step: f32) -> f32 {
+        (end_m + step).min(mission.config().distance_m)
+    }
+
+    /// Where the relay before `segment` is to stand.
+    pub(super) fn stands(
+        &self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u8,
+        mut place_m: f32,
+        target: f32,
+    ) -> Option<f32> {
+        let relays = chain.mission.relays();
+        let [mut x_m, ..] = self.marks.get(usize::from(segment))?.slope;
+        let mut end_m = self.end_m(
+            chain.mission,
+            chain.seat_of,
+            u16::from(segment) * SEGMENT_RELAYS,
+        );
+        let mut before = [(0.0, 0.0); SEGMENT];
+        for (k, index) in relays_of(segment, relays) {
+            let step = self.least_step(chain.mission, chain.seat_of, index);
+            end_m = Self::end_after(chain.mission, end_m, step);
+            *before.get_mut(k)? = (x_m, end_m);
+            x_m = self.hop(chain, index, end_m).outermost(target, x_m)?;
+        }
+        for (k, index) in relays_of(segment, relays).rev() {
+            let (from_m, end_m) = *before.get(k)?;
+            place_m = match self
+                .hop(chain, index, end_m)
+                .stand(target, from_m, place_m)?
+            {
+                Stand::AtReach => from_m,
+                Stand::At(x_m) => x_m,
+            };
+        }
+        Some(place_m)
     }
 }

@@ -2,13 +2,13 @@
 
 use core::task::Poll;
 
+use super::chain::Seat;
 use super::chain::SolverContext;
-use super::seat::Seat;
-use super::segment::{Mark, SEGMENT, STAGES, Stage};
+use super::chain::{Mark, SEGMENT, STAGES, Stage};
 use super::work::{ForwardPass, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
-use crate::optimiser::joint::cells::Cell;
+use crate::optimiser::joint::site::Cell;
 use crate::optimiser::joint::starts::Start;
 use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;

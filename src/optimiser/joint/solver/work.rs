@@ -1,6 +1,6 @@
 //! What a solver is at.
 
-use crate::optimiser::joint::seek::Seek;
+use crate::optimiser::joint::starts::Seek;
 use crate::place::Placement;
 
 /// A pass forward.
