@@ -227,9 +227,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest x at which the neighbour upstream may be, or any relay beyond it that is not the separation below it yet, m.
+    /// Returns the highest x at which the neighbour upstream may be, or any relay beyond it that is not the separation below it yet, m, until
+    /// this relay has cleared the first fence: then all of them are below this relay.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
-        if self.is_agreed() {
+        if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)
         } else {
             f32::NEG_INFINITY

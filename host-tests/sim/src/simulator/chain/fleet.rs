@@ -194,7 +194,10 @@ impl Chain {
                 if is_free
                     && let Some(member) = self.members.get_mut(index)
                     && member.killed.is_none()
-                    && member.relay.hold_reason(side) == Some(HoldReason::Lost)
+                    && matches!(
+                        member.relay.hold_reason(side),
+                        Some(HoldReason::Lost | HoldReason::NotFlown)
+                    )
                 {
                     member.relay.clear_lost(now, side);
                     self.drain(index);
