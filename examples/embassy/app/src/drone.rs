@@ -1,12 +1,12 @@
 //! What a drone is by its configuration, whatever its ports are.
 
 use embedded_storage::nor_flash::NorFlash;
+use uav_relay::GuardConfig;
 use uav_relay::asynch::AsyncAutopilot;
 use uav_relay::flight::autopilot::Autopilot;
 use uav_relay::flight::autopilot::carrot::Pace;
-use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::flight::autopilot::{Signing, Stamp};
-use uav_relay::GuardConfig;
+use uav_relay::flight::course::{Course, CourseError};
 use uav_relay::{Auth, Instant, Key, Relay, Settings, SetupError, Wiring};
 use uav_relay_block as config;
 use uav_relay_block::ConfigError;

@@ -15,9 +15,9 @@ use embedded_io_async::{ErrorType, Read, Write};
 use relay_app::EmbassyClock;
 use relay_app::board::Board;
 use relay_app::drone::{Refused, Room};
+use uav_relay::MAX_FRAME;
 use uav_relay::asynch::Clock as _;
 use uav_relay::channel::AirGround;
-use uav_relay::MAX_FRAME;
 use uav_relay::{
     Auth, Band, Event, Identity, Instant, Interference, Interferer, Key, Method, Mission,
     MissionConfig, Placement, Port, Profile, Relay, Settings, Wiring,
