@@ -8,10 +8,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::flight::autopilot::carrot::Pace;
-use uav_relay::flight::autopilot::clearance::Named;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
-use uav_relay::flight::autopilot::{Address, Signing, Stamp};
+use uav_relay::flight::autopilot::{Address, RelayNumbers, Signing, Stamp};
 use uav_relay::flight::autopilot::{
     Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, WaitReason,
 };
@@ -442,12 +441,19 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
 }
 
 /// Returns the numbers of relays that a command names.
-fn numbers(relays: Named) -> impl Iterator<Item = u16> {
+fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
     relays.into_iter().filter(|node| *node != 0)
 }
 
 /// Writes a line about an operator's command over MAVLink, with its sender.
-fn commanded(now: Instant, log: &Log, event: &str, text: &str, relays: Named, from: Address) {
+fn commanded(
+    now: Instant,
+    log: &Log,
+    event: &str,
+    text: &str,
+    relays: RelayNumbers,
+    from: Address,
+) {
     let named: Vec<String> = numbers(relays).map(|node| node.to_string()).collect();
     let command = format!("MAV_CMD_USER_1 {}", named.join(" "));
     let command = command.trim();

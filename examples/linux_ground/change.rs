@@ -1,4 +1,4 @@
-//! What an upload changes, as log lines: each value that differs, and how far each relay moves.
+//! Changes of an upload as log lines: each value that differs, and how far each relay moves.
 
 use serde_json::json;
 use uav_relay::{Band, Instant, Interference, MissionConfig, Placement};

@@ -16,7 +16,7 @@ const TURN_US: u64 = 1_000;
 /// Longest time that the computation may take.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// What the relays were loaded with, as far as a forecast needs it.
+/// Loaded mission of the relays, as far as a forecast needs it.
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded {
     pub(crate) mission: Mission,

@@ -53,7 +53,7 @@ enum Stage {
 pub(crate) struct Uploading {
     stage: Stage,
     progress: Progress,
-    /// Until when the stage is to end; `None` while the operator is asked, and once it is over.
+    /// End of the stage; `None` while the operator is asked, and once it is over.
     late_at: Option<Instant>,
 }
 

@@ -12,8 +12,8 @@
 use super::ends::{judge, v_at_end};
 use super::fit::{Fit, FoundSource, Unfit, misfit};
 use super::level::{EndsOff, Level, Levels, is_level};
-use super::listener::{coefficients, expected_v, terms};
 use super::sums::Sums;
+use super::terms::{coefficients, expected_v, terms};
 use super::track::Track;
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;

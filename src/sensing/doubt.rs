@@ -22,8 +22,8 @@
 use super::fit::Fit;
 use super::level::MEASURED_W;
 use super::listener::Place;
-use super::listener::{Terms, UNIT_W};
 use super::sums::Sums;
+use super::terms::{Terms, UNIT_W};
 
 /// How many times the variance that is expected all may have and still fit.
 const OUT_OF_LINE: f64 = 4.0;

@@ -14,7 +14,7 @@
 use super::doubt::is_apart;
 use super::fit::Fit;
 use super::level::{EndsOff, Level, Levels};
-use super::listener::{UNIT_W, terms};
+use super::terms::{UNIT_W, terms};
 use crate::mission::Mission;
 use crate::place::Placement;
 

@@ -20,8 +20,8 @@
 )]
 
 use super::factor::Factor;
-use super::listener::{Terms, coefficients, expected_v, strength, value};
 use super::sums::Sums;
+use super::terms::{Terms, coefficients, expected_v, strength, value};
 use crate::mission::{Interferer, Mission};
 
 /// Why sums are of no source.

@@ -1,9 +1,9 @@
 //! What one relay has heard: the place where it is, averaged, and the places before it, faded.
 //!
-//! Measurements are summed in the terms of 1 / I, and fade with time.
+//! Measurements are averaged and fade with time.
 
 use super::sums::Sums;
-use crate::mission::{Interferer, Mission};
+use super::terms::{Terms, terms};
 use crate::place::Placement;
 use crate::sir::square;
 use crate::time::{Duration, Instant};
@@ -144,61 +144,4 @@ impl Average {
         self.mean += (value - self.mean) / self.weight;
         self.last = now;
     }
-}
-
-/// 1, u, u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D and z = 2 h / D.
-pub(crate) type Terms = [f32; 4];
-
-/// The terms at a place, of a line of `distance_m`.
-pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
-    let half = 0.5 * distance_m;
-    let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
-    [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
-}
-
-/// The interference that v = 1 stands for, W: the middle of what may be measured, so that no square of a v leaves an f32.
-pub(crate) const UNIT_W: f32 = 1e-12;
-
-/// The least and the largest v: of what may be measured, [`MEASURED_W`](super::level::MEASURED_W).
-const V: (f32, f32) = (1e-18, 1e18);
-
-/// What is expected somewhere, as v; `None` where nothing may be measured like that.
-pub(crate) fn expected_v(v: f64) -> Option<f32> {
-    let (least, most) = (f64::from(V.0), f64::from(V.1));
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "within the range of an f32"
-    )]
-    (least..=most).contains(&v).then_some(v as f32)
-}
-
-/// k = eta D^2 [`UNIT_W`] / (4 P) of a source of `power_w`; and the power of one of that k.
-pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
-    let config = mission.config();
-    let d = f64::from(config.distance_m);
-    0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
-}
-
-/// The coefficients that `source` gives the terms: k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
-pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
-    let config = mission.config();
-    let half = 0.5 * f64::from(config.distance_m);
-    let k = strength(mission, f64::from(source.power_w));
-    let (x, y) = (
-        f64::from(source.x_m) / half - 1.0,
-        f64::from(source.y_m) / half,
-    );
-    [
-        k * (x * x + y * y + 1.0 / 3.0),
-        -2.0 * k * x,
-        k,
-        -2.0 * k * y,
-    ]
-}
-
-/// The sum of `terms` with these coefficients.
-pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
-    let [a, b, c, d] = coefficients;
-    let [one, u, q, t] = terms.map(f64::from);
-    a * one + b * u + c * q + d * t
 }

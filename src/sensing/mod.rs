@@ -13,8 +13,9 @@
 //!
 //! | file | one idea |
 //! | --- | --- |
+//! | `terms` | the four terms of a place, and the coefficients of a source |
 //! | `sums` | what a pass adds up along the chain |
-//! | `listener` | what one relay has heard, place by place, in the four terms of 1 / I, and how it fades |
+//! | `listener` | what one relay has heard, place by place, and how it fades |
 //! | `level` | what the transmitter and the receiver hear, on the ground |
 //! | `factor` | a 4 x 4 system, solved |
 //! | `fit` | the source that the sums speak of, or the one nearest to them, how sure that is, and when none does |
@@ -47,6 +48,7 @@ pub(crate) mod sums;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod sums;
+pub(crate) mod terms;
 pub(crate) mod track;
 
 pub use fit::Unfit;

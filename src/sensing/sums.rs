@@ -11,7 +11,7 @@
     )
 )]
 
-use super::listener::Terms;
+use super::terms::Terms;
 use crate::root::sqrt;
 
 /// Numbers of [`Sums`]: the products of the terms, the terms with v, v squared, how many places, their measurements, their age.

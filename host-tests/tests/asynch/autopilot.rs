@@ -392,7 +392,7 @@ fn a_stuck_writer_keeps_nobody_from_hearing() {
     );
 }
 
-/// As on a board: the firmware hands on the relay's events, and nothing else.
+/// Scene of a board: the firmware hands on the relay's events, and nothing else.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

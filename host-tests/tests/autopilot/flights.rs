@@ -366,7 +366,7 @@ impl Flight {
     }
 }
 
-/// What went wrong in a flight; how often it was engaged, and whether on the asynchronous runner.
+/// Returns the faults of a flight, the number of engagements, and true if it was on the asynchronous runner.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

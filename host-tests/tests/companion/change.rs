@@ -1,4 +1,4 @@
-//! What the ground shows of an upload before it is sent, and who confirms it.
+//! Changes that the ground shows before it sends an upload, and the operator's confirmation.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -83,7 +83,7 @@ impl Bench {
     }
 }
 
-/// What follows `event: ` in each line of that event.
+/// Text that follows `event: ` in each line of that event.
 fn said<'a>(ended: &'a Ended, event: &str) -> Vec<&'a str> {
     let event = format!("  transmitter  {event}: ");
     let lines = ended.stdout.iter();

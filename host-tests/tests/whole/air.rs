@@ -423,7 +423,7 @@ impl Air {
         self.kind.copied.filter(|_| at == all).unwrap_or(at)
     }
 
-    /// What is seen of the relays without the copied one and its copy.
+    /// State of the relays without the copied one and its copy.
     fn uncopied(&self) -> Vec<Seen> {
         let drones = (0..self.drones.len()).filter(|at| Some(self.place(*at)) != self.kind.copied);
         drones.map(|at| self.seen[at]).collect()

@@ -123,7 +123,7 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Of a relay and its copy one has a setpoint within two seconds, and once one of the two is gone the chain is whole with the other one. Only
+/// One of a relay and its copy has a setpoint within two seconds, and once one of the two is gone the chain is whole with the other one. Only
 /// where a copy is on either side of a cut can two chains fly: each has its vote.
 #[test]
 fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {

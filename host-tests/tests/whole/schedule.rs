@@ -282,7 +282,7 @@ pub(crate) fn with_copy(seed: u64) -> Schedule {
 }
 
 impl Schedule {
-    /// Whether no relay is ever cut off from another one.
+    /// Returns true if no relay is ever cut off from another one.
     pub(crate) fn is_uncut(&self) -> bool {
         !self
             .deeds

@@ -11,7 +11,7 @@
 
 use heapless::Vec;
 
-use super::mode::AutopilotEvent;
+use super::event::{AutopilotEvent, MOST, RelayNumbers};
 use crate::event::Event;
 use crate::flight::mavlink::frame::Address;
 use crate::side::Side;
@@ -19,15 +19,9 @@ use crate::side::Side;
 /// MAV_CMD_USER_1.
 pub(super) const CLEAR_LOST: u16 = 31_010;
 
-/// Relays that one command can name.
-pub const MOST: usize = 7;
-
 /// `MAV_RESULT`.
 const ACCEPTED: u8 = 0;
 const DENIED: u8 = 2;
-
-/// Numbers of relays, 0 for none.
-pub type Named = [u16; MOST];
 
 /// The relays that are lost on one side.
 #[derive(Clone, Debug, Default)]
@@ -43,7 +37,7 @@ pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
     /// The last command that was accepted.
-    accepted: Option<(Address, Named)>,
+    accepted: Option<(Address, RelayNumbers)>,
     /// The answer that is due: to whom, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
     /// The side that the relay is to clear.
@@ -116,7 +110,7 @@ impl Clearance {
 
 impl LostSide {
     /// Returns true if these are all relays that are lost here, and one is.
-    fn is_all_of(&self, named: &Named) -> bool {
+    fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
         !self.is_full

@@ -4,10 +4,12 @@
 //! | --- | --- |
 //! | `link` | the link: bytes, setpoints and the time in; frames, places and events out |
 //! | [`state`] | who flies: the table of states |
-//! | `vehicle` | which autopilot it is, what it has said of itself, and what its radio hears |
+//! | `kind` | whose autopilot it is: PX4 or ArduCopter |
+//! | `vehicle` | what the autopilot has said of itself, and what its radio hears |
 //! | `clock` | the autopilot's clock, on the relay's; the relay's own |
 //! | `echo` | how late the link is |
-//! | `mode` | flight modes, why the drone was released, why it cannot be engaged; events |
+//! | `mode` | flight modes, why the drone was released, why it cannot be engaged|
+//! | `event` | events that the firmware is told of |
 //! | `streams` | the messages that it is asked for |
 //! | `target` | what it is told to fly to, and how often |
 //! | [`carrot`] | the target on its way to the setpoint |
@@ -20,9 +22,11 @@
 
 mod astray;
 pub mod carrot;
-pub mod clearance;
+mod clearance;
 mod clock;
 mod echo;
+mod event;
+mod kind;
 mod link;
 mod mode;
 mod report;
@@ -33,10 +37,10 @@ pub mod trust;
 mod vehicle;
 
 pub use astray::OffLine;
+pub use event::{AutopilotEvent, RelayNumbers};
+pub use kind::Kind;
 pub use link::Autopilot;
-pub use mode::AutopilotEvent;
 pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};
-pub use vehicle::Kind;
 pub use vehicle::Position;
 
 pub use super::mavlink::frame::Address;

@@ -1,7 +1,7 @@
 //! What the autopilot is told to fly to: when it is told, and whether it flies there.
 
 use super::carrot::Carrot;
-use super::vehicle::Kind;
+use super::kind::Kind;
 use crate::flight::axis::Axis;
 use crate::geodetic::Geodetic;
 use crate::place::Placement;

@@ -9,9 +9,6 @@ use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::{Claim, Message};
 
-/// A claim to repeat: at which side, to which node.
-pub(crate) type Echo = (Side, u16, Claim);
-
 impl Node {
     /// Handles a frame under this relay's own number.
     pub(crate) fn hear_duplicate(&mut self, now: Instant, sender: Sender) {

@@ -4,7 +4,6 @@
 //! Two parts that are interleaved, as 1 - 3 - 5 and 2 - 4 are, or a part of which no relay takes the one that could lead it back, would
 //! keep their links for good. One that has no quorum has nothing to lose by them.
 
-use super::identity::Echo;
 use crate::event::{About, Event, Pending};
 use crate::mission::Mission;
 use crate::node::context::{Context, Effects, Member};
@@ -23,6 +22,10 @@ use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
+use crate::wire::message::Claim;
+
+/// Claim to repeat: at which side, to which node.
+pub(crate) type Echo = (Side, u16, Claim);
 
 /// A relay's share of the protocol.
 #[derive(Clone, Debug)]

@@ -10,13 +10,11 @@
 //! | `outlook` | what the rest of the chain is worth, as the relay before it sees it |
 //! | `policy` | a relay's step, and how it follows what changed before it |
 //! | `site`, `weigh` | one relay and the hop into it: one relay's worth of the pass forward, and of the pass back; the room of a relay across the line |
-//! | `ends` | what the first and the last hop can meet |
 //! | `ascent` | how far the target is raised, and what is taken of a step |
 //! | `starts` | where an ascent begins, and at which target |
 //! | [`solver`] | a whole chain without a message |
 
 mod ascent;
-mod ends;
 mod hop;
 mod outlook;
 mod policy;

@@ -60,7 +60,7 @@ fn frame(picture: &Picture) -> Frame {
         (low, high, top) = (low.min(x), high.max(x), top.max(h));
     }
     for (_, x, _) in picture.interferers.iter().chain(&picture.others) {
-        if sources::near(*x, distance) {
+        if picture::near(*x, distance) {
             (low, high) = (low.min(*x), high.max(*x));
         }
     }

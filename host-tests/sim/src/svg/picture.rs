@@ -2,8 +2,6 @@
 
 use uav_relay::Mission;
 
-use super::sources::near;
-
 /// Size of the picture in its own units; at half a page wide the smallest text is still about 5 pt.
 pub(super) const WIDTH: f64 = 480.0;
 pub(super) const HEIGHT: f64 = 330.0;
@@ -153,4 +151,9 @@ pub(super) fn worst(picture: &Picture) -> Option<f64> {
 /// Whether a relay is crossed out.
 pub(super) fn is_gone(picture: &Picture, number: usize) -> bool {
     picture.lost.contains(&number) || picture.left_out.contains(&number)
+}
+
+/// Returns true if the x axis is stretched to hold an interferer: it is no more than a fifth of the distance off the chain.
+pub(super) fn near(x: f64, distance: f64) -> bool {
+    x >= -0.2 * distance && x <= 1.2 * distance
 }

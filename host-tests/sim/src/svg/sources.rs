@@ -3,7 +3,7 @@
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::picture::{LEFT, Others, Picture, RIGHT, TOP, length};
+use super::picture::{LEFT, Others, Picture, RIGHT, TOP, length, near};
 
 /// Height of the words, and from one line of them to the next.
 const SIZE: f64 = 10.0;
@@ -17,11 +17,6 @@ const FAR_LINES: usize = 4;
 
 /// Power in watts, x and y in metres.
 type Source = (f64, f64, f64);
-
-/// Whether the x axis is stretched to hold an interferer: it is no more than a fifth of the distance off the chain.
-pub(super) fn near(x: f64, distance: f64) -> bool {
-    x >= -0.2 * distance && x <= 1.2 * distance
-}
 
 /// The interferers that the plot of a chain of this length holds, and those beyond it.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 /// The largest permitted number of public items.
-const MOST: usize = 124;
+const MOST: usize = 123;
 
 fn main() -> ExitCode {
     let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());

@@ -4,10 +4,10 @@
 //! of one.
 
 use crate::mission::{Interferer, Mission, Profile};
-use crate::optimiser::joint::ends;
 use crate::optimiser::joint::hop::Triple;
 use crate::optimiser::joint::outlook::Outlook;
 use crate::optimiser::joint::policy::Brief;
+use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
@@ -90,15 +90,15 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// The slack of the last relay at `at`, and its outlook.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
-        ends::tail(self.mission, power_w, room, target, at)
+        site::tail(self.mission, power_w, room, target, at)
     }
 
     /// No chain meets more than the first hop or the last one can have.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;
-        let first = ends::first_most(self.mission, self.interferer, first);
-        let last = ends::last_most(self.mission, power_w, room);
+        let first = site::first_most(self.mission, self.interferer, first);
+        let last = site::last_most(self.mission, power_w, room);
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 

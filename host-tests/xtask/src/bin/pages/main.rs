@@ -1,4 +1,4 @@
-//! What the pages for users tell them to type, typed: the blocks of commands are run in a folder that looks like a clean clone, and what a page
+//! Commands of the pages for users, typed: the blocks of commands are run in a folder that looks like a clean clone, and what a page
 //! says that they print is compared with what they print.
 //!
 //! A page is read as a user reads it. A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are
@@ -15,7 +15,7 @@
 //!
 //! A command has to succeed, unless its comment begins with `exit status N`: then it has to end with that one.
 //!
-//! What is printed is compared line by line: every line of the page has to come, in that order, with others between them. Spaces at the end do
+//! Output is compared line by line: every line of the page has to come, in that order, with others between them. Spaces at the end do
 //! not count. A line `...` stands for any lines. In a block `text noisy` each number stands for any number.
 //!
 //! The commands of `.cargo/config.toml` are the binaries that were built before, so no block waits for the compiler.
