@@ -1,6 +1,6 @@
 //! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
 
-use super::retransmit::Trip;
+use super::circulation::Path;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
 #[cfg(feature = "upload")]
@@ -221,28 +221,28 @@ impl<'a> Context<'a> {
         self.mission().after(self.index()).is_none()
     }
 
-    /// The way of a pass from here to the last relay of the view.
-    pub(crate) fn way_onward(&self) -> Trip {
+    /// Returns the path from this relay to the last relay of the view.
+    pub(crate) fn path_to_last(&self) -> Path {
         let mission = self.mission();
-        self.way(match mission.heading() {
+        self.path(match mission.heading() {
             Heading::TowardRx => mission.relays().saturating_sub(self.index()),
             Heading::TowardTx => self.index().saturating_sub(1),
         })
     }
 
-    /// The way of what came of it from here to the leader.
-    pub(crate) fn way_back(&self) -> Trip {
+    /// Returns the path from this relay to the leader.
+    pub(crate) fn path_to_leader(&self) -> Path {
         let relays = self.mission().relays();
-        self.way(
+        self.path(
             relays
-                .saturating_sub(self.way_onward().hops)
+                .saturating_sub(self.path_to_last().hops)
                 .saturating_sub(1),
         )
     }
 
-    /// One of so many hops, on which nobody computes.
-    pub(crate) const fn way(&self, hops: u16) -> Trip {
-        Trip {
+    /// Returns a path of `hops` hops on which no relay computes.
+    pub(crate) const fn path(&self, hops: u16) -> Path {
+        Path {
             hop_time: self.member.settings.hop_time,
             hops,
             slow: false,

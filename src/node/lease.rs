@@ -24,8 +24,8 @@
 //! frames are lost a silence says less. The period from one to the next is half of `probe_after`, or twice as
 //! long as a pulse takes, up to a quarter of `dead_after`.
 
+use super::circulation::{Circulation, Reply};
 use super::context::{Context, Effects};
-use super::retransmit::{Again, Retransmit};
 use super::timing::{PAUSE, earliest, longest_lease, tenths};
 use super::view::electorate::Held;
 use crate::settings::Settings;
@@ -42,22 +42,12 @@ enum LeaseState {
     Lapsed,
 }
 
-/// What is to be sent.
-#[derive(Clone, Copy, Debug, Default)]
-struct LeaseDue {
-    onward: bool,
-    back: bool,
-}
-
 /// The last pulse that a relay took part in.
 #[derive(Clone, Copy, Debug)]
 struct Current {
     number: u16,
     /// In tenths of a second.
     span: u16,
-    handed_on: Instant,
-    /// When it had come back.
-    done: Option<Instant>,
 }
 
 /// The lease of one relay.
@@ -78,8 +68,7 @@ pub(crate) struct Lease {
     /// At the leader: when the next pulse begins, and how long they took lately.
     next_at: Option<Instant>,
     slowest: Duration,
-    retransmit: Retransmit,
-    due: LeaseDue,
+    circulation: Circulation,
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -99,8 +88,7 @@ impl Lease {
             is_agreed: false,
             next_at: None,
             slowest: Duration::from_micros(0),
-            retransmit: Retransmit::new(seed),
-            due: LeaseDue::default(),
+            circulation: Circulation::new(seed),
         }
     }
 
@@ -151,9 +139,10 @@ impl Lease {
         rest: Instant,
         lost: bool,
     ) {
-        let under_way = self.current.filter(|current| current.done.is_none());
-        if let Some(slow) = under_way.filter(|_| !lost && self.rest.0 == base) {
-            self.slowest = self.slowest.max(now.since(slow.handed_on));
+        let is_under_way = self.circulation.is_outstanding();
+        let started_at = self.circulation.started_at();
+        if let Some(at) = started_at.filter(|_| is_under_way && !lost && self.rest.0 == base) {
+            self.slowest = self.slowest.max(now.since(at));
         }
         let known = self.bound.filter(|_| self.rest.0 == base);
         self.bound = known.map(|until| until.max(rest).max(self.relied_on));
@@ -168,8 +157,7 @@ impl Lease {
         self.state = LeaseState::Open;
         self.current = None;
         self.next_at = None;
-        self.due = LeaseDue::default();
-        self.retransmit.stop();
+        self.circulation.withdraw();
     }
 
     /// All have accepted the view that this relay is in.
@@ -207,18 +195,13 @@ impl Lease {
         if let Some(current) = self.current {
             match pulse.number.wrapping_sub(current.number) {
                 0 => {
-                    self.due.back = true;
-                    if current.done.is_some() {
-                        self.retransmit.asked(context.now, context.way_back());
-                    } else {
-                        let hop_time = context.settings().hop_time;
-                        self.retransmit.came_again(context.now, hop_time);
-                    }
+                    let path = context.path_to_leader();
+                    self.circulation.on_duplicate(context.now, path);
                     return Effects::REPEATED;
                 }
-                1 if current.done.is_some() => {
+                1 if !self.circulation.is_outstanding() => {
                     self.grant(context, current, pulse.lease);
-                    effects.heard_back = current.done;
+                    effects.heard_back = self.circulation.completed_at();
                 }
                 // The leader has begun anew, or this relay was not asked for long.
                 2..=0x7FFF => {}
@@ -237,10 +220,13 @@ impl Lease {
     /// Where that is more than twice as long, the first ones were too short: the lease would run out before it could be renewed.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
+        let Some(forwarded_at) = self.circulation.started_at() else {
+            return;
+        };
         if self.state == LeaseState::Open && next / 2 > pulse.span {
             return;
         }
-        let until = pulse.handed_on + from_tenths(pulse.span);
+        let until = forwarded_at + from_tenths(pulse.span);
         self.is_whole = true;
         if until > now {
             let until = self.until().map_or(until, |at| at.max(until));
@@ -249,39 +235,30 @@ impl Lease {
     }
 
     fn take(&mut self, context: &Context<'_>, number: u16, span: u16) {
-        self.current = Some(Current {
-            number,
-            span,
-            handed_on: context.now,
-            done: None,
-        });
-        self.retransmit.begin();
-        self.due = LeaseDue::default();
+        self.current = Some(Current { number, span });
+        self.circulation.start(context.now);
         if context.is_last() {
             self.finish(context);
-        } else {
-            self.due.onward = true;
         }
     }
 
     /// The current pulse has come back from the last relay.
     fn finish(&mut self, context: &Context<'_>) {
-        let Some(current) = &mut self.current else {
+        let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
+        else {
             return;
         };
-        current.done = Some(context.now);
-        let current = *current;
         self.relied_on = self.relied_on.max(context.now + from_tenths(current.span));
-        self.retransmit.answered(context.now, context.way_back());
+        self.circulation
+            .complete(context.now, context.path_to_leader());
         if !context.leads() {
-            self.due.back = true;
             return;
         }
         // After a slow one the next one follows soon; where all are slow the channel is left some time for others.
         let period = self.period(context.settings());
         // The first two follow each other at once: nobody else has a lease before the second.
         let first = self.state == LeaseState::Open;
-        let took = context.now.since(current.handed_on);
+        let took = context.now.since(forwarded_at);
         // A run of lost frames is remembered for a minute or two.
         let part = self.slowest.as_micros() / 32;
         let lately = self.slowest.as_micros().saturating_sub(part);
@@ -289,7 +266,7 @@ impl Lease {
         let next = self.given(context.settings());
         self.grant(context, current, next);
         let soon = context.now + PAUSE;
-        let paced = current.handed_on + period;
+        let paced = forwarded_at + period;
         self.next_at = Some(if first { soon } else { paced.max(soon) });
     }
 
@@ -312,19 +289,21 @@ impl Lease {
     }
 
     fn on_pulsed(&mut self, context: &Context<'_>, pulsed: Pulsed) -> Effects {
-        let Some(current) = self
+        let is_current = self
             .current
-            .filter(|current| current.number == pulsed.number && current.done.is_none())
-        else {
+            .is_some_and(|current| current.number == pulsed.number);
+        if !(is_current && self.circulation.is_outstanding()) {
             return Effects::STALE;
-        };
+        }
+        let forwarded_at = self.circulation.started_at();
         if pulsed.done {
             self.finish(context);
         } else {
-            self.retransmit.arrived(context.now, context.way_onward());
+            let path = context.path_to_last();
+            self.circulation.on_in_progress(context.now, path);
         }
         Effects {
-            heard_onward: Some(current.handed_on),
+            heard_onward: forwarded_at,
             ..Effects::NONE
         }
     }
@@ -332,10 +311,8 @@ impl Lease {
     /// Does what is due: a pulse at the leader, one more time, or nothing any more.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
-        let again = self.retransmit.take_due(now, context.settings().hop_time);
-        let resent = again == Some(Again::Onward);
-        self.due.onward |= resent;
-        self.due.back |= again == Some(Again::Back);
+        let hop_time = context.settings().hop_time;
+        let resent = self.circulation.handle_timeout(now, hop_time);
         if self.next_at.is_some_and(|at| at <= now) {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
@@ -356,11 +333,10 @@ impl Lease {
 
     /// What is to be sent onward; it is taken for sent then.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
-        let due = core::mem::take(&mut self.due.onward);
-        let current = self
-            .current
-            .filter(|current| due && current.done.is_none())?;
-        self.retransmit.sent(context.now, context.way_onward());
+        let is_due = self.circulation.poll_forward();
+        let current = self.current.filter(|_| is_due)?;
+        self.circulation
+            .await_result(context.now, context.path_to_last());
         Some(Message::Pulse(Pulse {
             number: current.number,
             mission: context.digest(),
@@ -370,17 +346,17 @@ impl Lease {
 
     /// What is to be sent back; it is taken for sent then.
     pub(crate) fn take_back(&mut self, context: &Context<'_>) -> Option<Message> {
-        let due = core::mem::take(&mut self.due.back);
-        let current = self.current.filter(|_| due)?;
+        let reply = self.circulation.poll_reply()?;
+        let current = self.current?;
         Some(Message::Pulsed(Pulsed {
             number: current.number,
             mission: context.digest(),
-            done: current.done.is_some(),
+            done: reply == Reply::Result,
         }))
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        let pulse = earliest(self.next_at, self.retransmit.next_timeout());
+        let pulse = earliest(self.next_at, self.circulation.next_timeout());
         earliest(pulse, self.until())
     }
 }
@@ -402,9 +378,8 @@ mod tests {
         lease.current = Some(Current {
             number: 7,
             span: 150,
-            handed_on: Instant::ZERO,
-            done: None,
         });
+        lease.circulation.start(Instant::ZERO);
         let now = Instant::ZERO + Duration::from_millis(40_000);
         lease.renew(now, (view(base + 1), view(base)), now, false);
         lease.given(&settings)

@@ -21,7 +21,7 @@
 //! | below the layers | |
 //! | --- | --- |
 //! | `context` | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
-//! | `retransmit` | how long an answer is awaited, and when a message is sent again |
+//! | `circulation` | a message along the chain and the reply with its result: stages, duplicates, retransmission |
 //! | `numbering` | what a number that is not the expected one means |
 //! | `timing` | what the layers have in common in keeping time |
 //! | [`sample`] | the interference that a relay measures |
@@ -29,6 +29,7 @@
 //! A message is answered by setting flags, and what is sent is built from the state when it is asked for, so nothing queues up and a
 //! message sent twice is harmless.
 
+mod circulation;
 pub(crate) mod context;
 mod dispatch;
 pub(crate) mod duplicate;
@@ -36,7 +37,6 @@ mod lease;
 pub(crate) mod mission_update;
 pub(crate) mod neighbour;
 mod numbering;
-mod retransmit;
 pub(crate) mod round;
 pub(crate) mod sample;
 mod steering;

@@ -227,11 +227,6 @@ impl Computation {
         }
     }
 
-    /// Whether there is something to hand back.
-    pub(crate) fn has_answer(&self) -> bool {
-        self.state.is_answered()
-    }
-
     /// Whether the current pass is one on which relays compute for a while.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {

@@ -53,7 +53,7 @@ impl Computation {
         let same = matches!(&self.pass, PassKind::Gather(known) if known.after == roster.after
             && known.seats.iter().take_while(|seat| seat.index < own).eq(&roster.seats));
         let arrival = self.state.arrival(roster.number, same);
-        if let Some(next) = arrival.refused(self.state) {
+        if let Some(next) = arrival.refused() {
             return next;
         }
         let before = roster.seats.last().is_none_or(|seat| seat.index < own);

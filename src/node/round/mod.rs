@@ -22,8 +22,8 @@ mod sweep;
 mod tests;
 mod turn;
 
+use super::circulation::{Circulation, Path, Reply};
 use super::context::{Context, Effects, Member};
-use super::retransmit::{Again, Retransmit, Trip};
 use super::sample::{Meter, Sample};
 use super::timing::{PAUSE, earliest};
 use crate::mission::Profile;
@@ -36,23 +36,12 @@ use computation::{ADJUST, ALTITUDE, Computation};
 use sense::{Findings, SENSING, Sensing};
 use state::{Action, Phase};
 
-/// What is to be sent.
-#[derive(Clone, Copy, Debug, Default)]
-struct RoundDue {
-    onward: bool,
-    back: bool,
-    busy: bool,
-}
-
 /// The rounds of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Round {
-    retransmit: Retransmit,
+    circulation: Circulation,
     work_at: Option<Instant>,
-    due: RoundDue,
     computation: Computation,
-    /// When the current pass was handed onward first, or what came of it was handed back.
-    said_at: Option<Instant>,
 }
 
 impl Round {
@@ -67,21 +56,19 @@ impl Round {
     ) -> Self {
         Self {
             computation: Computation::new(leads, number, profile, settings, now),
-            retransmit: Retransmit::new(seed),
+            circulation: Circulation::new(seed),
             work_at: None,
-            said_at: None,
-            due: RoundDue {
-                onward: false,
-                back: false,
-                busy: false,
-            },
         }
     }
 
     /// A message of the mission and the view that this relay is in, from the neighbour that has it to say. Bounded by 16 reaches.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
-        let (before, said_at) = (computation.state, self.said_at);
+        let before = computation.state;
+        let (forwarded_at, replied_at) = (
+            self.circulation.started_at(),
+            self.circulation.completed_at(),
+        );
         let found = computation.sensing.found();
         let next = match message {
             Message::Sweep(sweep) => computation.on_sweep(context, sweep),
@@ -94,8 +81,8 @@ impl Round {
             Message::Moved(moved) if ADJUST => computation.on_moved(context, moved),
             Message::Busy { sweep } => {
                 if computation.phase() == Phase::Waiting && *sweep == computation.number() {
-                    let trip = self.trip(context);
-                    self.retransmit.arrived(context.now, trip);
+                    let path = self.path(context);
+                    self.circulation.on_in_progress(context.now, path);
                 }
                 return Effects::NONE;
             }
@@ -103,8 +90,8 @@ impl Round {
         };
         let state = computation.state;
         Effects {
-            heard_onward: said_at.filter(|_| state.answers(before)),
-            heard_back: said_at.filter(|_| state.follows(before)),
+            heard_onward: forwarded_at.filter(|_| state.answers(before)),
+            heard_back: replied_at.filter(|_| state.follows(before)),
             ..self.proceed_with(context, next, found)
         }
     }
@@ -112,15 +99,7 @@ impl Round {
     /// Does what is due. Bounded by one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
-        let resent = match self.retransmit.take_due(context.now, hop_time) {
-            Some(Again::Onward) => self.computation.phase() == Phase::Waiting,
-            Some(Again::Back) => {
-                self.due.back = true;
-                false
-            }
-            None => false,
-        };
-        self.due.onward |= resent;
+        let resent = self.circulation.handle_timeout(context.now, hop_time);
         if SENSING
             && self.computation.sensing.take_due(context.now)
             && self.computation.may_sense(context)
@@ -175,9 +154,8 @@ impl Round {
             Action::Foreign => Effects::FOREIGN,
             Action::Stale => Effects::STALE,
             Action::Work => {
-                // What there was to say of the pass before would be stale.
-                self.due = RoundDue::default();
-                self.retransmit.stop();
+                // Messages of the pass before would be stale.
+                self.circulation.withdraw();
                 self.work_soon(context.now);
                 Effects::NONE
             }
@@ -186,34 +164,18 @@ impl Round {
                 Effects::NONE
             }
             Action::Forward => {
-                // An answer to the pass before would be stale.
-                self.due = RoundDue {
-                    onward: true,
-                    ..RoundDue::default()
-                };
-                self.retransmit.begin();
+                self.circulation.start(context.now);
                 self.work_at = None;
-                self.said_at = Some(context.now);
                 Effects::NONE
             }
-            Action::Busy => {
-                self.due.busy = true;
-                let hop_time = context.settings().hop_time;
-                self.retransmit.came_again(context.now, hop_time);
-                Effects::REPEATED
-            }
             Action::Repeat => {
-                self.due.back = true;
-                self.retransmit.asked(context.now, context.way_back());
+                let path = context.path_to_leader();
+                self.circulation.on_duplicate(context.now, path);
                 Effects::REPEATED
             }
             Action::Answer { agreed } => {
-                self.due = RoundDue {
-                    back: true,
-                    ..RoundDue::default()
-                };
-                self.retransmit.answered(context.now, context.way_back());
-                self.said_at = Some(context.now);
+                let path = context.path_to_leader();
+                self.circulation.complete(context.now, path);
                 // Now that it knows what the others bring along it may have the chain to solve.
                 self.work_at = None;
                 if self.computation.is_solving(context) {
@@ -225,11 +187,11 @@ impl Round {
                 }
             }
             Action::Settled => {
-                self.retransmit.stop();
+                self.circulation.close();
                 Effects::NONE
             }
             Action::Infeasible => {
-                self.retransmit.stop();
+                self.circulation.close();
                 Effects {
                     infeasible: true,
                     ..Effects::NONE
@@ -263,10 +225,8 @@ impl Round {
     /// A view is proposed: what was under way is over.
     pub(crate) fn suspend(&mut self) {
         self.computation.suspend();
-        self.due = RoundDue::default();
-        self.retransmit.stop();
+        self.circulation.cancel();
         self.work_at = None;
-        self.said_at = None;
     }
 
     /// The new view is in force, in which this relay `leads` or not, and has something to work out at once or not.
@@ -289,7 +249,7 @@ impl Round {
 
     /// What could not be said to the neighbour after can be now.
     pub(crate) fn resend(&mut self) {
-        self.due.onward |= self.computation.phase() == Phase::Waiting;
+        self.circulation.resend();
     }
 
     /// What is to be sent onward. It is taken for sent; nothing goes out without a neighbour, and comes again.
@@ -298,38 +258,32 @@ impl Round {
         context: &Context<'_>,
         reachable: bool,
     ) -> Option<Message> {
-        let due = core::mem::take(&mut self.due.onward);
-        // A relay that still computes has nothing to hand on.
-        let message = self.computation.onward(context).filter(|_| due)?;
-        self.await_answer(context);
+        let is_due = self.circulation.poll_forward();
+        let message = self.computation.onward(context).filter(|_| is_due)?;
+        let path = self.path(context);
+        self.circulation.await_result(context.now, path);
         reachable.then_some(message)
     }
 
     /// What is to be sent back; it is taken for sent then.
     pub(crate) fn take_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
-        if core::mem::take(&mut self.due.back) && self.computation.has_answer() && reachable {
-            return self.computation.back(context);
+        match self.circulation.poll_reply().filter(|_| reachable)? {
+            Reply::Result => self.computation.back(context),
+            Reply::InProgress => Some(Message::Busy {
+                sweep: self.computation.number(),
+            }),
         }
-        let busy = core::mem::take(&mut self.due.busy) && reachable;
-        busy.then_some(Message::Busy {
-            sweep: self.computation.number(),
-        })
     }
 
-    fn await_answer(&mut self, context: &Context<'_>) {
-        let trip = self.trip(context);
-        self.retransmit.sent(context.now, trip);
-    }
-
-    fn trip(&self, context: &Context<'_>) -> Trip {
-        Trip {
+    fn path(&self, context: &Context<'_>) -> Path {
+        Path {
             slow: self.computation.is_slow(),
-            ..context.way_onward()
+            ..context.path_to_last()
         }
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        let due = earliest(self.work_at, self.retransmit.next_timeout());
+        let due = earliest(self.work_at, self.circulation.next_timeout());
         earliest(due, self.computation.sensing.next_timeout())
     }
 

@@ -97,7 +97,7 @@ impl Computation {
         let same = matches!(&self.pass, PassKind::Sense(known)
             if known.hearing.told == hearing.told && known.from == hearing.sums);
         let arrival = self.state.arrival(hearing.number, same);
-        if let Some(next) = arrival.refused(self.state) {
+        if let Some(next) = arrival.refused() {
             return next;
         }
         if !Self::senses(context) {

@@ -54,9 +54,7 @@ pub(crate) enum Action {
     Think,
     /// Hand the pass onward, and again until something comes back.
     Forward,
-    /// Say back that the pass has arrived.
-    Busy,
-    /// Hand back again what came of it.
+    /// Reply to a duplicate.
     Repeat,
     /// What came of the pass is known: hand it back.
     Answer {
@@ -83,10 +81,10 @@ pub(crate) enum Arrival {
 
 impl Arrival {
     /// What to do about one that is not taken up.
-    pub(crate) const fn refused(self, state: RoundState) -> Option<Action> {
+    pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
-            Self::Again => Some(state.again()),
+            Self::Again => Some(Action::Repeat),
             Self::Straggler => Some(Action::Stale),
             Self::Foreign => Some(Action::Foreign),
         }
@@ -218,14 +216,6 @@ impl RoundState {
             Arrival::Foreign
         } else {
             Arrival::Straggler
-        }
-    }
-
-    /// What to do about a pass that has come again.
-    pub(crate) const fn again(self) -> Action {
-        match self.phase {
-            Phase::Waiting => Action::Busy,
-            _ => Action::Repeat,
         }
     }
 

@@ -27,7 +27,7 @@ impl Computation {
                 && sweeping.chosen == sweep.chosen
                 && sweeping.fingerprint == print);
         let arrival = self.state.arrival(sweep.number, same);
-        if let Some(next) = arrival.refused(self.state) {
+        if let Some(next) = arrival.refused() {
             return next;
         }
         if sweep.chosen && context.mission().interferer().is_none() {

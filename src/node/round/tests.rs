@@ -122,7 +122,7 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
     exchange(&mut line, |line, message| {
         matches!(message, Message::Sensed(_)) && holds(line)
     });
-    assert_eq!(line.rounds[0].retransmit.next_timeout(), None);
+    assert_eq!(line.rounds[0].circulation.next_timeout(), None);
 }
 
 /// A relay that searches does not know its place yet, so it has no token to hand on, whoever its neighbour is.

@@ -21,7 +21,7 @@ impl Computation {
     pub(crate) fn on_token(&mut self, context: &Context<'_>, token: &Token) -> Action {
         let same = matches!(&self.pass, PassKind::Turn(turning) if turning.turn == token.turn);
         let arrival = self.state.arrival(token.number, same);
-        if let Some(next) = arrival.refused(self.state) {
+        if let Some(next) = arrival.refused() {
             return next;
         }
         if self.setpoint.is_none() {

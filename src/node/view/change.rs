@@ -1,10 +1,12 @@
 //! The states of the view change on one relay: a proposal comes, is handed on, and is decided.
 //!
-//! | state | a newer proposal comes | the same again | the decision comes | nobody is after it any more, and nobody was handed it |
-//! | --- | --- | --- | --- | --- |
-//! | `Settled` | hand on: `Proposed` | - | stale | - |
-//! | `Proposed` | hand on | say busy | hand back: `Decided` | decide: `Decided` |
-//! | `Decided` | hand on: `Proposed` | hand back again | stale | - |
+//! A proposal travels as [`Circulation`] describes; what is particular to it:
+//!
+//! | stage | newer proposal received | decision received | no neighbour after this relay, and not forwarded to any |
+//! | --- | --- | --- | --- |
+//! | `Idle` | vote, forward it: `Outstanding` | stale | - |
+//! | `Outstanding` | vote, forward it | reply with it: `Completed` | decide: `Completed` |
+//! | `Completed` | vote, forward it: `Outstanding` | stale | - |
 //!
 //! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again after
 //! `probe_after` or later ([`Asking`]), and alone not before its own vote would suffice. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
@@ -16,9 +18,9 @@ use super::asking::Asking;
 use super::electorate;
 use super::electorate::{Electorate, Outcome};
 use super::record::{RecordError, ViewRecord};
+use crate::node::circulation::{Circulation, Reply};
 use crate::node::context::{Context, Decided, Effects, Member, Proposer};
 use crate::node::numbering::Stragglers;
-use crate::node::retransmit::{Again, Retransmit};
 use crate::node::timing::earliest;
 use crate::time::Instant;
 use crate::view::{View, ViewId};
@@ -28,18 +30,11 @@ use crate::wire::message::{Decision, Message, Poll, Proposal};
 /// How much later than all it has heard of before a relay takes a view to be on one hearing.
 const LEAP: u32 = 256;
 
-/// Where the view change is.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub(super) enum ViewState {
-    Settled,
-    Proposed,
-    Decided,
-}
-
 /// The view change, as one relay takes part in it.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    pub(super) state: ViewState,
+    /// `Outstanding` while the decision on a proposal is awaited.
+    pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
     /// The latest view heard of.
@@ -48,8 +43,6 @@ pub(crate) struct ViewChange {
     /// Whether the last decision was that too few are there.
     pub(super) refused: bool,
     pub(super) stragglers: Stragglers,
-    pub(super) retransmit: Retransmit,
-    pub(super) due: ViewDue,
 }
 
 impl ViewChange {
@@ -57,18 +50,12 @@ impl ViewChange {
     pub(crate) const fn new(relays: u16, elder: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, elder),
-            state: ViewState::Settled,
+            circulation: Circulation::new(seed),
             proposed: None,
             newest: ViewId::LOADED,
             asking: Asking::new(seed),
             refused: false,
             stragglers: Stragglers::NONE,
-            retransmit: Retransmit::new(seed),
-            due: ViewDue {
-                proposal: false,
-                decision: false,
-                busy: false,
-            },
         }
     }
 
@@ -128,7 +115,7 @@ impl ViewChange {
 
     /// The proposal whose decision is awaited.
     pub(crate) fn awaited(&self) -> Option<Proposed> {
-        self.proposed.filter(|_| self.state == ViewState::Proposed)
+        self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
     /// The last proposal that was taken part in.
@@ -159,10 +146,8 @@ impl ViewChange {
 
     /// Gives up the proposal under way and asks for a view, as after a restart with the record.
     pub(crate) fn leave(&mut self, now: Instant) {
-        self.state = ViewState::Settled;
         self.proposed = None;
-        self.due = ViewDue::default();
-        self.retransmit.stop();
+        self.circulation.withdraw();
         self.asking.ask_anew(now);
     }
 
@@ -200,15 +185,8 @@ impl ViewChange {
             ..Effects::NONE
         };
         if again {
-            if self.state == ViewState::Proposed {
-                self.due.busy = true;
-                let hop_time = context.settings().hop_time;
-                self.retransmit.came_again(context.now, hop_time);
-            } else {
-                self.due.decision = true;
-                let way = context.way(proposal.place);
-                self.retransmit.asked(context.now, way);
-            }
+            let path = context.path(proposal.place);
+            self.circulation.on_duplicate(context.now, path);
             return Effects {
                 repeated: true,
                 ..from
@@ -258,7 +236,6 @@ impl ViewChange {
         let poll = self.electorate.vote(node, view, told, context.held)?;
         // However far ahead it is, this relay has had part in it.
         self.newest = self.newest.max(view);
-        self.state = ViewState::Proposed;
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
             view,
@@ -271,12 +248,10 @@ impl ViewChange {
             decided: None,
             lease_left: 0,
         });
-        self.retransmit.begin();
-        self.due = ViewDue::default();
+        self.circulation.start(context.now);
         let effects = if context.end {
             self.decide(context)
         } else {
-            self.due.proposal = true;
             Effects::NONE
         };
         Some(Effects {
@@ -383,14 +358,9 @@ impl ViewChange {
             // So have all the others.
             self.electorate.commit();
         }
-        self.state = ViewState::Decided;
         self.refused = decided.is_none();
-        let way = context.way(proposed.place.saturating_sub(1));
-        self.retransmit.answered(context.now, way);
-        self.due = ViewDue {
-            decision: !leads,
-            ..ViewDue::default()
-        };
+        let path = context.path(proposed.place.saturating_sub(1));
+        self.circulation.complete(context.now, path);
         self.asking.stop();
         if leads && decided.is_none() {
             // Who has heard of a newer view only now has a voice at once.
@@ -418,13 +388,13 @@ impl ViewChange {
 impl ViewChange {
     /// What could not be said to the neighbour after can be now.
     pub(crate) fn resend(&mut self) {
-        self.due.proposal |= self.state == ViewState::Proposed;
+        self.circulation.resend();
     }
 
     /// Whether the proposal is to be sent onward, to node `to`; it is taken for sent then.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
         let proposal = self.awaited()?.view;
-        if !core::mem::take(&mut self.due.proposal) {
+        if !self.circulation.poll_forward() {
             return None;
         }
         let proposed = self.proposed.as_mut()?;
@@ -433,8 +403,8 @@ impl ViewChange {
             return None;
         }
         let proposed = *proposed;
-        let way = context.way(context.member.all);
-        self.retransmit.sent(context.now, way);
+        let path = context.path(context.member.all);
+        self.circulation.await_result(context.now, path);
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,
             view: proposed.view,
@@ -446,8 +416,8 @@ impl ViewChange {
     /// What is to be sent back; it is taken for sent then.
     pub(crate) fn take_back(&mut self) -> Option<Message> {
         let proposed = self.proposed?;
-        if core::mem::take(&mut self.due.decision) && self.state != ViewState::Proposed {
-            return Some(Message::Decision(Decision {
+        Some(match self.circulation.poll_reply()? {
+            Reply::Result => Message::Decision(Decision {
                 mission_id: proposed.mission_id,
                 proposal: proposed.view,
                 place: proposed.place,
@@ -455,10 +425,10 @@ impl ViewChange {
                 base: proposed.base,
                 view: proposed.decided,
                 lease_left: proposed.lease_left,
-            }));
-        }
-        core::mem::take(&mut self.due.busy).then_some(Message::Busy {
-            sweep: proposed.view.mark(),
+            }),
+            Reply::InProgress => Message::Busy {
+                sweep: proposed.view.mark(),
+            },
         })
     }
 
@@ -468,8 +438,8 @@ impl ViewChange {
             .awaited()
             .is_some_and(|proposed| proposed.view.mark() == number);
         if known {
-            let way = context.way(context.member.all);
-            self.retransmit.arrived(context.now, way);
+            let path = context.path(context.member.all);
+            self.circulation.on_in_progress(context.now, path);
         }
         known
     }
@@ -483,16 +453,8 @@ impl ViewChange {
         leads: bool,
         fresh: bool,
     ) -> Effects {
-        let mut resent = false;
         let hop_time = context.settings().hop_time;
-        match self.retransmit.take_due(context.now, hop_time) {
-            Some(Again::Onward) if self.state == ViewState::Proposed => {
-                self.due.proposal = true;
-                resent = true;
-            }
-            Some(Again::Back) => self.due.decision = true,
-            _ => {}
-        }
+        let resent = self.circulation.handle_timeout(context.now, hop_time);
         let effects = if self.asking.is_due(context.now) {
             self.ask_again(context, leads, fresh)
         } else {
@@ -544,7 +506,7 @@ impl ViewChange {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        earliest(self.asking.next_timeout(), self.retransmit.next_timeout())
+        earliest(self.asking.next_timeout(), self.circulation.next_timeout())
     }
 }
 
@@ -579,12 +541,4 @@ pub(super) struct Conclusion {
     pub(super) base: View,
     pub(super) view: Option<View>,
     pub(super) lease_left: u16,
-}
-
-/// What is to be sent.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
-pub(super) struct ViewDue {
-    pub(super) proposal: bool,
-    pub(super) decision: bool,
-    pub(super) busy: bool,
 }

@@ -48,7 +48,12 @@ pub(super) struct Unit {
 impl Unit {
     fn key(&self) -> impl Eq + core::hash::Hash + use<> {
         let change = &self.change;
-        (change.state, change.proposed, change.electorate, self.flies)
+        (
+            change.circulation.stage(),
+            change.proposed,
+            change.electorate,
+            self.flies,
+        )
     }
 }
 

@@ -10,9 +10,9 @@ use std::vec::Vec;
 use super::chain::{Body, Chain, Decree, Frame, Unit, put};
 use crate::mission::Mission;
 use crate::mission::tests::paper;
+use crate::node::circulation::Circulation;
 use crate::node::context::{Context, Decided, Effects, Member};
 use crate::node::numbering::Stragglers;
-use crate::node::retransmit::Retransmit;
 use crate::node::view::asking::Asking;
 use crate::node::view::change::ViewChange;
 use crate::node::view::electorate::Held;
@@ -172,7 +172,7 @@ impl Check {
         change.asking = Asking::new(1);
         change.refused = false;
         change.stragglers = Stragglers::NONE;
-        change.retransmit = Retransmit::new(1);
+        change.circulation = Circulation::at_stage(change.circulation.stage());
     }
 
     pub(super) fn propose(&self, chain: &mut Chain, at: usize) {

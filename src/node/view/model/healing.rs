@@ -4,7 +4,7 @@
 
 use super::chain::{Chain, Unit};
 use super::check::Check;
-use crate::node::view::change::ViewState;
+use crate::node::circulation::Stage;
 use crate::view::ViewId;
 
 /// So many proposals are enough for a chain that is healed.
@@ -68,7 +68,9 @@ impl Check {
                 .all(|at| {
                     let Unit { change, flies } = &chain.units[at];
                     let knows = change.electorate.agreed() == agreed && change.electorate.member;
-                    knows && change.state != ViewState::Proposed && flies.0 == agreed.id
+                    knows
+                        && change.circulation.stage() != Stage::Outstanding
+                        && flies.0 == agreed.id
                 });
             if settled && u32::from(agreed.relays) == there.count_ones() {
                 return Some(proposals);

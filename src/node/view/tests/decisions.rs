@@ -1,9 +1,9 @@
 //! What is decided, and who accepts it.
 
 use super::relay::{PROPOSED, Relay, all, came, id};
+use crate::node::circulation::Stage;
 use crate::node::context::{Decided, Effects};
 use crate::node::view::change::Proposed;
-use crate::node::view::change::ViewState;
 use crate::node::view::electorate::{Electorate, Held};
 use crate::view::View;
 use crate::wire::message::{Decision, Message, Successor};
@@ -18,7 +18,7 @@ fn what_is_promised_keeps_an_earlier_decision_from_being_accepted() {
     let early = relay.decision(id(1, 1), Some(all(id(1, 1))));
     assert_eq!(relay.handle(&early), Effects::STALE);
     assert!(!relay.view.electorate.awaits(id(1, 1)));
-    assert_eq!(relay.view.state, ViewState::Proposed);
+    assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn a_decision_is_of_the_relay_that_the_proposal_went_on_to() {
         let stray = Message::Decision(stray);
         assert_eq!(relay.handle(&stray), Effects::STALE, "{stray:?}");
     }
-    assert_eq!(relay.view.state, ViewState::Proposed);
+    assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn who_has_lost_the_mission_has_no_part_in_its_view() {
     let decision = relay.decision(id(1, 1), Some(all(id(1, 1))));
     relay.latest.version = 5;
     assert_eq!(relay.handle(&decision), Effects::FOREIGN);
-    assert_eq!(relay.view.state, ViewState::Proposed);
+    assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
     assert!(matches!(
         relay.view.proposed,
         Some(Proposed { decided: None, .. })

@@ -1,0 +1,427 @@
+//! A message that travels along the chain and whose result comes back: stages, duplicates and retransmission.
+//!
+//! View proposals, lease renewals and the passes of an agreement round all travel this way. The initiator sends a message to its neighbour
+//! and every relay forwards it. The last relay knows the result, and a reply with the result goes back through all of them. One
+//! [`Circulation`] is one relay's part in one such message. Its owner holds the payload and decides whether a received message is new, a
+//! duplicate or stale.
+//!
+//! | stage | event | action | next stage |
+//! | --- | --- | --- | --- |
+//! | any | message received or created ([`start`](Circulation::start)) | forward it | `Outstanding` |
+//! | any | result known ([`complete`](Circulation::complete)) | send the reply, unless this relay is the initiator | `Completed` |
+//! | any | message given up ([`withdraw`](Circulation::withdraw)) | - | `Idle` |
+//! | `Idle`, `Outstanding` | duplicate received | reply that it is in progress; retransmit soon | unchanged |
+//! | `Outstanding` | "in progress" received | wait for the whole round trip | unchanged |
+//! | `Outstanding` | timer expired | forward it again | unchanged |
+//! | `Completed` | duplicate received | send the reply again | unchanged |
+//! | `Completed` | timer expired | send the reply again, unasked | unchanged |
+//!
+//! # Timing
+//!
+//! A reply is awaited for the round trip over the remaining hops and two more; [`SLOW`] times as long if relays compute on the way. The relay
+//! next to a lost frame has the shortest timer, so one loss costs one retransmission. A timer that expires shows that the channel loses
+//! frames: this message and the next [`MEMORY`] ones are retransmitted after four hop times and then after eight, until a neighbour replies
+//! that the message is in progress. That neighbour learns of the losses by the duplicate and does the same, so that a loss costs the whole
+//! round trip once and not at every hop of a long chain. A random eighth is added to each wait, so that relays on a shared channel do not
+//! retransmit in step.
+//!
+//! Replies are not acknowledged. On a lossy channel a reply is sent again, unasked, as many times as its number of hops has binary digits:
+//! a request for it would cost the previous relay its whole wait.
+
+use crate::jitter::Jitter;
+use crate::time::{Duration, Instant};
+
+/// Factor on the wait for a pass on which relays compute: its frames are twice as long, and each relay may take thirty work portions.
+const SLOW: u32 = 4;
+
+/// Base-2 logarithm of the most hop times between two retransmissions, less one: eight hop times.
+const LOG_MOST: u32 = 2;
+
+/// Hop times until the first retransmission on a lossy channel, and until the neighbour has replied to a duplicate.
+const SOON: u32 = 4;
+
+/// Messages for which the channel counts as lossy after a loss.
+const MEMORY: u8 = 8;
+
+/// Progress of a message at one relay.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) enum Stage {
+    /// No message, or this relay has not forwarded it yet.
+    Idle,
+    /// Forwarded or about to be; its result is not known yet.
+    Outstanding,
+    /// The result is known.
+    Completed,
+}
+
+/// A reply to the previous relay.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Reply {
+    /// The result.
+    Result,
+    /// The message was received, and its result is not known yet.
+    InProgress,
+}
+
+/// The path between this relay and the relay that replies.
+#[derive(Clone, Copy)]
+pub(crate) struct Path {
+    /// Time of one hop.
+    pub(crate) hop_time: Duration,
+    /// Number of hops.
+    pub(crate) hops: u16,
+    /// True if relays compute before they forward.
+    pub(crate) slow: bool,
+}
+
+/// One relay's part in a message that travels along the chain and in its result.
+#[derive(Clone, Debug)]
+pub(crate) struct Circulation {
+    stage: Stage,
+    started_at: Option<Instant>,
+    completed_at: Option<Instant>,
+    is_forward_due: bool,
+    is_reply_due: bool,
+    is_in_progress_due: bool,
+    /// Retransmissions since a neighbour replied last.
+    retries: u8,
+    /// True once the next relay has replied that it has the message.
+    is_received: bool,
+    /// True if this relay or the previous one has seen the current message lost.
+    is_lossy: bool,
+    /// Further messages for which the channel counts as lossy.
+    lossy_messages: u8,
+    /// Unasked repetitions of the reply that are left.
+    replies_left: u8,
+    jitter: Jitter,
+    timer: Option<Instant>,
+}
+
+impl Circulation {
+    /// `seed` sets the random part of the waits.
+    pub(crate) const fn new(seed: u32) -> Self {
+        Self {
+            stage: Stage::Idle,
+            started_at: None,
+            completed_at: None,
+            is_forward_due: false,
+            is_reply_due: false,
+            is_in_progress_due: false,
+            retries: 0,
+            is_received: false,
+            is_lossy: false,
+            lossy_messages: 0,
+            replies_left: 0,
+            jitter: Jitter::new(seed),
+            timer: None,
+        }
+    }
+
+    /// Returns a message at `stage` without times, for models that leave time out.
+    #[cfg(test)]
+    pub(crate) const fn at_stage(stage: Stage) -> Self {
+        Self {
+            stage,
+            ..Self::new(1)
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) const fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// Returns true while the result is awaited.
+    pub(crate) const fn is_outstanding(&self) -> bool {
+        matches!(self.stage, Stage::Outstanding)
+    }
+
+    /// Returns the time at which this relay had the message to forward.
+    pub(crate) const fn started_at(&self) -> Option<Instant> {
+        self.started_at
+    }
+
+    /// Returns the time at which this relay knew the result; `None` before.
+    pub(crate) const fn completed_at(&self) -> Option<Instant> {
+        self.completed_at
+    }
+
+    /// Forwards a new message.
+    pub(crate) const fn start(&mut self, now: Instant) {
+        self.stop(Stage::Outstanding);
+        self.started_at = Some(now);
+        self.completed_at = None;
+        self.is_forward_due = true;
+        self.retries = 0;
+        self.is_received = false;
+        self.is_lossy = self.lossy_messages > 0;
+        self.lossy_messages = self.lossy_messages.saturating_sub(1);
+    }
+
+    /// Replies with the result, over `path` to the initiator, which itself is no hop away and has nobody to reply to.
+    #[inline(never)] // called from many places
+    pub(crate) fn complete(&mut self, now: Instant, path: Path) {
+        self.stop(Stage::Completed);
+        self.completed_at = Some(now);
+        self.is_reply_due = path.hops > 0;
+        self.repeat_reply(now, path);
+    }
+
+    /// Completes the message without a reply: the initiator has nothing more to send.
+    pub(crate) const fn close(&mut self) {
+        self.stop(Stage::Completed);
+    }
+
+    /// Gives the message up.
+    pub(crate) const fn withdraw(&mut self) {
+        self.stop(Stage::Idle);
+    }
+
+    /// Completes the message without a result, and forgets its times: no later message is a sign of life by them.
+    pub(crate) const fn cancel(&mut self) {
+        self.close();
+        self.started_at = None;
+        self.completed_at = None;
+    }
+
+    const fn stop(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.is_forward_due = false;
+        self.is_reply_due = false;
+        self.is_in_progress_due = false;
+        self.replies_left = 0;
+        self.timer = None;
+    }
+
+    /// Handles the same message once more: the previous relay has retransmitted it, `path` hops from the initiator.
+    pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
+        self.is_lossy = true;
+        if self.stage == Stage::Completed {
+            self.is_reply_due = true;
+            self.repeat_reply(now, path);
+            return;
+        }
+        self.is_in_progress_due = true;
+        let soon = now + self.jitter.spread(path.hop_time.times(SOON));
+        if !self.is_received && self.timer.is_some_and(|at| at > soon) {
+            self.timer = Some(soon);
+        }
+    }
+
+    /// Handles the next relay's reply that the message is in progress.
+    pub(crate) fn on_in_progress(&mut self, now: Instant, path: Path) {
+        self.retries = 0;
+        self.is_received = true;
+        self.await_result(now, path);
+    }
+
+    /// Schedules the message once more, if its result is awaited: a neighbour can be reached again.
+    pub(crate) const fn resend(&mut self) {
+        self.is_forward_due |= self.is_outstanding();
+    }
+
+    /// Returns true if the message is to be forwarded now. The caller then calls [`await_result`](Self::await_result).
+    pub(crate) fn poll_forward(&mut self) -> bool {
+        core::mem::take(&mut self.is_forward_due) && self.is_outstanding()
+    }
+
+    /// Starts the retransmission timer of a message that is forwarded at `now`, `path` hops from the last relay.
+    pub(crate) fn await_result(&mut self, now: Instant, path: Path) {
+        let round_trip = (2 * u32::from(path.hops) + 2) * if path.slow { SLOW } else { 1 };
+        let hops = match self.retries {
+            0 if self.is_lossy && !self.is_received => round_trip.min(SOON),
+            0 => round_trip,
+            retries => round_trip.min(2 << u32::from(retries).min(LOG_MOST)),
+        };
+        self.replies_left = 0;
+        self.timer = Some(now + self.jitter.spread(path.hop_time.times(hops)));
+    }
+
+    /// Returns the pending reply and marks it as sent.
+    pub(crate) fn poll_reply(&mut self) -> Option<Reply> {
+        if core::mem::take(&mut self.is_reply_due) {
+            return Some(Reply::Result);
+        }
+        core::mem::take(&mut self.is_in_progress_due).then_some(Reply::InProgress)
+    }
+
+    fn repeat_reply(&mut self, now: Instant, path: Path) {
+        self.timer = None;
+        self.replies_left = 0;
+        if self.is_lossy {
+            let digits = u16::BITS - path.hops.leading_zeros();
+            self.replies_left = u8::try_from(digits).unwrap_or(u8::MAX);
+            self.await_reply(now, path.hop_time);
+        }
+    }
+
+    fn await_reply(&mut self, now: Instant, hop_time: Duration) {
+        let is_left = self.replies_left > 0;
+        self.timer = is_left.then(|| now + self.jitter.spread(hop_time.times(SOON)));
+    }
+
+    /// Schedules what the timer is for. Returns true if the message is retransmitted.
+    pub(crate) fn handle_timeout(&mut self, now: Instant, hop_time: Duration) -> bool {
+        if self.timer.is_none_or(|at| at > now) {
+            return false;
+        }
+        self.timer = None;
+        if self.replies_left > 0 {
+            self.replies_left -= 1;
+            self.await_reply(now, hop_time);
+            self.is_reply_due = true;
+            return false;
+        }
+        // The first retransmission on a lossy channel shows nothing: the neighbour has had no reason yet to reply that it has the message.
+        if self.retries > 0 || self.is_received || !self.is_lossy {
+            self.is_lossy = true;
+            self.lossy_messages = MEMORY;
+        }
+        self.retries = self.retries.saturating_add(1);
+        self.resend();
+        self.is_outstanding()
+    }
+
+    pub(crate) const fn next_timeout(&self) -> Option<Instant> {
+        self.timer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Circulation, MEMORY, Path, Reply, SOON, Stage};
+    use crate::time::{Duration, Instant};
+
+    const HOP: Duration = Duration::from_millis(10);
+
+    const PATH: Path = Path {
+        hop_time: HOP,
+        hops: 49,
+        slow: false,
+    };
+
+    const START: Instant = Instant::from_millis(1_000);
+
+    /// Sends a new message at `now`.
+    fn send(circulation: &mut Circulation, now: Instant) {
+        circulation.start(now);
+        assert!(circulation.poll_forward());
+        circulation.await_result(now, PATH);
+    }
+
+    fn sent() -> Circulation {
+        let mut circulation = Circulation::new(1);
+        send(&mut circulation, START);
+        circulation
+    }
+
+    /// Hop times from `now` until the timer expires.
+    fn wait(circulation: &Circulation, now: Instant) -> u64 {
+        let at = circulation.next_timeout().unwrap();
+        at.since(now).as_micros() / HOP.as_micros()
+    }
+
+    fn around(hops: u32) -> core::ops::RangeInclusive<u64> {
+        u64::from(hops)..=u64::from(hops + hops / 8)
+    }
+
+    /// Lets the timer expire `times` times. Returns the time of the last one.
+    fn expire(circulation: &mut Circulation, mut now: Instant, times: u32) -> Instant {
+        for _ in 0..times {
+            now = circulation.next_timeout().unwrap();
+            assert!(circulation.handle_timeout(now, HOP));
+            assert!(circulation.poll_forward());
+            circulation.await_result(now, PATH);
+        }
+        now
+    }
+
+    #[test]
+    fn the_whole_round_trip_is_waited_for_once() {
+        let mut one = sent();
+        assert!(around(100).contains(&wait(&one, START)));
+        let now = expire(&mut one, START, 1);
+        assert!(around(4).contains(&wait(&one, now)));
+        let now = expire(&mut one, now, 1);
+        assert!(around(8).contains(&wait(&one, now)));
+        one.on_in_progress(now, PATH);
+        assert!(around(100).contains(&wait(&one, now)));
+        for message in 0..=MEMORY {
+            send(&mut one, now);
+            let hops = if message < MEMORY { SOON } else { 100 };
+            assert!(around(hops).contains(&wait(&one, now)), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_first_retransmission_with_a_reply_extends_no_lossy_period() {
+        let mut one = sent();
+        expire(&mut one, START, 1);
+        for message in 0..=MEMORY {
+            send(&mut one, START);
+            assert_eq!(one.is_lossy, message < MEMORY, "{message}");
+            if one.is_lossy {
+                let now = expire(&mut one, START, 1);
+                one.on_in_progress(now, PATH);
+            }
+        }
+    }
+
+    #[test]
+    fn a_duplicate_is_retransmitted_soon_unless_the_next_relay_has_it() {
+        let mut one = sent();
+        one.on_duplicate(START, PATH);
+        assert_eq!(one.poll_reply(), Some(Reply::InProgress));
+        assert_eq!(one.poll_reply(), None);
+        assert!(around(SOON).contains(&wait(&one, START)));
+        one.on_in_progress(START, PATH);
+        one.on_duplicate(START, PATH);
+        assert!(around(100).contains(&wait(&one, START)));
+        // A duplicate is no proof of a loss on the next hop.
+        send(&mut one, START);
+        assert!(around(100).contains(&wait(&one, START)));
+    }
+
+    #[test]
+    fn a_reply_is_sent_once_or_on_a_lossy_channel_by_the_digits_of_its_hops() {
+        for (hops, digits) in [(0, 0), (1, 1), (7, 3), (8, 4), (49, 6), (199, 8)] {
+            for lossy in [false, true] {
+                let (mut one, mut now) = (sent(), START);
+                let path = Path { hops, ..PATH };
+                one.complete(now, path);
+                assert_eq!(one.poll_reply(), (hops > 0).then_some(Reply::Result));
+                if lossy {
+                    one.on_duplicate(now, path);
+                    assert_eq!(one.poll_reply(), Some(Reply::Result));
+                }
+                let mut times = 0;
+                while let Some(at) = one.next_timeout() {
+                    assert!(around(SOON).contains(&wait(&one, now)));
+                    now = at;
+                    assert!(!one.handle_timeout(now, HOP));
+                    assert_eq!(one.poll_reply(), Some(Reply::Result));
+                    times += 1;
+                }
+                assert_eq!(times, if lossy { digits } else { 0 }, "{hops}");
+                assert!(!one.handle_timeout(now, HOP));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_sent_of_a_message_that_is_withdrawn_or_closed() {
+        for (end, stage) in [
+            (Circulation::withdraw as fn(&mut Circulation), Stage::Idle),
+            (Circulation::close, Stage::Completed),
+        ] {
+            let mut one = sent();
+            one.resend();
+            end(&mut one);
+            assert_eq!((one.stage(), one.next_timeout()), (stage, None));
+            assert!(!one.poll_forward());
+            assert_eq!(one.poll_reply(), None);
+            one.resend();
+            assert!(!one.poll_forward());
+        }
+    }
+}
