@@ -57,11 +57,12 @@ fn an_epoch_that_went_back_is_told_with_the_node() {
     }
 }
 
-/// Relay 2 is switched on again with the epoch that it had: it is a duplicate of what it was. With the larger claim it takes part; with the
-/// smaller one it has no setpoint, and reports that its number is taken.
+/// Relay 2 restarts with the epoch that it had, so its neighbours take it for a duplicate of itself. With the larger claim it takes part.
+/// With the smaller one it reports that its number is taken, and has no setpoint until they have received nothing of the larger one for
+/// `dead_after`.
 #[test]
-fn with_the_epoch_that_it_had_a_relay_takes_part_or_reports_a_duplicate() {
-    let mut taken = 0;
+fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() {
+    let mut waited = 0;
     for seed in 1..=12 {
         let mission = mission(3);
         let mut air = Air::of(&mission, |_| auth(KEY, 5), 0.0);
@@ -72,12 +73,18 @@ fn with_the_epoch_that_it_had_a_relay_takes_part_or_reports_a_duplicate() {
         };
         let settings = super::air::settings(auth(KEY, 5));
         air.relays[1] = Relay::new(mission, identity, settings, 1_000 * seed, air.now).unwrap();
-        air.run(90);
-        let reports = air.told(Event::IndexTaken { node: 2 }).contains(&1);
-        assert_ne!(air.relays[1].setpoint().is_some(), reports, "seed {seed}");
-        taken += u32::from(!reports);
+        let restarted = air.now;
+        let reports = |air: &Air| air.told(Event::IndexTaken { node: 2 }).contains(&1);
+        while air.relays[1].setpoint().is_none() {
+            air.run(1);
+            let seconds = air.now.since(restarted).as_micros() / 1_000_000;
+            assert!(seconds < 90, "seed {seed}");
+        }
+        let waits = air.now.since(restarted) > settings.dead_after;
+        assert_eq!(reports(&air), waits, "seed {seed}");
+        waited += u32::from(waits);
     }
-    assert!((1..12).contains(&taken), "{taken} of 12");
+    assert!((1..12).contains(&waited), "{waited} of 12");
 }
 
 /// Over two wires: the drone on the other port bears the number of the one on this port.
