@@ -39,7 +39,6 @@ pub struct Air {
     soak: Option<Instant>,
 }
 
-/// Access method of the shared channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Sharing {
     /// Half duplex: radios sense the channel before they send, and wait a random time

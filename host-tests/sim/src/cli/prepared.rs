@@ -156,9 +156,7 @@ impl<'a> Prepared<'a> {
         Ok(chain)
     }
 
-    /// Reports the outcome, evaluated with the true interference.
-    ///
-    /// The setup's mission is replaced by the true one.
+    /// Reports the outcome against the true interference, which also replaces the setup's mission.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
         let listened = ListenedReport::of(&self.setup, outcome);
@@ -239,7 +237,6 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
     Ok(())
 }
 
-/// Creates the setup from the options.
 fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Setup, Failure> {
     let mut setup = Setup::new(mission);
     setup.settings.schedule = match options.method {
@@ -270,7 +267,6 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
     Ok(setup)
 }
 
-/// Returns the picture of the chain with its final mission.
 fn drawn(
     mission: &Mission,
     scenario: &Scenario,

@@ -28,7 +28,6 @@ pub(super) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
     cuts.next()
 }
 
-/// Converts to seconds.
 pub(super) fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }

@@ -29,7 +29,6 @@ pub struct Uploads {
     no_store: bool,
 }
 
-/// End of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum End {
     /// Transmitter
@@ -38,7 +37,6 @@ enum End {
     Rx,
 }
 
-/// Requested upload.
 #[derive(Clone, PartialEq, Debug)]
 struct Planned {
     text: String,
@@ -46,7 +44,6 @@ struct Planned {
     changes: Vec<(Key, f64)>,
 }
 
-/// Parameter that an upload may change.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Key {
     X,
@@ -71,7 +68,7 @@ enum Key {
     RxHeight,
 }
 
-/// Names of the keys and ranges of their values, as in a scenario file, a mission's noise and `--tolerance`.
+/// Names and ranges of the keys, as in a scenario file, a mission's noise and `--tolerance`.
 const KEYS: [(&str, Key, f64, f64); 20] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
@@ -136,7 +133,7 @@ impl Uploads {
         self.upload.iter().map(|one| one.at)
     }
 
-    /// Returns the uploads in order of time, for relays with the mission `base` and the sites `sites`, if known.
+    /// Returns the uploads in order of time. `base` is the relays' mission, `sites` their sites, if known.
     pub fn of(&self, base: &Mission, sites: Option<Sites>) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
             None | Some(End::Tx) => Side::Upstream,

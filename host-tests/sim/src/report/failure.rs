@@ -25,7 +25,6 @@ fn adopted(outcome: &Outcome) -> u16 {
     versions.max().unwrap_or(0)
 }
 
-/// Returns the reason for a failed run.
 fn ended(method: &str, outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Settled | Ending::Soaked => None,

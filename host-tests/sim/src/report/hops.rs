@@ -76,8 +76,6 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
 }
 
 /// Formats the relays, the lost ones and Rx as a table; with a y column if `room` is true.
-///
-/// Returns an empty string without positions.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

@@ -17,9 +17,7 @@ pub(super) fn seconds(at: Instant) -> f64 {
 pub struct MomentReport {
     /// Time of the entry, s of virtual time.
     pub at_s: f64,
-    /// Relay number in the mission, from 1.
-    ///
-    /// For a partition, the last relay before it. For the start of an upload, 0 is the transmitter and N + 1 the receiver.
+    /// Relay number from 1; Tx and Rx count as 0 and N + 1; for a partition, the last relay before it.
     pub relay: u16,
     /// Kind of the entry.
     ///

@@ -36,7 +36,6 @@ pub struct Struck {
     pub counted: BTreeMap<(Strike, &'static str), u64>,
 }
 
-/// Frame that the attacker has received.
 #[derive(Clone, Debug)]
 pub(super) struct Recorded {
     /// Arrival time at the intended receiver; sending it earlier would not be a replay.
@@ -54,7 +53,6 @@ pub(super) struct Attacker {
     recorded: VecDeque<Recorded>,
 }
 
-/// Random-number stream of the attacker.
 const ATTACKER: u64 = 2;
 
 /// Largest number of recorded frames; older ones are discarded.
@@ -125,7 +123,6 @@ impl Attacker {
 
 /// Returns the name of the first counter that grew from `before` to `after`.
 pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
-    /// Name of a counter and its getter.
     type Counter = (&'static str, fn(&Stats) -> u32);
     // A received but rejected frame increments two counters; the reason for the rejection comes first.
     let counters: [Counter; 16] = [

@@ -19,9 +19,7 @@ pub struct Bursts {
 }
 
 impl Bursts {
-    /// Links that lose `share` (0 to 0.9) of the frames in bursts of `length` frames on average.
-    ///
-    /// `length` is at least [`Bursts::shortest`].
+    /// Links that lose `share` (0 to 0.9) of the frames in bursts of mean `length`, at least [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {

@@ -230,7 +230,6 @@ impl Flight {
         Some(sum(drone.taken(), noise))
     }
 
-    /// Returns the closest pair of drones at `now`; `None` for fewer than two.
     pub(super) fn nearest(&self, now: Instant) -> Option<Nearest> {
         let places: Vec<Point> = self.drones.iter().map(|drone| drone.body.at).collect();
         Nearest::of(&places, now)

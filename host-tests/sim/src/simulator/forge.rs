@@ -35,8 +35,8 @@ pub(super) struct Way {
 
 /// Returns a frame forged by a random method.
 ///
-/// One of: an untagged false message, one with a guessed tag, a recorded frame with one changed byte and a valid CRC, a handshake
-/// with a guessed tag, or the handshake of a relay with another key.
+/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a valid CRC,
+/// handshake with a guessed tag, handshake of a relay with another key.
 pub(super) fn forge(
     mission: &Mission,
     way: Way,
@@ -77,9 +77,7 @@ fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng
     twisted.unwrap_or_else(|| made_up(mission, way, rng))
 }
 
-/// Returns a recorded pass or reply with false values; `None` for other messages.
-///
-/// Its pass number is the same or slightly later; sender and receiver do not change.
+/// Returns a recorded pass or reply with false values and a similar number; `None` for other messages.
 fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
     let (header, message) = frame::decode(&whole).ok()?;

@@ -96,9 +96,7 @@ pub struct Setup {
     pub radio_reach: usize,
     /// Channel access of the radios, on a shared channel.
     pub access: Access,
-    /// Mean length of a burst of losses, frames: 1 for independent losses.
-    ///
-    /// Otherwise at least [`Bursts::shortest`](super::bursts::Bursts::shortest) of `faults.loss`.
+    /// Mean burst of losses, frames: 1 if independent, else at least [`Bursts::shortest`](super::bursts::Bursts::shortest).
     pub burst: f64,
     /// Failures of single link directions.
     pub deaf: Vec<Deaf>,

@@ -135,7 +135,6 @@ impl Sky {
         self.said_w(scene, relays + 1, now, true_w, rng)
     }
 
-    /// Draws the power that the transmitter measures, W.
     pub(super) fn transmitter_w(&self, scene: &Scene, now: Instant, rng: &mut ChaCha8Rng) -> f64 {
         self.said_w(scene, 0, now, scene.interference_on_ground_w(0.0), rng)
     }

@@ -1,6 +1,4 @@
-//! Top view of the chain with the room beside the line and the interferers, below the side view.
-//!
-//! y points to the right of x, so it increases downward.
+//! Top view of the chain, the room beside the line and the interferers; y (right of x) points downward.
 
 use super::axis::{self, Frame, Scale};
 use super::canvas::Canvas;
@@ -12,12 +10,9 @@ use super::{hops, nodes, sources};
 const PLOT_TOP: f64 = BOTTOM + 52.0;
 const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
-/// Font size of the labels.
 const SIZE: f64 = 10.0;
 
-/// Limit of the plot for interferers, as a multiple of the room's half-width.
-///
-/// Without a room it is the line's length. Interferers farther away are drawn at the plot's edge.
+/// Limit of the plot for interferers, in half-widths of the room; farther ones are drawn at its edge.
 const FARTHEST: f64 = 2.0;
 
 /// Draws the top view; `side` provides the scale along the line.
@@ -77,7 +72,6 @@ fn upright(seen: &Picture, room: &Room) -> Scale {
     Scale::new((low - margin, high + margin), (PLOT_TOP, PLOT_BOTTOM))
 }
 
-/// Draws Tx and Rx with their names outside the chain.
 fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) {
     for (name, x, side) in [("Tx", 0.0, -1.0), ("Rx", distance, 1.0)] {
         let (x, y) = frame.at((x, 0.0));

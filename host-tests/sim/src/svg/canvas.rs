@@ -17,7 +17,6 @@ line,path{fill:none;stroke:#222;stroke-width:1px}\
 /// Point in picture units; y points downward.
 pub(super) type Point = (f64, f64);
 
-/// SVG document under construction.
 pub(super) struct Canvas {
     out: String,
 }
@@ -72,7 +71,6 @@ impl Canvas {
         ));
     }
 
-    /// Draws an edge of the room beside the line.
     pub(super) fn edge(&mut self, (x1, y1): Point, (x2, y2): Point) {
         let [x1, y1, x2, y2] = [x1, y1, x2, y2].map(short);
         self.put(format_args!(
@@ -90,7 +88,6 @@ impl Canvas {
         ));
     }
 
-    /// Draws a closed shape through `points`.
     pub(super) fn shape(&mut self, points: &[Point], class: &str) {
         let outline = outline(points);
         self.put(format_args!("<path class=\"{class}\" d=\"{outline}\"/>\n"));

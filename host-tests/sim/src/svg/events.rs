@@ -26,7 +26,6 @@ pub(super) fn height(picture: &Picture) -> f64 {
     }
 }
 
-/// Draws the strip, if there are events.
 pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     if picture.events.is_empty() {
         return;

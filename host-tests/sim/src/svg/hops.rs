@@ -5,10 +5,7 @@ use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
 use super::picture::{Picture, decibels, length, placed, worst};
 
-/// Colour classes: upper limit in dB above the worst hop, colour, line width, legend.
-///
-/// Colours by Okabe and Ito, distinguishable with colour blindness; the worst hops are also the widest, for prints without
-/// colour.
+/// Hop classes: limit in dB above the worst hop, colour (Okabe-Ito), width (for prints without colour), legend.
 pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (0.1, "#d55e00", 3.2, "< 0.1 dB"),
     (1.0, "#e69f00", 2.4, "< 1 dB"),
@@ -16,10 +13,8 @@ pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (f64::INFINITY, "#0072b2", 2.4, "≥ 6 dB"),
 ];
 
-/// Style of a hop with unknown SIR.
 const UNKNOWN: (&str, f64) = ("#999999", 2.4);
 
-/// Font size of the numbers, in picture units.
 const SIZE: f64 = 10.0;
 
 /// Distance of a number from its line, more than a relay's radius.
@@ -32,7 +27,6 @@ const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 /// Largest number of hops with stacked numbers; more are thinned out.
 const FEW: usize = 21;
 
-/// Hop as it is drawn.
 pub(super) struct Hop {
     number: usize,
     line: [Point; 2],

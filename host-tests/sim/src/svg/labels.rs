@@ -5,7 +5,6 @@ use super::canvas::Point;
 /// Half of the assumed line width.
 const HALF_LINE: f64 = 1.6;
 
-/// Axis-aligned rectangle.
 #[derive(Clone, Copy)]
 pub(super) struct Area {
     low: Point,

@@ -5,7 +5,6 @@ use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
 use super::picture::{Picture, is_gone, length, placed};
 
-/// Font size of a relay's number.
 const SIZE: f64 = 9.0;
 
 /// Draws Tx and Rx on the ground with their names outside the chain.
@@ -62,7 +61,6 @@ pub(super) fn relays(
     }
 }
 
-/// Draws a cross.
 pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
     canvas.line((x - arm, y - arm), (x + arm, y + arm), "cross");
     canvas.line((x - arm, y + arm), (x + arm, y - arm), "cross");

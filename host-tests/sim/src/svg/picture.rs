@@ -32,9 +32,7 @@ pub struct Picture {
     pub nodes: Vec<(f64, f64)>,
     /// Room beside the line; adds a top view.
     pub room: Option<Room>,
-    /// Linear SIR of every hop of the chain, from Tx to Rx.
-    ///
-    /// A value that is not finite and positive is unknown: that hop is grey, without a number.
+    /// Linear SIR of every hop from Tx to Rx; values that are not finite and positive are drawn grey.
     pub hop_sir: Vec<f64>,
     /// Silent relays, each 1 to N: crossed out, with dashed hops.
     pub lost: Vec<usize>,

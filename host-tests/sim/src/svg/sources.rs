@@ -46,19 +46,15 @@ pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pict
     }
 }
 
-/// Returns the corners of a marker.
 fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
 }
 
-/// Formats power and position.
 fn whole((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
-/// Returns the former or estimated interferers with their coordinates.
-///
-/// Interferers of the previous mission are omitted where a present one's marker covers them.
+/// Returns the former or estimated interferers to draw, with coordinates; present markers hide former ones.
 fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));

@@ -9,7 +9,6 @@ const SILENT: Duration = Duration::from_secs(1);
 /// Update interval of the line.
 const EVERY: Duration = Duration::from_millis(100);
 
-/// Control sequence that erases the terminal line.
 const ERASE: &str = "\r\u{1b}[K";
 
 /// Progress line on standard error, erased at the end of the run.

@@ -10,7 +10,6 @@ use super::recorded::link;
 use super::state::Chain;
 
 impl Chain {
-    /// Sends a frame of relay `index` through `port`.
     pub(super) fn transmit(&mut self, index: usize, port: Port, frame: &[u8]) {
         if port == Port::Shared && self.broadcast(index, frame) {
             return;

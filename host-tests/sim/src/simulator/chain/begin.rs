@@ -25,9 +25,6 @@ use super::station::stations;
 
 impl Chain {
     /// Switches every relay on at time 0. `run` computes the reference positions if the run is watched.
-    ///
-    /// # Errors
-    /// [`SetupError`] if a relay rejects its profile or settings.
     pub(super) fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -125,7 +122,6 @@ impl Chain {
     }
 }
 
-/// Creates the relays, switched on at time 0.
 fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupError> {
     let mut members = Vec::new();
     for index in 1..=setup.mission.relays() {

@@ -23,7 +23,6 @@ impl Chain {
         true
     }
 
-    /// Processes an event of the channel.
     pub(super) fn on_air(&mut self, event: AirEvent) {
         let Some(mut medium) = self.medium.take() else {
             return;

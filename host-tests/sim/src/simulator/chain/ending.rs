@@ -119,9 +119,7 @@ fn is_counted(part: &[&Member]) -> bool {
     })
 }
 
-/// Returns true if no part has a quorum and the relays know it.
-///
-/// Each part has at most half of its previous relays, some relay has noticed it, and all know their present neighbours.
+/// Returns true if no part has a quorum, the relays know it, and all know their present neighbours.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));

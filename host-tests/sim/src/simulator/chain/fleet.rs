@@ -38,7 +38,6 @@ impl Chain {
         }
     }
 
-    /// Advances all drones by one time step.
     pub(super) fn fly_fleet(&mut self) {
         self.look_for_traffic();
         for index in 0..self.fleet.len() {

@@ -13,7 +13,6 @@ use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {
-    /// Starts upload `which` of the setup.
     pub(super) fn begin_upload(&mut self, which: usize) {
         let Some(spec) = self.setup.uploads.get(which).copied() else {
             return;

@@ -10,9 +10,7 @@ use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {
-    /// Removes and returns the frames sent by `until`, ordered by their end.
-    ///
-    /// Returns none unless [`Setup::record`](super::super::setup::Setup::record) is set.
+    /// Removes and returns the frames sent by `until`, ordered by their end, if recording is on.
     pub fn frames(&mut self, until: Instant) -> Vec<OnAir> {
         self.record
             .as_mut()

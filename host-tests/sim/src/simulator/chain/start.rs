@@ -7,7 +7,6 @@ use uav_relay::{Identity, Instant, Relay, Settings, ViewRecord};
 use super::super::forge::NETWORK;
 use super::super::setup::Setup;
 
-/// Parameters of a relay's start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     /// Relay number, from 1.

@@ -17,7 +17,6 @@ use super::super::setup::Setup;
 use super::super::watch::Watch;
 use super::station::Station;
 
-/// Relay of a run.
 #[derive(Debug)]
 pub(super) struct Member {
     pub(super) relay: Relay,
@@ -28,11 +27,9 @@ pub(super) struct Member {
     pub(super) killed: Option<Instant>,
     /// True if the relay controlled its drone at the last time step.
     pub(super) lent: bool,
-    /// Number of starts.
     pub(super) starts: u32,
     /// Sweeps begun before the last start.
     pub(super) swept: u32,
-    /// Persisted upload.
     pub(super) stored: Option<Upload>,
     /// Last setpoint that passed the limit check.
     pub(super) safe: Option<Placement>,
@@ -68,7 +65,6 @@ pub struct Chain {
     pub(super) handed_over_m: Vec<Option<f64>>,
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     pub(super) medium: Option<Medium>,
-    /// Burst model of the losses, if any.
     pub(super) bursts: Option<Bursts>,
     /// Setpoints of the last agreement.
     pub(super) agreed: Option<Vec<Placement>>,
@@ -77,6 +73,5 @@ pub struct Chain {
     pub(super) listened: bool,
     /// Statistics, for soaks and shared channels.
     pub(super) watch: Option<Watch>,
-    /// Recorded frames, if requested.
     pub(super) record: Option<Record>,
 }

@@ -102,7 +102,6 @@ impl Chain {
         }
     }
 
-    /// Returns the number of sweeps that all relays have begun.
     pub(super) fn sweeps(&self) -> u32 {
         self.members.iter().map(Member::begun).sum()
     }

@@ -24,7 +24,6 @@ pub(super) enum Mode {
     Companion,
 }
 
-/// Pilot of one drone.
 #[derive(Clone, Debug)]
 pub(super) struct Pilot {
     arms_at: Instant,

@@ -42,7 +42,6 @@ const IN_AIR: u8 = 2;
 const TAKING_OFF: u8 = 3;
 const LANDING: u8 = 4;
 
-/// Periodic message.
 #[derive(Clone, Copy, Debug)]
 struct Rate {
     id: u32,
@@ -176,7 +175,6 @@ impl Vehicle {
         self.body.velocity_mps.iter().any(|v| v.abs() > 0.5)
     }
 
-    /// Returns true while the drone is off the ground.
     pub(in crate::simulator) const fn flies(&self) -> bool {
         self.landed != ON_GROUND
     }
@@ -266,7 +264,6 @@ impl Vehicle {
         }
     }
 
-    /// Applies the decisions of the pilot and of the autopilot.
     fn decide(&mut self, now: Instant) {
         if !self.armed && self.pilot.has_armed(now) {
             self.armed = true;

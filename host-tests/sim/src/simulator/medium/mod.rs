@@ -52,7 +52,6 @@ enum Fate {
     Unheard,
 }
 
-/// Transmission in progress.
 #[derive(Debug)]
 struct OnAir {
     from: usize,

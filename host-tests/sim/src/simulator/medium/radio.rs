@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use uav_relay::Instant;
 
-/// State of a radio.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) enum State {
     /// Receiving, with an empty queue.
