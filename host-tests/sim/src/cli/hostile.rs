@@ -43,11 +43,10 @@ pub struct Hostile {
     #[arg(long)]
     no_auth: bool,
     /// Connect all relays by one radio channel, which reaches four relays far; default with any of --kill, --boot, --partition,
-    /// --deaf, --soak,
-    /// --air, --fly, --forge, --replay and --upload
+    /// --deaf, --soak, --air, --fly, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
-    /// Connect each relay to its neighbours by wires even then; a failure is only reported, the chain does not close the gap
+    /// Connect each relay to its neighbours by wires even then; a failure is reported, but the gap is not closed
     #[arg(long)]
     wires: bool,
     #[command(flatten)]

@@ -24,7 +24,6 @@ pub struct DroneReport {
     pub off_m: Option<f64>,
 }
 
-/// Reports all drones; empty without autopilots.
 pub(super) fn drones(outcome: &Outcome) -> Vec<DroneReport> {
     let ends = (1..).zip(outcome.fleet.iter().zip(&outcome.relays));
     ends.map(|(index, (&(at, flown), relay))| one(index, at, flown, relay))

@@ -126,7 +126,6 @@ fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
     versions.max()
 }
 
-/// Returns the log entry for the start of an upload.
 fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
     moments
         .iter()

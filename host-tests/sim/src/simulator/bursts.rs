@@ -19,7 +19,7 @@ pub struct Bursts {
 }
 
 impl Bursts {
-    /// Links that lose `share` (0 to 0.9) of the frames in bursts of mean `length`, at least [`Bursts::shortest`].
+    /// Links with a `share` of lost frames, 0 to 0.9, and a mean burst `length` from [`Bursts::shortest`] up.
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {

@@ -123,7 +123,6 @@ impl Sky {
         }
     }
 
-    /// Draws the power that the receiver of a chain of `relays` measures, W.
     pub(super) fn receiver_w(
         &self,
         scene: &Scene,
@@ -139,7 +138,6 @@ impl Sky {
         self.said_w(scene, 0, now, scene.interference_on_ground_w(0.0), rng)
     }
 
-    /// Returns true if the two ends measure at `now`.
     pub(super) fn ends_measure(&self, now: Instant) -> bool {
         let [from, until] = self.ends_during;
         self.ends && now >= from && now < until

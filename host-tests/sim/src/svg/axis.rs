@@ -16,7 +16,6 @@ pub(super) struct Frame {
 }
 
 impl Scale {
-    /// Scale from a non-empty range.
     pub(super) const fn new(from: (f64, f64), to: (f64, f64)) -> Self {
         Self { from, to }
     }

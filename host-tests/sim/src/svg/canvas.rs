@@ -93,7 +93,6 @@ impl Canvas {
         self.put(format_args!("<path class=\"{class}\" d=\"{outline}\"/>\n"));
     }
 
-    /// Draws a closed shape with a tooltip.
     pub(super) fn marked(&mut self, points: &[Point], class: &str, tip: &str) {
         let (outline, tip) = (outline(points), escape(tip));
         self.put(format_args!(

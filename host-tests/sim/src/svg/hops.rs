@@ -5,7 +5,7 @@ use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
 use super::picture::{Picture, decibels, length, placed, worst};
 
-/// Hop classes: limit in dB above the worst hop, colour (Okabe-Ito), width (for prints without colour), legend.
+/// Hop classes: dB above the worst hop, colour (Okabe-Ito), width (for colourless prints), legend.
 pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (0.1, "#d55e00", 3.2, "< 0.1 dB"),
     (1.0, "#e69f00", 2.4, "< 1 dB"),

@@ -94,7 +94,6 @@ fn count(picture: &Picture) -> String {
     }
 }
 
-/// Formats an SIR, linear and in dB.
 fn both_units(sir: f64) -> String {
     let linear = if (1e-3..1e5).contains(&sir) {
         format!("{sir:.4}")

@@ -139,7 +139,6 @@ pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
-/// Returns the SIR of the worst hop, linear.
 pub(super) fn worst(picture: &Picture) -> Option<f64> {
     let sirs = picture
         .hop_sir

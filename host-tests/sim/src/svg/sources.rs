@@ -68,7 +68,6 @@ fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     .collect()
 }
 
-/// Draws the markers of former or estimated interferers.
 pub(super) fn others(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let ground = frame.h.at(0.0);
     for (at, source) in gone(picture, frame) {
@@ -78,7 +77,6 @@ pub(super) fn others(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pi
     }
 }
 
-/// Labels former or estimated interferers where there is room.
 pub(super) fn label_others(
     canvas: &mut Canvas,
     labels: &mut Labels,

@@ -71,7 +71,6 @@ fn run(options: &Options) -> Result<(), Failure> {
     show(options, &report)
 }
 
-/// Runs the chain to its end and captures its frames.
 fn fly(
     run: &Prepared<'_>,
     setup: Setup,

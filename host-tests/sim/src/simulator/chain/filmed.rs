@@ -31,7 +31,6 @@ impl Chain {
         }
     }
 
-    /// Records a transmission of relay `index` (from 0).
     pub(super) fn film_frame(&mut self, index: usize, port: Port) {
         if let (Some(film), Some(member)) = (&mut self.outcome.film, self.members.get(index)) {
             film.sent.push(Sent {

@@ -33,7 +33,7 @@ impl Chain {
                 .any(|deaf| deaf.applies(number(by), number(of), self.now))
     }
 
-    /// Returns true if relays `one` and `other` (from 0) receive each other and are close enough to be neighbours.
+    /// Returns true if relays `one` and `other` (from 0) can be neighbours now: linked both ways and near.
     pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
         let most = self.reach().min(NEIGHBOUR);
         one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)
@@ -49,7 +49,6 @@ impl Chain {
     }
 }
 
-/// Converts an index to a relay number, from 1.
 fn number(index: usize) -> u16 {
     u16::try_from(index + 1).unwrap_or(u16::MAX)
 }

@@ -34,7 +34,6 @@ pub(super) enum Says {
 }
 
 impl Says {
-    /// Encodes the message as a MAVLink frame.
     pub(super) fn frame(self, sequence: u8) -> Vec<u8> {
         let mut payload = Vec::new();
         let id = match self {

@@ -33,7 +33,6 @@ pub(super) struct Pilot {
 }
 
 impl Pilot {
-    /// Pilot of drone `index`, from 0.
     pub(super) fn new(index: usize, all: &[Takeover]) -> Self {
         let later = u64::try_from(index).unwrap_or(0) * NEXT_MS;
         let own = |takeover: &&Takeover| usize::from(takeover.relay) == index + 1;

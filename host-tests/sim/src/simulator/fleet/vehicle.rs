@@ -209,7 +209,6 @@ impl Vehicle {
         self.pilot.has_seen_a_restart(now);
     }
 
-    /// Starts a landing on the spot.
     pub(in crate::simulator) fn land(&mut self) {
         if self.landed == IN_AIR {
             self.landed = LANDING;

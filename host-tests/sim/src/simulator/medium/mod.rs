@@ -173,7 +173,6 @@ impl Medium {
         }
     }
 
-    /// Senses the channel at `node`.
     fn sense(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let Some(State::Waiting { until, exponent }) = self.radios.get(node).map(|it| it.state)
         else {
