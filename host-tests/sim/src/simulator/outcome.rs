@@ -142,7 +142,7 @@ pub struct RelayEnd {
     pub version: u16,
     /// Interference estimate of the relay.
     pub believed: Told,
-    /// Sites of its mission; `None` for those loaded before take-off.
+    /// Sites of the relay's mission; `None` for those loaded before take-off.
     pub sites: Option<Sites>,
     /// Observed state.
     pub seen: Seen,
