@@ -1,4 +1,4 @@
-//! Every method through the tool itself: what scenario it needs, what it finds, how it is drawn.
+//! Planning methods on the command line: required scenarios, results and pictures.
 
 use serde_json::Value;
 use uav_relay_scenario::Scenario;
@@ -210,7 +210,7 @@ fn several_interferers_are_flown_as_one_and_a_note_says_so() {
     );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(report["sir"].as_f64().unwrap() > 0.1, "{report}");
-    // Held against both, it is another SIR: that of a scene with both.
+    // The SIR against both interferers is that of a scene with both.
     let scenario = Scenario::load(std::path::Path::new(several)).unwrap();
     let scene = Scene::new(&scenario, 3).unwrap();
     let relays = report["relays"].as_array().unwrap();
