@@ -1,4 +1,4 @@
-//! The ttys of either wiring, and sleep until one of them or a timer needs the relay.
+//! Ttys of either wiring.
 
 use std::os::fd::BorrowedFd;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::{sleep, tap};
 
-/// A tty, or the end of the chain: nobody is there; behind a gate.
+/// Tty, or `None` at an end of the chain, behind the send gate.
 #[derive(Debug)]
 pub(crate) struct End(Option<Replug>, Gate);
 
@@ -27,7 +27,7 @@ impl SerialPort for End {
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
         if !self.1.is_open() {
-            // It waits, as for a port that takes nothing.
+            // Keeps the frame waiting, as a full port does.
             return Ok(0);
         }
         let all = Ok(bytes.len());
@@ -39,7 +39,7 @@ impl SerialPort for End {
     }
 }
 
-/// All that a relay is connected to.
+/// Ports of a relay.
 #[derive(Debug)]
 pub(crate) enum Ports {
     Pair(Box<Pair<End, End>>),
@@ -47,7 +47,7 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens them. Nothing is sent while `gate` is shut.
+    /// Opens the ttys. Nothing is sent while `gate` is closed.
     ///
     /// # Errors
     /// One line that names the tty.
@@ -74,7 +74,7 @@ impl Ports {
         })
     }
 
-    /// Writes what goes over them to a capture from now on, and returns the file.
+    /// Captures all further traffic in a file; returns the file that is written.
     ///
     /// # Errors
     /// One line that names the file.
@@ -86,7 +86,7 @@ impl Ports {
         Ok(file)
     }
 
-    /// Moves what can be moved, with a call of `keep` before anything is sent, and says when to come back at the latest.
+    /// Exchanges bytes with the relay, and calls `keep` before each send; returns the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -99,7 +99,7 @@ impl Ports {
         }
     }
 
-    /// Opens again what has vanished, when it is time to, and says when to come back for that.
+    /// Reopens lost ttys when due; returns the time of the next retry.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         self.ttys()
             .filter_map(|tty| {
@@ -109,12 +109,12 @@ impl Ports {
             .min()
     }
 
-    /// Their names, as options give them.
+    /// Returns the options and paths of the ttys.
     pub(crate) fn names(&mut self) -> Vec<String> {
         self.ttys().map(|tty| tty.to_string()).collect()
     }
 
-    /// What they have counted: bytes, and what went wrong with them.
+    /// Returns byte and error counters as JSON.
     pub(crate) fn status(&mut self) -> Value {
         let links = match self {
             Self::Pair(pair) => vec![*pair.upstream.stats(), *pair.downstream.stats()],
@@ -141,11 +141,7 @@ impl Ports {
             .filter_map(|end| end.0.as_mut())
     }
 
-    /// Sleeps until a tty has bytes, or room after it had none, or one of `others` what it waits for; for `at_most`, or for ever. What was
-    /// found at each of `others`.
-    ///
-    /// # Errors
-    /// What the system says where it is not possible to sleep.
+    /// Sleeps until a tty or one of `others` is ready, at most `at_most`, else for ever; returns the events of each of `others`.
     pub(crate) fn sleep(
         &mut self,
         at_most: Option<Duration>,

@@ -1,10 +1,10 @@
-//! The companion's own part of the file, as options.
+//! `[companion]` section of the file, as options.
 
 use uav_relay_scenario::deployment::Deployment;
 
 use uav_relay_linux::config::{Given, network};
 
-/// What a file says to a companion.
+/// Adds the `[network]` and `[companion]` sections.
 pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
     network(deployment, given);
     let own = &deployment.companion;
