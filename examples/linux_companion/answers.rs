@@ -8,7 +8,7 @@ const PATIENCE: Duration = Duration::from_millis(3_000);
 /// Best data received from the port since the start.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Answer {
-    /// No bytes.
+    /// Empty so far: no byte has arrived.
     Nothing,
     /// Bytes without an intact MAVLink 2 frame.
     Noise,

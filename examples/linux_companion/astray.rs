@@ -69,8 +69,8 @@ impl Astray {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Checks the position, off the line or the newest one, against the line between `sites` and the mission's `lateral` range;
-    /// returns a geofence report if one is due.
+    /// Returns a geofence report if one is due. Compares the position, off the line or the newest one, with the line between
+    /// `sites` and the mission's `lateral` range.
     pub(crate) fn look(
         &mut self,
         now: Instant,
