@@ -53,7 +53,7 @@ use panic_halt as _;
 #[cfg(target_os = "none")]
 use stm32f4xx_hal as _;
 
-/// On the target the result is inspected with a debugger.
+/// Leaves the result to the debugger on the target.
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {

@@ -47,7 +47,6 @@ impl Memory {
     }
 }
 
-/// Port for both runners.
 #[derive(Clone, Copy)]
 struct End<'m>(&'m Memory);
 
@@ -89,7 +88,6 @@ impl Write for End<'_> {
     }
 }
 
-/// Clock that stands still.
 struct Still(Instant);
 
 impl Clock for Still {

@@ -11,10 +11,8 @@ use uav_relay::Mission;
 use uav_relay::Relay;
 use uav_relay::Settings;
 
-/// Largest value of SysTick.
 pub(crate) const TOP: u32 = 0x00FF_FFFF;
 
-/// Returns the SysTick ticks of `work`.
 pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
     let before = SYST::get_current();
     black_box(work());

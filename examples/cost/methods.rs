@@ -32,7 +32,6 @@ impl Flight {
         }
     }
 
-    /// Delivers the frames of relay `at`.
     fn drain(&mut self, at: usize, now: Instant) {
         let mut frame: FrameBuf = [0; MAX_FRAME];
         loop {

@@ -29,8 +29,9 @@ pub(crate) fn planning() {
     hprintln!("fewest_relays {}", relays);
 }
 
-/// Solves a chain of `relays` relays by the joint method; returns the instructions in total and of the most expensive portion,
-/// and the number of portions.
+/// Solves a chain of `relays` relays by the joint method.
+///
+/// Returns the total instructions, those of the most expensive portion, and the number of portions.
 fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);

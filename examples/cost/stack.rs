@@ -35,7 +35,6 @@ pub(crate) fn stack() {
     );
 }
 
-/// Delivers the frames of one relay to another.
 pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant) {
     let mut frame: FrameBuf = [0; MAX_FRAME];
     while let Some(transmit) = from.poll_transmit(now, &mut frame) {
@@ -46,7 +45,6 @@ pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant)
 /// Number of painted words: more than any call uses.
 pub(crate) const PAINTED: usize = 1024;
 
-/// Pattern of untouched stack.
 pub(crate) const PAINT: u32 = 0xC0FF_EE11;
 
 /// Returns the bytes of stack that `work` uses below this frame.

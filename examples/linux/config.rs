@@ -16,7 +16,6 @@ use uav_relay_scenario::mission;
 use crate::log::Log;
 use crate::site::degrees;
 
-/// SIR tolerance of every relay of a chain.
 const TOLERANCE: f64 = 1e-4;
 
 /// Settings that only a file can give.
@@ -278,7 +277,6 @@ pub fn read<T: Parser>(
     ))
 }
 
-/// Returns the file named by `--config`.
 fn named(line: &[OsString]) -> Option<PathBuf> {
     line.iter().enumerate().find_map(|(at, word)| {
         if word == "--config" {

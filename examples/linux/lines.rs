@@ -31,7 +31,6 @@ pub fn power_w(words: &[&str]) -> Option<f32> {
     (1e-30..=1e6).contains(&power_w).then_some(power_w)
 }
 
-/// Maximum number of buffers read by one call.
 const READS: usize = 16;
 
 /// Open FIFO.

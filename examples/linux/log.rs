@@ -41,7 +41,6 @@ pub struct Source {
     pub value: Value,
 }
 
-/// Format of a line.
 #[derive(Debug)]
 struct Format {
     json: bool,
@@ -139,7 +138,6 @@ impl Log {
     }
 }
 
-/// Destination of the lines.
 struct Out {
     file: File,
     path: Option<PathBuf>,
@@ -169,7 +167,6 @@ fn appended(path: &Path) -> std::io::Result<File> {
     File::options().append(true).create(true).open(path)
 }
 
-/// Writer at the receiving end of the queue.
 struct Writer {
     out: Out,
     /// True if the last line was written only in part.
@@ -217,7 +214,6 @@ impl Writer {
         }
     }
 
-    /// Writes bytes; returns true if all were written.
     fn put(&mut self, mut bytes: &[u8]) -> bool {
         while !bytes.is_empty() {
             match self.out.file.write(bytes) {

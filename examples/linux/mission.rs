@@ -7,7 +7,6 @@ use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig,
 
 use crate::command::{named, number};
 
-/// Interferer of the paper's multi-hop scenario.
 const PAPERS: Interference = Interference::Source(Interferer {
     power_w: 80.0,
     x_m: 500.0,

@@ -19,7 +19,6 @@ const ANSWERS: usize = 4;
 /// Maximum number of unanswered connections; the oldest beyond that get the state at once.
 const CLIENTS: usize = 16;
 
-/// Time that a client has to send a command.
 const PATIENCE: Duration = Duration::from_millis(200);
 
 /// Listening socket; its file is removed on drop.
@@ -30,7 +29,6 @@ pub struct StatusSocket {
     clients: Vec<Client>,
 }
 
-/// Connection that is not answered yet.
 #[derive(Debug)]
 struct Client {
     stream: UnixStream,

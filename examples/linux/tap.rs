@@ -17,7 +17,6 @@ use crate::log::Log;
 /// Maximum number of pieces waiting to be written.
 const WAITING: usize = 1_024;
 
-/// Maximum number of captures with the same base name.
 const MOST: u32 = 9_999;
 
 /// Bytes received or sent by one call, at port number `port`.

@@ -15,7 +15,6 @@ use uav_relay::serial::{Fault, SerialPort};
 #[derive(Debug)]
 pub struct Tty {
     fd: OwnedFd,
-    /// Option and path, for messages.
     name: String,
     /// True if the last write was accepted only in part.
     full: bool,

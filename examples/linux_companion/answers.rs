@@ -16,7 +16,6 @@ pub(crate) enum Answer {
     Others,
 }
 
-/// Watches a port until its autopilot is found.
 #[derive(Debug)]
 pub(crate) struct Answers {
     /// Best data so far, and the time since when; `None` once the autopilot is found.
@@ -25,7 +24,6 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    /// Starts watching.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             newest: Some((Answer::Nothing, now)),
@@ -56,7 +54,6 @@ impl Answers {
         self.newest.and(self.told)
     }
 
-    /// Returns the time of the next check.
     pub(crate) fn wake(&self) -> Option<Instant> {
         let (answer, since) = self.newest?;
         (self.told < Some(answer)).then(|| since + PATIENCE)

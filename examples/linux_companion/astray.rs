@@ -12,10 +12,8 @@ use uav_relay::flight::autopilot::OffLine;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Band, Duration, Geodetic, Instant, Placement, Sites};
 
-/// Minimum time between two reports of the same kind.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of a valid position.
 const STALE: Duration = Duration::from_millis(3_000);
 
 /// Distance outside the geofence that is not reported, m.
@@ -24,7 +22,6 @@ const FENCE_M: f64 = 100.0;
 /// Factor by which swapped sites must be nearer to the drone before the log asks about a swap.
 const NEARER: f64 = 10.0;
 
-/// Kind of deviation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
     Line,
@@ -36,7 +33,6 @@ enum Kind {
 pub(crate) struct Off {
     kind: Kind,
     away_m: f64,
-    /// Distance outside the geofence, m.
     outside_m: f64,
     /// True where swapping latitude and longitude of both sites brings the line to the drone.
     is_swapped: bool,
@@ -53,12 +49,10 @@ pub(crate) struct Astray {
 }
 
 impl Astray {
-    /// Records a position along the line.
     pub(crate) const fn handle_place(&mut self, now: Instant, place: Placement) {
         self.newest = Some((now, place));
     }
 
-    /// Returns the newest position, unless it is stale.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         fresh.map(|(_, place)| place)
@@ -144,7 +138,6 @@ impl Lines {
         })
     }
 
-    /// Evaluates a drone without a position along the line.
     fn off_line(&self, OffLine { at, away_m }: OffLine) -> Off {
         let away_m = f64::from(away_m);
         let swapped = self.swapped.as_ref().and_then(|axis| axis.away_m(at));
@@ -192,7 +185,6 @@ impl Off {
             .then(|| format!("relay: the drone is {} from its line", Far(self.away_m)))
     }
 
-    /// Returns the distances as JSON fields.
     pub(crate) fn fields(&self) -> Value {
         json!({ "from_line_m": self.away_m, "outside_m": self.outside_m })
     }

@@ -30,18 +30,14 @@ use uav_relay_scenario::endpoint::Endpoint;
 /// Capacity of the send queue of a slow tty, bytes: some seconds of traffic.
 const WAITING: usize = 4_096;
 
-/// Event name of its log lines.
 const EVENT: &str = "autopilot";
 
 /// MAVLink link number in signatures.
 const LINK: u8 = 0;
 
-/// Port of the autopilot.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Where {
-    /// Tty, and its bit rate, bit/s.
     Tty(PathBuf, u32),
-    /// UDP port.
     Udp(Endpoint),
 }
 
@@ -54,7 +50,6 @@ impl fmt::Display for Where {
     }
 }
 
-/// MAVLink signing key of the autopilot.
 #[derive(Clone, Copy)]
 pub(crate) struct SigningKey(pub(crate) [u8; 32]);
 
@@ -64,7 +59,6 @@ impl fmt::Debug for SigningKey {
     }
 }
 
-/// Configuration of the autopilot link.
 #[derive(Clone, Debug)]
 pub(crate) struct AutopilotPlan {
     pub(crate) place: Where,
@@ -79,12 +73,10 @@ enum Port {
     Udp(Datagrams),
 }
 
-/// Autopilot link and its port.
 #[derive(Debug)]
 pub(crate) struct Companion {
     plan: AutopilotPlan,
     link: Autopilot,
-    /// Sites of the line that is flown.
     between: Sites,
     port: Port,
     waiting: Vec<u8>,
@@ -97,9 +89,6 @@ pub(crate) struct Companion {
 
 impl Companion {
     /// Opens the port. This must succeed at the start, because a wrong name is a mistake.
-    ///
-    /// # Errors
-    /// One line that names the fault.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.place)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
@@ -142,7 +131,6 @@ impl Companion {
         }
     }
 
-    /// Logs the number of frames rejected for their signature.
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         let refused = self.link.refused();
         if refused > 0 {
@@ -154,7 +142,6 @@ impl Companion {
         }
     }
 
-    /// Returns the state and the counters as JSON.
     pub(crate) fn status(&self) -> Value {
         let port = match &self.port {
             Port::Tty(tty) => tty.status(),
@@ -334,7 +321,6 @@ impl Companion {
         others.fold(link, |wake, again| wake.min(again.max(now)))
     }
 
-    /// Returns the file descriptor and the events to poll.
     pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         match &self.port {
             Port::Tty(tty) => tty.interest(),
@@ -342,7 +328,6 @@ impl Companion {
         }
     }
 
-    /// Records the events that poll(2) reported.
     pub(crate) fn noticed(&mut self, events: PollFlags) {
         if let Port::Tty(tty) = &mut self.port {
             tty.noticed(events);
@@ -440,7 +425,6 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
     }
 }
 
-/// Returns the relay numbers in a command.
 fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
     relays.into_iter().filter(|node| *node != 0)
 }
@@ -504,7 +488,6 @@ const fn waits(reason: WaitReason) -> &'static str {
     }
 }
 
-/// Returns a state in one word, for programs.
 const fn word(state: State) -> &'static str {
     match state {
         State::Silent => "silent",

@@ -10,7 +10,6 @@ use uav_relay_scenario::endpoint::Endpoint;
 /// Maximum number of attempts of a call that reports an earlier refusal.
 const ATTEMPTS: usize = 4;
 
-/// Socket and its counters.
 #[derive(Debug)]
 pub(crate) struct Datagrams {
     socket: UdpSocket,
@@ -24,9 +23,6 @@ pub(crate) struct Datagrams {
 
 impl Datagrams {
     /// Binds the local port; accepts datagrams only from the autopilot's address and port.
-    ///
-    /// # Errors
-    /// One line without the address: the fault, and the values to use instead.
     pub(crate) fn open(endpoint: &Endpoint) -> Result<Self, String> {
         let Endpoint {
             host, port, local, ..
@@ -93,7 +89,6 @@ impl Datagrams {
         }
     }
 
-    /// Returns the number of bytes received.
     pub(crate) const fn bytes_in(&self) -> u64 {
         self.read
     }
@@ -111,7 +106,6 @@ impl Datagrams {
         )
     }
 
-    /// Returns the address and the counters as JSON.
     pub(crate) fn status(&self) -> Value {
         json!({
             "option": "--autopilot",
@@ -124,7 +118,6 @@ impl Datagrams {
         })
     }
 
-    /// Returns the file descriptor to poll.
     pub(crate) fn fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }

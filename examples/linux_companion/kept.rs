@@ -13,16 +13,12 @@ use uav_relay::{Duration, Instant};
 use uav_relay_linux::keep::keep;
 use uav_relay_linux::log::Log;
 
-/// Pause between two attempts.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Maximum time that the program waits for the disk at exit.
 const LAST: Span = Span::from_millis(500);
 
-/// Result and duration of a write.
 type Done = (std::io::Result<()>, Span);
 
-/// File and the state of its writes.
 #[derive(Debug)]
 pub(crate) struct Kept {
     option: &'static str,
@@ -41,9 +37,6 @@ pub(crate) struct Kept {
 
 impl Kept {
     /// Starts the writer thread of `file`, given by `option`; writes nothing yet.
-    ///
-    /// # Errors
-    /// One line that names the option and the fault.
     pub(crate) fn new(option: &'static str, file: &Path) -> Result<Self, String> {
         let named = |error: std::io::Error| format!("{option} {}: {error}", file.display());
         let (ended, mut end) = UnixStream::pair().map_err(named)?;
@@ -81,7 +74,6 @@ impl Kept {
         })
     }
 
-    /// Returns true while a write is in progress.
     pub(crate) const fn is_writing(&self) -> bool {
         self.is_writing
     }
@@ -91,12 +83,10 @@ impl Kept {
         !self.failing || self.again_at <= now
     }
 
-    /// Returns the time of the next retry.
     pub(crate) fn wake(&self) -> Option<Instant> {
         (self.failing && !self.is_writing).then_some(self.again_at)
     }
 
-    /// Returns the file descriptor to poll for the end of a write.
     pub(crate) fn fd(&self) -> BorrowedFd<'_> {
         self.ended.as_fd()
     }
@@ -162,17 +152,14 @@ impl Kept {
         is_kept
     }
 
-    /// Returns the number of successful writes.
     pub(crate) const fn writes(&self) -> u64 {
         self.writes
     }
 
-    /// Returns the longest duration of a write, ms.
     pub(crate) fn slowest_ms(&self) -> f64 {
         1e3 * self.slowest.as_secs_f64()
     }
 
-    /// Returns the number of failed writes.
     pub(crate) const fn failures(&self) -> u64 {
         self.failures
     }

@@ -5,7 +5,6 @@ use uav_relay::{Duration, Listen};
 
 use uav_relay_linux::command::number;
 
-/// Options of sensing.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Listening")]
 pub(crate) struct ListenOptions {
@@ -30,7 +29,6 @@ pub(crate) struct ListenOptions {
 }
 
 impl ListenOptions {
-    /// Returns true if the relays listen.
     pub(crate) const fn is_on(&self) -> bool {
         self.listen
     }

@@ -10,7 +10,6 @@ use uav_relay::{Event, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// Name of the command.
 pub(crate) const CLEAR: &str = "clear-lost";
 
 /// Relays that this relay has lost since its start.
@@ -23,7 +22,6 @@ pub(crate) struct Lost {
 }
 
 impl Lost {
-    /// Starts with no relay lost.
     pub(crate) const fn new(index: u16, relays: u16) -> Self {
         Self {
             index,
@@ -32,7 +30,6 @@ impl Lost {
         }
     }
 
-    /// Records an event of the relay.
     pub(crate) fn event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { node, .. } if (1..=self.relays).contains(&node) => {
@@ -45,7 +42,6 @@ impl Lost {
         }
     }
 
-    /// Returns the lost relays.
     pub(crate) const fn nodes(&self) -> &BTreeSet<u16> {
         &self.nodes
     }
@@ -149,7 +145,6 @@ pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> Strin
     )
 }
 
-/// Returns `relay 3 is` or `relays 3, 4 are`.
 fn listed(nodes: impl IntoIterator<Item = u16>) -> String {
     let nodes: Vec<String> = nodes.into_iter().map(|node| node.to_string()).collect();
     match &nodes[..] {

@@ -103,7 +103,7 @@ fn main() -> std::process::ExitCode {
         Err(Refusal { line, is_final }) => {
             uav_relay_linux::command::complain(&line);
             if is_final {
-                // Status 2, as for wrong options, tells the unit not to restart.
+                // Status 2, as for wrong options: the systemd unit does not restart the program.
                 ExitCode::from(2)
             } else {
                 ExitCode::FAILURE

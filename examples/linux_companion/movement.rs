@@ -9,7 +9,6 @@ use uav_relay::{Duration, Instant, Placement, Relay};
 use crate::status::at;
 use uav_relay_linux::log::Log;
 
-/// Minimum change of the setpoint that is logged, m.
 const STEP_M: f32 = 0.5;
 
 /// Maximum distance from the agreed position at arrival, m: autopilots hover up to 0.9 m off their target.
@@ -18,10 +17,8 @@ const NEAR_M: f32 = 1.0;
 /// Time that a setpoint must stay the same, and a drone close to it, at the end of a move: an overshoot is no arrival.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
-/// Line to log.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Step {
-    /// Changed setpoint.
     Setpoint(Placement),
     /// Agreed position that the drone has reached, and its remaining distance, m.
     Arrived(Placement, f32),
@@ -43,7 +40,6 @@ pub(crate) struct Movement {
 }
 
 impl Movement {
-    /// Starts without a setpoint.
     pub(crate) const fn new(is_sparse: bool) -> Self {
         Self {
             is_sparse,

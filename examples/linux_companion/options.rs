@@ -35,8 +35,7 @@ const RADIO: u16 = 12;
 #[derive(Parser, Debug)]
 #[command(name = "linux_companion", version)]
 struct Options {
-    /// TOML file with the scenario, as read by `cargo chain` and `cargo plan`, and the sections `network` and `companion`;
-    /// options of the command line override it
+    /// TOML file with the scenario, and the sections `network` and `companion`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Number of this relay; 1 is next to the transmitter
@@ -152,7 +151,6 @@ pub(crate) enum Ttys {
     Shared(PathBuf),
 }
 
-/// Checked options.
 #[derive(Debug)]
 pub(crate) struct Plan {
     pub(crate) mission: Mission,
@@ -170,7 +168,6 @@ pub(crate) struct Plan {
     pub(crate) overrides: Vec<Override>,
 }
 
-/// Files and key for signing.
 pub(crate) struct Secret {
     pub(crate) key: [u8; 32],
     pub(crate) epoch_file: PathBuf,
@@ -261,7 +258,6 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     })
 }
 
-/// Returns the autopilot's port and the line that it flies along.
 fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     let sites = options.sites.of(options.mission.distance)?;
     let (Some(name), Some(sites)) = (&options.autopilot, sites) else {

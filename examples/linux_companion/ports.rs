@@ -39,7 +39,6 @@ impl SerialPort for End {
     }
 }
 
-/// Ports of a relay.
 #[derive(Debug)]
 pub(crate) enum Ports {
     Pair(Box<Pair<End, End>>),
@@ -48,9 +47,6 @@ pub(crate) enum Ports {
 
 impl Ports {
     /// Opens the ttys. Nothing is sent while `gate` is closed.
-    ///
-    /// # Errors
-    /// One line that names the tty.
     pub(crate) fn open(ttys: &Ttys, baud: u32, gate: &Gate) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
             let tty = path
@@ -75,9 +71,6 @@ impl Ports {
     }
 
     /// Captures all further traffic in a file; returns the file that is written.
-    ///
-    /// # Errors
-    /// One line that names the file.
     pub(crate) fn capture(&mut self, file: &Path) -> Result<PathBuf, String> {
         let (taps, file) = tap::taps(env!("CARGO_BIN_NAME"), file, &self.names())?;
         for (tty, tap) in self.ttys().zip(taps) {
@@ -109,12 +102,10 @@ impl Ports {
             .min()
     }
 
-    /// Returns the options and paths of the ttys.
     pub(crate) fn names(&mut self) -> Vec<String> {
         self.ttys().map(|tty| tty.to_string()).collect()
     }
 
-    /// Returns byte and error counters as JSON.
     pub(crate) fn status(&mut self) -> Value {
         let links = match self {
             Self::Pair(pair) => vec![*pair.upstream.stats(), *pair.downstream.stats()],

@@ -8,26 +8,19 @@ use uav_relay::{Duration, Instant, Placement, Sample};
 use uav_relay_linux::lines::{self, Fifo, LONGEST, POWER};
 use uav_relay_linux::log::Log;
 
-/// Maximum age of a valid position.
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// FIFO and its newest position.
 #[derive(Debug)]
 pub(crate) struct Positions {
     fifo: Fifo,
-    /// True if a line may contain a power.
     listens: bool,
     /// Number of invalid lines.
     bad: u64,
-    /// Newest position and the time of its arrival.
     newest: Option<(Instant, Placement)>,
 }
 
 impl Positions {
     /// Opens the FIFO; `listens` permits lines with a power.
-    ///
-    /// # Errors
-    /// One line that names the fault.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
@@ -70,12 +63,10 @@ impl Positions {
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns the number of invalid lines.
     pub(crate) const fn bad(&self) -> u64 {
         self.bad
     }
 
-    /// Logs the number of invalid lines, if any.
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         if self.bad > 0 {
             log.tell(

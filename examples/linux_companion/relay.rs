@@ -24,7 +24,6 @@ use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::{config, epoch, tap};
 
-/// Relay and everything connected to it.
 struct Flight {
     service: Service,
     report: Report,
@@ -40,10 +39,8 @@ struct Flight {
     signs: bool,
 }
 
-/// Reason why the relay can not start.
 #[derive(Debug)]
 pub(crate) struct Refusal {
-    /// Line for the user.
     pub(crate) line: String,
     /// True if another start fails until somebody changes something; false for a port that may come back.
     pub(crate) is_final: bool,
@@ -59,9 +56,6 @@ impl From<String> for Refusal {
 }
 
 /// Runs the relay until SIGINT or SIGTERM.
-///
-/// # Errors
-/// The reason why it could not start.
 pub(crate) fn fly(plan: &Plan) -> Result<(), Refusal> {
     let mut flight = Flight::begin(plan)?;
     flight.service.ready();
@@ -281,7 +275,6 @@ impl Flight {
     }
 }
 
-/// Returns the signing settings, with a new epoch.
 fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     let Some(secret) = &plan.secret else {
         return Ok(None);

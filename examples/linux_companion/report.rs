@@ -16,7 +16,6 @@ use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
 
-/// Displays an f32 rounded and as its bits.
 struct Exact(f32);
 
 impl fmt::Display for Exact {
@@ -26,7 +25,6 @@ impl fmt::Display for Exact {
     }
 }
 
-/// Writes the log lines of one relay.
 #[derive(Debug)]
 pub(crate) struct Report {
     log: Log,
@@ -34,7 +32,6 @@ pub(crate) struct Report {
     /// Number of loaded relays; nodes keep their numbers when some are lost.
     relays: u16,
     digest: u16,
-    /// Geofence of the setpoints, if there is a guard.
     fence: Option<Geofence>,
     movement: Movement,
 }
@@ -201,7 +198,6 @@ impl Report {
             .say(now, "refused", json!({ "range_m": range }), what);
     }
 
-    /// Logs an event about another node.
     fn of_a_node(&self, now: Instant, event: Event, relay: &Relay) {
         let (node, side) = match event {
             Event::NeighbourLost { side, node } | Event::NeighbourBack { side, node } => {
@@ -352,7 +348,6 @@ impl Report {
         );
     }
 
-    /// Logs the new estimate of the interference.
     fn believed(&self, now: Instant, told: Told) {
         let tell = |text: fmt::Arguments<'_>| self.log.tell(now, "believed", text);
         match told.belief {

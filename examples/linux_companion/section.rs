@@ -4,7 +4,6 @@ use uav_relay_scenario::deployment::Deployment;
 
 use uav_relay_linux::config::{Given, network};
 
-/// Adds the `[network]` and `[companion]` sections.
 pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
     network(deployment, given);
     let own = &deployment.companion;

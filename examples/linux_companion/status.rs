@@ -7,7 +7,6 @@ use uav_relay_linux::counters::counted;
 use crate::lost::Lost;
 use crate::waits;
 
-/// Returns a position, m, as JSON.
 pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }

@@ -12,13 +12,9 @@ use uav_relay::{Instant, Mission, Upload};
 use crate::kept::Kept;
 use uav_relay_linux::log::Log;
 
-/// Length of the file, bytes.
 const STORED: usize = Upload::LENGTH + 4;
 
 /// Loads the mission uploaded to relays that were configured with `mission`; `None` if there is no `file`.
-///
-/// # Errors
-/// One line that names the file and the fault.
 pub(crate) fn load(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
     let named = |error: &str| format!("--upload-file {}: {error}", file.display());
     let bytes = match std::fs::read(file) {
@@ -42,20 +38,15 @@ fn parse(bytes: &[u8]) -> Option<Upload> {
     Upload::decode(upload).filter(|_| *check == sum(upload))
 }
 
-/// Uploaded mission that is stored in flight.
 #[derive(Debug)]
 pub(crate) struct Uploads {
     kept: Kept,
     unstored: Option<[u8; STORED]>,
-    /// Content being written.
     writing: Option<[u8; STORED]>,
 }
 
 impl Uploads {
     /// Starts the writer thread; writes nothing yet.
-    ///
-    /// # Errors
-    /// One line that names the fault.
     pub(crate) fn new(file: &Path) -> Result<Self, String> {
         Ok(Self {
             kept: Kept::new("--upload-file", file)?,
@@ -90,12 +81,10 @@ impl Uploads {
         self.kept.wake()
     }
 
-    /// Returns the state of the file.
     pub(crate) const fn kept(&self) -> &Kept {
         &self.kept
     }
 
-    /// Waits at most 0.5 s for a write in progress, at exit.
     pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
         self.kept.finish(now, log);
     }

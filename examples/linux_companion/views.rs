@@ -16,11 +16,9 @@ use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--view-file";
 
-/// View record and its file.
 pub(crate) struct Views {
     kept: Option<Kept>,
     stored: Option<ViewRecord>,
-    /// Record being written.
     writing: Option<ViewRecord>,
     /// Record of the last write, successful or not.
     tried: Option<ViewRecord>,
@@ -84,12 +82,10 @@ impl Views {
         self.gate.set(is_stored || is_tried);
     }
 
-    /// Returns the state of the file, if there is one.
     pub(crate) const fn kept(&self) -> Option<&Kept> {
         self.kept.as_ref()
     }
 
-    /// Waits at most 0.5 s for a write in progress, at exit.
     pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
         if let Some(kept) = &mut self.kept {
             kept.finish(now, log);
@@ -97,7 +93,6 @@ impl Views {
     }
 }
 
-/// Returns the refusal for a record that the relay rejects.
 pub(crate) fn refused(file: Option<&Path>, error: RecordError) -> Refusal {
     let what = match error {
         RecordError::Base => format!(

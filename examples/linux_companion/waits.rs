@@ -63,7 +63,6 @@ impl Waits {
     }
 }
 
-/// Returns a reason in one word, for programs.
 pub(crate) const fn word(reason: HoldReason) -> &'static str {
     match reason {
         HoldReason::Unheard => "unheard",

@@ -8,7 +8,6 @@ use uav_relay_linux::site::degrees;
 use crate::forecast::Move;
 use crate::new::Basis;
 
-/// Logs each value that differs.
 pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
     let pairs = values(before).into_iter().zip(values(after));
     let mut is_same = true;
@@ -66,7 +65,6 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Logs the distance that each relay moves.
 pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
         let what = "cannot be computed in advance, since the relays measure the interference or find no positions";

@@ -13,7 +13,6 @@ use uav_relay::{
 /// Latency of a frame between simulated relays, µs.
 const TURN_US: u64 = 1_000;
 
-/// Maximum computing time.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Mission loaded into the relays, as needed for a forecast.
@@ -21,11 +20,9 @@ const PATIENCE: Duration = Duration::from_secs(10);
 pub(crate) struct Loaded {
     pub(crate) mission: Mission,
     pub(crate) method: Method,
-    /// Profiles of single relays, with their indices.
     pub(crate) profiles: Vec<(u16, Profile)>,
 }
 
-/// Frame in transit.
 struct Letter {
     to: usize,
     port: Port,
@@ -118,7 +115,6 @@ pub(crate) struct Move {
     pub(crate) index: u16,
     pub(crate) before: Placement,
     pub(crate) after: Placement,
-    /// Distance between the positions, m.
     pub(crate) metres: f64,
 }
 

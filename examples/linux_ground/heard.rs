@@ -18,7 +18,6 @@ enum State {
     Lost,
 }
 
-/// States of all such relays.
 #[derive(Debug, Default)]
 pub(crate) struct Hearing(BTreeMap<u16, State>);
 
@@ -48,7 +47,6 @@ impl Hearing {
         ends.min()
     }
 
-    /// Returns the relays that are not lost.
     pub(crate) fn nodes(&self) -> Vec<u16> {
         let heard = self.0.iter().filter(|(_, state)| **state != State::Lost);
         heard.map(|(node, _)| *node).collect()

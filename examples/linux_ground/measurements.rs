@@ -17,7 +17,6 @@ const OPTION: &str = "--measurements";
 /// Polling period of a file, because poll(2) does not report changes of a file.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// Maximum number of datagrams read by one call.
 const READS: usize = 16;
 
 /// Length of the end of a file that is read, bytes: the last line and the one before.
@@ -29,7 +28,6 @@ const EVERY: Duration = Duration::from_millis(500);
 /// Silence after which missing measurements are logged.
 const SILENCE: Duration = Duration::from_millis(60_000);
 
-/// Source of lines.
 #[derive(Debug)]
 enum Source {
     Fifo(Fifo),
@@ -45,7 +43,6 @@ struct Watched {
     look_at: Instant,
 }
 
-/// Measurements of one end of the chain.
 #[derive(Debug)]
 pub(crate) struct Measurements {
     source: Source,
@@ -64,9 +61,6 @@ pub(crate) struct Measurements {
 
 impl Measurements {
     /// Opens the FIFO, the file or the socket `name`.
-    ///
-    /// # Errors
-    /// One line that names the source and the fault.
     pub(crate) fn open(name: &str, end: Side) -> Result<Self, String> {
         let named = |error: &str| format!("{OPTION} {name}: {error}");
         let path = Path::new(name);
@@ -182,7 +176,6 @@ impl Measurements {
         );
     }
 
-    /// Returns the time of the next call.
     pub(crate) fn wake(&self) -> Option<Instant> {
         let look = match &self.source {
             Source::File(file) => Some(file.look_at),
@@ -194,7 +187,6 @@ impl Measurements {
         [look, next, silent].into_iter().flatten().min()
     }
 
-    /// Returns the file descriptor to poll, if there is one.
     pub(crate) fn fd(&self) -> Option<BorrowedFd<'_>> {
         match &self.source {
             Source::Fifo(fifo) => Some(fifo.fd()),
@@ -203,7 +195,6 @@ impl Measurements {
         }
     }
 
-    /// Returns the state and the counters as JSON.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from": self.name,
@@ -260,7 +251,6 @@ fn socket(address: &str) -> std::io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// Returns the name of an end of the chain.
 pub(crate) const fn name(end: Side) -> &'static str {
     match end {
         Side::Upstream => "transmitter",

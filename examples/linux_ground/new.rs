@@ -68,7 +68,6 @@ const FAR_M: f64 = 100_000.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
     pub(crate) config: MissionConfig,
-    /// Sites of the line that is flown, if known.
     pub(crate) line: Option<Sites>,
     /// Upload of this mission; `None` for the loaded mission.
     pub(crate) upload: Option<Upload>,
@@ -96,9 +95,6 @@ impl Basis {
 
 impl NewOptions {
     /// Returns the upload that replaces `basis` at relays loaded with `loaded`, between the sites `sited` if given.
-    ///
-    /// # Errors
-    /// One line that names the option and the fault.
     pub(crate) fn upload(
         &self,
         version: u16,
@@ -200,9 +196,6 @@ impl NewOptions {
 }
 
 /// Refuses a line far from the present one, because the drones there would have no position along it.
-///
-/// # Errors
-/// The distance, the limit, and whether latitude and longitude look swapped.
 fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
@@ -232,9 +225,9 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     ))
 }
 
-/// Returns the largest turn t of the line, degrees, that keeps the order of relays at minimum separation despite position errors
-/// of 1 m.
+/// Returns the largest turn t of the line, degrees, that keeps the relays in order despite position errors of 1 m.
 ///
+/// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
 /// For the separation s and the width w of the lateral range it solves s cos t - w sin t = min(2 m, s / 2).
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (

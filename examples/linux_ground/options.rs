@@ -26,8 +26,7 @@ use crate::new::{Basis, NewOptions};
 #[command(name = "linux_ground", version, disable_version_flag = true)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
 struct Options {
-    /// TOML file with the scenario loaded into the relays, and the sections `network` and `ground`; options of the command line
-    /// override it
+    /// TOML file with the loaded scenario, and the sections `network` and `ground`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Tty toward the relay next to this end of the chain
@@ -48,8 +47,8 @@ struct Options {
     /// File with the network's key, 64 hexadecimal digits
     #[arg(long, value_name = "FILE")]
     key_file: PathBuf,
-    /// File with the epoch, a number increased at every start; created if missing; it must never go back, and must not be shared
-    /// with a relay
+    /// File with the epoch, increased at every start; created if missing. It must never go back, and must not be shared with a
+    /// relay
     #[arg(long, value_name = "FILE")]
     epoch_file: PathBuf,
     /// Version of the new mission, 1 to 65535: larger than that of every earlier upload. As the last word, without V, it prints
@@ -80,8 +79,8 @@ struct Options {
     /// Upload without confirmation; required if standard input is no terminal
     #[arg(long, requires = "version")]
     yes: bool,
-    /// Also upload missions outside the geofence of --altitude, --band, --lateral-min-m, --lateral-max-m and --distance: for
-    /// relays without a drone, which have no geofence. Relays that fly a drone refuse them
+    /// Also upload missions outside the geofence, for relays without a drone, which have none. It is that of --altitude, --band,
+    /// --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
     no_fence: bool,
     /// Take values that are not given from the loaded mission instead of the flown one
@@ -127,7 +126,6 @@ enum Method {
     Adjust,
 }
 
-/// Upload as described by the command line.
 #[derive(Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
 pub(crate) struct Change {
@@ -135,7 +133,6 @@ pub(crate) struct Change {
     new: NewOptions,
     pub(crate) sited: Option<Sites>,
     pub(crate) dry_run: bool,
-    /// True if no confirmation is needed.
     pub(crate) yes: bool,
     pub(crate) no_fence: bool,
     pub(crate) from_loaded: bool,
@@ -143,15 +140,11 @@ pub(crate) struct Change {
 
 impl Change {
     /// Returns the upload that replaces `basis`.
-    ///
-    /// # Errors
-    /// One line that names the option and the fault.
     pub(crate) fn upload(&self, loaded: &Mission, basis: &Basis) -> Result<Upload, String> {
         self.new.upload(self.version, loaded, self.sited, basis)
     }
 }
 
-/// Checked options.
 pub(crate) struct Plan {
     pub(crate) tty: PathBuf,
     pub(crate) baud: u32,

@@ -36,7 +36,6 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     );
 }
 
-/// Logs the progress of the upload.
 pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progress) {
     let (version, all) = (upload.version(), upload.config().relays);
     match progress {
@@ -235,7 +234,6 @@ fn why(plan: &Plan, stats: &Stats) -> String {
     }
 }
 
-/// Logs that a relay is heard, or no longer answers.
 pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let fields = json!({ "node": node });
     if is_heard {

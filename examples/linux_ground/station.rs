@@ -21,10 +21,8 @@ use crate::options::Plan;
 use crate::report;
 use crate::uploading::{Fault, Over, Uploading};
 
-/// Maximum number of buffers read by one call.
 const READS: usize = 64;
 
-/// Ground station and everything connected to it.
 struct Station<'a> {
     plan: &'a Plan,
     service: Service,
@@ -101,7 +99,6 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// Runs the loop once.
     fn turn(&mut self) -> Over {
         let time = self.service.now();
         let log = &self.service.log;
@@ -129,7 +126,6 @@ impl<'a> Station<'a> {
         self.sleep(wake.min())
     }
 
-    /// Exchanges bytes and forwards a measurement.
     fn exchange(&mut self, time: Instant) {
         let Self { ground, tty, .. } = self;
         let mut bytes = [0; 256];
@@ -149,7 +145,6 @@ impl<'a> Station<'a> {
         self.send();
     }
 
-    /// Writes as much as the port accepts.
     fn send(&mut self) {
         let Self { ground, tty, .. } = self;
         loop {
@@ -275,7 +270,6 @@ fn answered() -> String {
     }
 }
 
-/// Returns the upload and its progress as JSON.
 fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
     let Some(upload) = upload else {
         return Value::Null;

@@ -23,7 +23,6 @@ use crate::report;
 /// Time that a relay has to send the values of its mission.
 const VALUES: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
 
-/// Reason of a failure in one line, and the exit status.
 #[derive(Debug)]
 pub(crate) struct Fault {
     pub(crate) line: String,
@@ -48,7 +47,6 @@ enum Stage {
     Over(Option<Box<Upload>>),
 }
 
-/// Upload in progress.
 #[derive(Debug)]
 pub(crate) struct Uploading {
     stage: Stage,
@@ -68,7 +66,6 @@ impl Uploading {
         }
     }
 
-    /// Returns the time of the next turn at the latest.
     pub(crate) fn wake(&self) -> Option<Instant> {
         let values = match self.stage {
             Stage::Asking(since) => since.map(|since| since + VALUES),
@@ -77,7 +74,6 @@ impl Uploading {
         self.late_at.into_iter().chain(values).min()
     }
 
-    /// Returns true while a confirmation is awaited.
     pub(crate) const fn is_confirming(&self) -> bool {
         matches!(self.stage, Stage::Confirming(_))
     }

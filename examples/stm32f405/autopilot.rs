@@ -40,15 +40,12 @@ const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
 
-/// UART before its interrupt is enabled.
 pub(crate) type Uart = Serial<USART1>;
 
-/// Configures the UART.
 pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, apb2_hz: u32, rcc: &mut Rcc) -> Option<Uart> {
     Serial::new(usart, (tx, rx), port::config(apb2_hz), rcc).ok()
 }
 
-/// Autopilot link and its port.
 pub(crate) struct Autopilot {
     link: Link,
     /// Sites of the block, and sites of the line that is flown.

@@ -8,15 +8,12 @@ use uav_relay_chip::registers::Chip;
 use uav_relay_chip::reset::Reset;
 use uav_relay_chip::watchdog;
 
-/// Longest sleep of the main loop.
 const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
 const LATE: Duration = Duration::from_millis(watchdog::LATE_MS);
 
-/// True if the watchdog has restarted the chip.
 static WAS_HUNG: AtomicBool = AtomicBool::new(false);
 
-/// Clocks and reset cause at the start.
 pub(crate) struct Begun {
     pub(crate) clocks: Clocks,
     #[cfg_attr(not(feature = "defmt"), expect(dead_code, reason = "it is logged"))]
@@ -39,7 +36,6 @@ pub(crate) fn was_hung() -> bool {
     WAS_HUNG.load(Ordering::Relaxed)
 }
 
-/// Feeds the watchdog.
 pub(crate) fn feed() {
     watchdog::feed(&mut Chip);
 }

@@ -18,7 +18,6 @@ static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 /// True if bytes have arrived since the main loop's last sleep.
 static INPUT: AtomicBool = AtomicBool::new(false);
 
-/// Monotonic clock.
 pub(crate) struct Clock {
     last: Instant,
 }
@@ -62,12 +61,10 @@ impl Clock {
     }
 }
 
-/// Wakes the main loop after an input.
 pub(crate) fn wake() {
     INPUT.store(true, Ordering::Relaxed);
 }
 
-/// Returns the microseconds since the start.
 pub(crate) fn micros() -> u64 {
     let (ticks, count) = free(|cs| {
         let ticks = TICKS.borrow(cs).get();

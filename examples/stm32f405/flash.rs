@@ -15,24 +15,19 @@ use super::uploads;
 #[derive(Clone, Copy)]
 struct Sector(u32);
 
-/// Two sectors of a journal.
 #[derive(Clone, Copy)]
 pub(crate) struct Sectors([Sector; 2]);
 
-/// Sectors of the votes on views.
 pub(crate) const VIEWS: Sectors = Sectors::at(views::SECTORS);
 
-/// Sectors of the epoch.
 #[cfg(feature = "auth")]
 pub(crate) const EPOCHS: Sectors = Sectors::at(epoch::SECTORS);
 
-/// Sectors of uploads.
 #[cfg(feature = "upload")]
 pub(crate) const UPLOADS: Sectors = Sectors::at(uploads::SECTORS);
 
 const KIB: u32 = 1024;
 
-/// Address of the flash, and of the first large sector.
 const FLASH_START: u32 = 0x0800_0000;
 const LARGE: u32 = FLASH_START + 128 * KIB;
 
@@ -45,7 +40,6 @@ impl Sectors {
         self.0.get(sector).copied()
     }
 
-    /// Returns the words of a sector.
     #[inline(never)] // small, and called often
     fn all(&self, sector: usize) -> &[u32] {
         self.get(sector).map_or(&[], Sector::words)
@@ -86,7 +80,6 @@ impl Sector {
         bytes as usize / 4
     }
 
-    /// Returns the words of this sector.
     const fn words<'a>(self) -> &'a [u32] {
         // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors` that is
         // borrowed while the slice lives.

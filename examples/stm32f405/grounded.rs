@@ -9,7 +9,6 @@ use uav_relay::{Event, Instant, Mission, Relay};
 use super::config::Sites;
 use super::log;
 
-/// Placeholder of the UART.
 pub(crate) struct Uart;
 
 #[expect(

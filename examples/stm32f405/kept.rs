@@ -25,7 +25,6 @@ pub(crate) fn resume_upload(relay: &mut Relay) {
     }
 }
 
-/// Stores the mission just uploaded to `relay`.
 #[cfg(feature = "upload")]
 #[inline(never)]
 pub(crate) fn keep_upload(relay: &Relay) {
@@ -39,7 +38,6 @@ fn uploads() -> Journal<Sectors> {
     Journal::new(flash::UPLOADS, uploads::WORDS, block())
 }
 
-/// Votes of the relay.
 pub(crate) struct Views(views::Views);
 
 impl Views {

@@ -36,7 +36,6 @@ pub(crate) fn begins(config: &Config) {
     );
 }
 
-/// Logs the cause of the last reset, and the clocks.
 pub(crate) fn started(begun: &Begun) {
     match begun.reset {
         Reset::Watchdog => {
@@ -97,7 +96,6 @@ pub(crate) fn cannot_sign_to_autopilot() {
     );
 }
 
-/// Logs an event of the autopilot link.
 #[cfg(feature = "flight")]
 pub(crate) fn autopilot(event: AutopilotEvent) {
     match event {

@@ -91,7 +91,6 @@ fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
     Some((clock, links, uart))
 }
 
-/// Serial links to both neighbours.
 #[cfg(target_os = "none")]
 type Links = uav_relay::serial::Pair<port::Port, port::Port>;
 

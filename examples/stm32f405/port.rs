@@ -22,14 +22,11 @@ pub(crate) const RECEIVED: usize = 128;
 /// Capacity of the send queue, bytes: more than the longest frame, so that the main loop can sleep meanwhile.
 pub(crate) const OUTGOING: usize = 256;
 
-/// Queues between the interrupt and the main loop.
 pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> =
     ByteQueues<IN, OUT>;
 
-/// Main loop's end of a port.
 pub(crate) type Port = QueuedPort<'static, Serves>;
 
-/// Interrupt that serves a port.
 pub(crate) struct Serves(Interrupt);
 
 impl Pend for Serves {
@@ -38,13 +35,11 @@ impl Pend for Serves {
     }
 }
 
-/// UART and queue end of a port's interrupt.
 pub(crate) struct Served<U: Instance> {
     uart: Serial<U>,
     end: InterruptEnd<'static>,
 }
 
-/// Static place of an interrupt's data.
 pub(crate) type Slot<U> = Mutex<RefCell<Option<Served<U>>>>;
 
 impl<U: Instance> Served<U> {
@@ -90,7 +85,6 @@ pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     port
 }
 
-/// Handles the interrupt of a port.
 pub(crate) fn serve<U: Instance>(slot: &Slot<U>) {
     free(|cs| {
         if let Ok(mut served) = slot.borrow(cs).try_borrow_mut()

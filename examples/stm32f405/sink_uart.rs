@@ -25,7 +25,6 @@ struct Log {
     frame: Frame,
     /// True if the frame exceeds its buffer.
     cut: bool,
-    /// Number of dropped frames.
     lost: u32,
 }
 
@@ -38,7 +37,6 @@ static LOG: Mutex<RefCell<Log>> = Mutex::new(RefCell::new(Log {
     lost: 0,
 }));
 
-/// Opens the port of the log.
 pub(crate) fn start(uart: Serial<UART4>) {
     let Some(queues) = singleton!(QUEUES: Queues<ROOM, RECEIVED> = Queues::new()) else {
         return;
@@ -61,7 +59,6 @@ pub(crate) fn asked() -> bool {
     asked
 }
 
-/// Returns the number of dropped frames.
 pub(crate) fn lost() -> u32 {
     let mut lost = 0;
     with(|log| lost = log.lost);
@@ -83,7 +80,6 @@ pub(crate) fn begin() {
     });
 }
 
-/// Appends bytes to the frame.
 pub(crate) fn write(bytes: &[u8]) {
     with(|log| {
         let Log {

@@ -13,13 +13,11 @@ use super::drone::Drone;
 use super::kept;
 use super::log;
 
-/// Serial links of either wiring.
 pub(crate) trait Links {
     /// Exchanges bytes between the ports and the relay, and stores its votes between receiving and sending. Returns the time of
     /// the next call.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
-    /// Logs the counters of each link.
     fn log_counters(&self);
 }
 
@@ -46,7 +44,6 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     }
 }
 
-/// Runs the main loop for good.
 pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -> ! {
     loop {
         let now = clock.now();

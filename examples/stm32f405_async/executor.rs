@@ -61,7 +61,6 @@ pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl 
     }
 }
 
-/// Returns a waker of the only task.
 fn waker() -> Waker {
     const WAKES: RawWakerVTable = RawWakerVTable::new(
         |_| RawWaker::new(core::ptr::null(), &WAKES),

@@ -72,7 +72,6 @@ fn main() -> ! {
     fly(clock, upstream, downstream, drone)
 }
 
-/// Runs the relay for good.
 #[cfg(target_os = "none")]
 fn fly(
     clock: clock::Clock,

@@ -16,16 +16,13 @@ use super::port::Port;
 /// Pause before the next attempt on a full port; 11 bytes leave meanwhile.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Reading half.
 pub(crate) struct Rx<'p>(&'p RefCell<Port>);
 
-/// Writing half.
 pub(crate) struct Tx<'p> {
     port: &'p RefCell<Port>,
     time: &'p Time,
 }
 
-/// Splits a port into both halves.
 pub(crate) const fn halves<'p>(port: &'p RefCell<Port>, time: &'p Time) -> (Rx<'p>, Tx<'p>) {
     (Rx(port), Tx { port, time })
 }

@@ -78,7 +78,6 @@ fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
     Some((clock, channel, uart))
 }
 
-/// Link to the radio, with its driver-enable pin.
 #[cfg(target_os = "none")]
 type Channel = uav_relay::serial::Shared<port::Port, radio::DriverEnable>;
 

@@ -23,7 +23,6 @@ use super::port::{self, Port, Queues, Slot};
 
 static RADIO: Slot<USART2> = Mutex::new(RefCell::new(None));
 
-/// Driver-enable pin, high while this relay sends.
 pub(crate) type DriverEnable = PA1<Output>;
 
 /// Sets up the board, once: clock, radio port, driver-enable pin, and the UART of the autopilot.

@@ -83,7 +83,6 @@ impl Clocks {
     }
 }
 
-/// Input frequency of the PLL, Hz.
 const PLL_INPUT_HZ: u32 = 2_000_000;
 
 /// PLL settings for a core frequency.
@@ -281,7 +280,6 @@ mod tests {
     use super::{Clocks, NUCLEO_F446RE, Plan, STM32F405, Source, probe, start};
     use crate::mock::{Block, Faults};
 
-    /// Returns every combination of faults.
     fn all() -> impl Iterator<Item = Faults> {
         (0..1_u32 << Faults::BITS)
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
@@ -343,7 +341,6 @@ mod tests {
         assert_eq!(start(&mut block, &none).pll, Some(Source::Internal));
     }
 
-    /// After a probe the HSI is on and the PLL off.
     #[test]
     fn a_probe_leaves_the_hsi() {
         for plan in [STM32F405, NUCLEO_F446RE] {

@@ -28,7 +28,6 @@ const START_POLLS: u32 = 200_000;
 const DIVISOR: u32 = 31;
 const DIVIDED: u32 = DIVISOR << 16;
 
-/// Edges between two captures.
 const EDGES: u32 = 8;
 
 /// RCC_APB2ENR, TIM11EN.

@@ -11,7 +11,7 @@ use crate::registers::{Register, Registers};
 #[expect(clippy::struct_excessive_bools, reason = "each fails by itself")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Faults {
-    /// All registers read 0, as in the emulator.
+    /// Makes all registers read 0, as in the emulator.
     pub(crate) hsi_hidden: bool,
     pub(crate) crystal_dead: bool,
     pub(crate) timer_dead: bool,
@@ -52,7 +52,6 @@ impl Faults {
     }
 }
 
-/// Mock register block.
 #[derive(Default)]
 pub(crate) struct Block {
     values: BTreeMap<Register, u32>,
@@ -236,7 +235,7 @@ impl Registers for Block {
         }
     }
 
-    /// Only the timer changes between reads, so that other waits need one read.
+    /// Reads once where the chip's state can not change; only the timer changes between reads.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

@@ -18,7 +18,7 @@ pub enum Reset {
     Software,
     /// Watchdog not fed: the relay's loop hung, or its clock stopped.
     Watchdog,
-    /// No known cause, or an emulator.
+    /// Unknown cause, or an emulator.
     #[default]
     Unknown,
 }

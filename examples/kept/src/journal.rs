@@ -76,12 +76,10 @@ pub enum WhenFull {
 #[derive(Debug)]
 pub struct Journal<F> {
     flash: F,
-    /// Length of a record, words.
     words: usize,
     key: u32,
 }
 
-/// Content of a sector.
 #[derive(Clone, Copy)]
 struct Found {
     newest: Option<Newest>,

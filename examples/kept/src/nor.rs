@@ -6,7 +6,6 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::journal::{BLANK, Flash};
 
-/// Bytes of a word.
 const WORD: usize = 4;
 
 /// Words per read or write: a driver call costs more than a word, and some flashes write a whole page each time.

@@ -52,7 +52,7 @@ pub enum Refused {
     Block(ConfigError),
     /// Key without a flash for the epoch.
     NoFlash,
-    /// No epoch left after the last one.
+    /// Last epoch already used.
     NoEpoch,
     /// Sites without a port to an autopilot.
     NoAutopilot,
@@ -62,7 +62,6 @@ pub enum Refused {
     Setup(SetupError),
 }
 
-/// Relay, its votes, and the autopilot of a drone with sites.
 #[derive(Debug)]
 pub(crate) struct Drone<F> {
     pub(crate) relay: &'static mut Relay,
@@ -72,9 +71,6 @@ pub(crate) struct Drone<F> {
 }
 
 /// Creates the drone of a board, with its relay in `room`; `flies` is true if there is a port to an autopilot.
-///
-/// # Errors
-/// The reason why it takes no part.
 pub(crate) fn begin<F: NorFlash>(
     room: &'static mut Room,
     mut board: Board<F>,

@@ -12,7 +12,6 @@ use uav_relay_chip::reset::Reset;
 
 use crate::drone::Refused;
 
-/// Logs the cause of the last reset.
 pub(crate) fn started(reset: Reset) {
     match reset {
         Reset::Watchdog => error!("started by the watchdog: the loop hung, or the clock stopped"),

@@ -183,7 +183,6 @@ where
 /// Returns a seed from the chip's unique number, because the chip has no random number generator.
 fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
-    // FNV-1a.
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
     words.into_iter().fold(0x811C_9DC5, step)
 }

@@ -37,7 +37,6 @@ bind_interrupts!(
     }
 );
 
-/// Size of the flash, bytes.
 const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
 /// Flash driver of the board.
@@ -66,7 +65,6 @@ impl Guard {
     }
 }
 
-/// Time from the last feeding to the reset.
 const TIMEOUT: Duration = Duration::from_millis(6_000);
 
 /// Creates the board, with a seed from its random number generator.

@@ -45,7 +45,6 @@ bind_interrupts!(
     }
 );
 
-/// Address of the flash.
 const FLASH_START: u32 = 0x0800_0000;
 
 const KIB: u32 = 1024;
@@ -114,7 +113,6 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     )
 }
 
-/// Returns the offsets of the sector at `address`.
 const fn sector(address: u32, bytes: u32) -> Range<u32> {
     let start = address - FLASH_START;
     start..start + bytes
@@ -187,7 +185,6 @@ where
 /// Returns a seed from the chip's unique number, because the random number generator's clock, PLLQ, is not set up here.
 fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
-    // FNV-1a.
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
     words.into_iter().fold(0x811C_9DC5, step)
 }

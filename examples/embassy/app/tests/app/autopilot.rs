@@ -9,13 +9,12 @@ use crate::bench::{Bench, SITES, alone, block_alone, refused_with_autopilot};
 use crate::ram::Ram;
 use crate::vehicle::Vehicle;
 
-/// Returns the distance of two positions, m.
 fn apart(a: Placement, b: Placement) -> f32 {
     let apart = [a.x_m - b.x_m, a.y_m - b.y_m, a.altitude_m - b.altitude_m];
     apart.map(|part| part * part).iter().sum::<f32>().sqrt()
 }
 
-/// On the ground it gets no target, in the pilot's hands its own position; engaged it flies to its relay's position within the
+/// A drone on the ground gets no target, in its pilot's hands its own position; engaged it flies to its relay's position.
 /// speed limit.
 #[test]
 fn a_drone_with_sites_is_flown_to_its_place_and_released() {
@@ -75,7 +74,6 @@ fn sites_of_another_mission_are_refused() {
     );
 }
 
-/// The autopilot's port does not disturb those of the neighbours.
 #[test]
 fn a_chain_agrees_beside_an_autopilot() {
     let mut bench = Bench::with(Vehicle::new(Placement::on_line(100.0, 20.0)));

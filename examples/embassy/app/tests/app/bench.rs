@@ -32,7 +32,6 @@ pub(crate) const KEY: [u8; 32] = [7; 32];
 /// Lock of the mock clock, which all tests share.
 static CLOCK: Mutex<()> = Mutex::new(());
 
-/// One direction of a wire.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipe(Rc<RefCell<VecDeque<u8>>>);
 
@@ -74,7 +73,6 @@ impl Pipe {
     }
 }
 
-/// Driver-enable pin without effect.
 struct Enable;
 
 impl PinType for Enable {
@@ -91,7 +89,6 @@ impl OutputPin for Enable {
     }
 }
 
-/// Future of the application.
 type Running = Pin<Box<dyn Future<Output = Result<Infallible, Refused>>>>;
 
 pub(crate) struct Bench {
@@ -114,7 +111,6 @@ fn numbers() -> ChannelNumbers {
     }
 }
 
-/// Returns the configuration of relay `index` of `relays`.
 fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
     let common = Profile {
         altitude_m: 20.0,
@@ -193,7 +189,6 @@ pub(crate) fn refused(board: Board<Ram>) -> Refused {
     why(board, None)
 }
 
-/// Returns the reason why a board with a port to an autopilot is refused.
 pub(crate) fn refused_with_autopilot(board: Board<Ram>) -> Refused {
     why(board, Some((Pipe::default(), Pipe::default())))
 }
@@ -216,7 +211,6 @@ thread_local! {
     pub(crate) static FED: RefCell<Vec<Instant>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Returns the watchdog's feeding function.
 fn feed() -> impl FnMut() {
     || FED.with_borrow_mut(|fed| fed.push(EmbassyClock.now()))
 }
@@ -287,7 +281,6 @@ impl Bench {
         });
     }
 
-    /// Creates the bench with a vehicle at the application's third port.
     pub(crate) fn with(vehicle: Vehicle) -> Self {
         Self {
             vehicle: Some(vehicle),
@@ -299,7 +292,6 @@ impl Bench {
         self.vehicle.as_mut().unwrap()
     }
 
-    /// Switches the drone off.
     pub(crate) fn switch_off(&mut self) {
         self.drone = None;
     }

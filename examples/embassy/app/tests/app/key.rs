@@ -14,7 +14,6 @@ use crate::ram::Ram;
 /// Silence after which a neighbour is lost, with a margin, ms.
 const LOST: u32 = 25_000;
 
-/// Returns the epoch in the flash.
 fn epoch(flash: &Ram) -> Option<u32> {
     let storage = flash.storage();
     let flash = Nor::new(storage.flash, storage.epochs);

@@ -8,7 +8,6 @@ use uav_relay::{Geodetic, Placement};
 
 use crate::bench::{Pipe, SITES};
 
-/// Distance flown in a millisecond, m.
 const STEP_M: f32 = 0.008;
 
 pub(crate) struct Vehicle {
@@ -45,13 +44,11 @@ impl Vehicle {
         }
     }
 
-    /// Returns the relay's reader and writer.
     pub(crate) fn port(&self) -> (Pipe, Pipe) {
         let [to, from] = self.uart.clone();
         (to, from)
     }
 
-    /// Advances by a millisecond.
     pub(crate) fn step(&mut self) {
         self.millis += 1;
         self.hear();

@@ -7,7 +7,6 @@ use uav_relay_kept::views::{WORDS, log, record};
 use crate::bench::{Bench, block_of_three};
 use crate::ram::Ram;
 
-/// Returns the last record of this block in the flash.
 fn newest(flash: &Ram) -> Option<ViewRecord> {
     let storage = flash.storage();
     let check = u32::from_le_bytes(*block_of_three().last_chunk().unwrap());

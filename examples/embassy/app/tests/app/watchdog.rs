@@ -31,7 +31,6 @@ fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
-/// The operator is informed on the ground station.
 #[test]
 fn the_operator_is_told_that_it_restarted_the_relay() {
     for (reset, told) in [(Reset::Watchdog, true), (Reset::Power, false)] {
