@@ -10,7 +10,7 @@ use uav_relay::planning::single::{free, given_altitude, given_x};
 use super::counter::instructions;
 use super::missions::{HIGH, MISSION, WIDE};
 
-/// Measures the theorems with a band of altitudes, and the search for the fewest relays that meet a target.
+/// Measures the theorems with a band of altitudes, and the search for the fewest relays for a target.
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));

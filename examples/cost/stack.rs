@@ -14,7 +14,7 @@ use uav_relay::Settings;
 use super::counter::relay;
 use super::missions::mission;
 
-/// Measures the maximum stack use of a relay's calls, bytes: paints the stack below and looks for the paint.
+/// Measures the maximum stack use of a relay's calls, bytes, by the paint that is left below.
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);
     let mut head = relay(1, Settings::default(), TWO);

@@ -39,7 +39,7 @@ pub(crate) fn reach() {
     reach_in_noise();
 }
 
-/// Measures the same hops in noise, from 1e-4 to 100 times the interferer's received power at a distance of 100 m.
+/// Measures the same hops with noise of 1e-4 to 100 times the interference 100 m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -168,7 +168,7 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the largest portion of the leader's prediction for a hundred relays, and counts the portions.
+/// Measures the largest portion of the leader's prediction for a hundred relays; counts the portions.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

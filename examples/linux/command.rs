@@ -8,7 +8,7 @@ use uav_relay_scenario::deployment::Deployment;
 
 use crate::config::{self, Beyond, Given};
 
-/// Parses the command line and the file named by `--config`; `section` adds the program's own section of that file.
+/// Parses the command line and the file named by `--config`. `section` adds the program's own section of that file.
 ///
 /// # Errors
 /// The exit status after `--help` or a mistake, which has been printed.
@@ -25,7 +25,7 @@ pub fn read<T: Parser>(section: fn(&Deployment, &mut Given)) -> Result<(T, Beyon
     Ok((options, beyond))
 }
 
-/// Extracts clap's first paragraph and the suggested spelling; the other tips and the usage are dropped.
+/// Extracts clap's first paragraph and the suggested spelling. The other tips and the usage are dropped.
 fn first(text: &str) -> String {
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();

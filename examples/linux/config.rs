@@ -32,7 +32,7 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// Refuses a command-line option for all relays that the own `[[relay]]` profile of relay `index` would hide.
+    /// Refuses an option for all relays that relay `index` would ignore for its own `[[relay]]` profile.
     ///
     /// # Errors
     /// One line that names the option and the file's table.
@@ -102,7 +102,7 @@ impl Given {
         self.options.extend(path.map(|path| (name, Some(path))));
     }
 
-    /// Adds an option with a relative path as [`path`](Self::path) does, or with a `udp:` address unchanged.
+    /// Adds an option with a relative path, see [`path`](Self::path), or with a `udp:` address unchanged.
     pub fn path_or_udp(&mut self, name: &'static str, place: Option<&String>) {
         match place {
             Some(path) if !path.starts_with("udp:") => self.path(name, Some(&PathBuf::from(path))),
@@ -117,7 +117,7 @@ impl Given {
         }
     }
 
-    /// Refuses autopilot settings in the file when neither the file nor the command line configures an autopilot.
+    /// Refuses autopilot settings in the file when no autopilot is configured there or on the command line.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let value_of = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if value_of("--autopilot").is_some() || said(line, "--autopilot").is_some() {
@@ -134,7 +134,7 @@ impl Given {
         })
     }
 
-    /// Removes options that the command line also gives or excludes; returns the rest and the overrides with a different value.
+    /// Removes options that the command line also gives or excludes. Returns the rest and the overrides with a different value.
     fn less(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
@@ -217,7 +217,7 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Returns the words of the command line behind those of its `--config` file, and the settings that only a file can give.
+/// Returns the words of the `--config` file and the command line, and the settings that only a file can give.
 ///
 /// `section` adds the program's own section of the file.
 ///

@@ -4,7 +4,7 @@ use std::fs::{File, remove_file, rename};
 use std::io::Write as _;
 use std::path::Path;
 
-/// Replaces the content of `file` with `bytes`; after a crash the file holds either the old or the new content.
+/// Replaces the content of `file` with `bytes`. After a crash the file holds either the old or the new content.
 ///
 /// # Errors
 /// The system's error.

@@ -46,7 +46,8 @@ pub struct Fifo {
 pub struct Begun(Vec<u8>);
 
 impl Begun {
-    /// Appends bytes and passes each completed line to `line` without its line feed, cut to one byte more than [`LONGEST`].
+    /// Appends bytes and passes each completed line to `line` without its line feed. Cuts a line to one byte more than
+    /// [`LONGEST`].
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {

@@ -8,7 +8,7 @@ use rustix::io::Errno;
 
 use crate::replug::Replug;
 
-/// Sleeps until one of `ttys` or `others` is ready, at most `at_most`, else for ever; returns the events of each of `others`.
+/// Sleeps until one of `ttys` or `others` is ready, at most `at_most`, else for ever. Returns the events of each of `others`.
 ///
 /// A tty is ready when it has bytes, or room after it had none.
 ///

@@ -78,7 +78,7 @@ impl StatusSocket {
         std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Accepts connections and reads from them; returns the complete requests, and the time of the next call.
+    /// Accepts connections and reads from them. Returns the complete requests, and the time of the next call.
     pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());

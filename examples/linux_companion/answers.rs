@@ -31,7 +31,7 @@ impl Answers {
         }
     }
 
-    /// Takes the data received so far, `None` for an autopilot; returns a fault to report, once for each kind.
+    /// Takes the data received so far, `None` for an autopilot. Returns a fault to report, once for each kind.
     pub(crate) fn look(&mut self, now: Instant, heard: Option<Answer>) -> Option<Answer> {
         let (answer, since) = self.newest?;
         let Some(heard) = heard else {

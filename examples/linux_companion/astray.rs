@@ -179,7 +179,7 @@ fn beyond(value: f64, least: f64, most: f64) -> f64 {
 }
 
 impl Off {
-    /// Returns the text for the operator's ground station, at most 50 bytes; `None` for reports that are only logged.
+    /// Returns the text for the operator's ground station, at most 50 bytes. `None` for reports that are only logged.
     pub(crate) fn for_operator(&self) -> Option<String> {
         (self.kind == Kind::Line)
             .then(|| format!("relay: the drone is {} from its line", Far(self.away_m)))

@@ -11,10 +11,10 @@ use uav_relay_linux::log::Log;
 
 const STEP_M: f32 = 0.5;
 
-/// Maximum distance from the agreed position at arrival, m: autopilots hover up to 0.9 m off their target.
+/// Maximum distance from the agreed position at arrival, m. Autopilots hover up to 0.9 m off their target.
 const NEAR_M: f32 = 1.0;
 
-/// Time that a setpoint must stay the same, and a drone close to it, at the end of a move: an overshoot is no arrival.
+/// Time that setpoint and drone must stay at the end of a move, because an overshoot is no arrival.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -195,7 +195,7 @@ mod tests {
         }
     }
 
-    /// A setpoint moving 0.1 m every 0.2 s is logged every 0.6 m and where it stops; a small later change is not.
+    /// A setpoint moving 0.1 m every 0.2 s is logged every 0.6 m and where it stops. A small later change is not.
     #[test]
     fn a_line_for_each_half_metre_and_the_exact_end() {
         let mut movement = Movement::new(true);

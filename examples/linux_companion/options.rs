@@ -28,7 +28,7 @@ use uav_relay_scenario::key;
 /// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
 const LATENCY: Duration = Duration::from_millis(40);
 
-/// Overhead of a frame on a radio channel, bytes: its header, and the turnaround from receiving to sending.
+/// Overhead of a frame on a radio channel, bytes: its header, and the turnaround of the radio.
 const RADIO: u16 = 12;
 
 /// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.

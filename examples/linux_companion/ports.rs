@@ -79,7 +79,7 @@ impl Ports {
         Ok(file)
     }
 
-    /// Exchanges bytes with the relay, and calls `keep` before each send; returns the time of the next call.
+    /// Exchanges bytes with the relay, and calls `keep` before each send. Returns the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -132,7 +132,7 @@ impl Ports {
             .filter_map(|end| end.0.as_mut())
     }
 
-    /// Sleeps until a tty or one of `others` is ready, at most `at_most`, else for ever; returns the events of each of `others`.
+    /// Sleeps until a tty or one of `others` is ready, at most `at_most`, else for ever. Returns the events of each of `others`.
     pub(crate) fn sleep(
         &mut self,
         at_most: Option<Duration>,

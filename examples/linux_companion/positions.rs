@@ -34,7 +34,7 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position received since the last call; passes measurements to `heard` and logs the first invalid line.
+    /// Returns the newest position received since the last call. Passes measurements to `heard` and logs the first invalid line.
     /// Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,

@@ -14,7 +14,7 @@ use uav_relay_linux::log::Log;
 
 const STORED: usize = Upload::LENGTH + 4;
 
-/// Loads the mission uploaded to relays that were configured with `mission`; `None` if there is no `file`.
+/// Loads the mission uploaded to relays that were configured with `mission`. `None` if there is no `file`.
 pub(crate) fn load(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
     let named = |error: &str| format!("--upload-file {}: {error}", file.display());
     let bytes = match std::fs::read(file) {

@@ -96,7 +96,7 @@ impl Chain {
         }
     }
 
-    /// Runs until all relays agree on positions in mission `version`; returns `None` if they do not by `end`.
+    /// Runs until all relays agree on positions in mission `version`. Returns `None` if they do not by `end`.
     fn positions(&mut self, version: u16, end: Clock) -> Option<Vec<Placement>> {
         self.agreed.fill(false);
         while !self.agreed.iter().all(|agreed| *agreed) {
@@ -154,7 +154,7 @@ pub(crate) fn moves(
     Some(moves.collect())
 }
 
-/// Returns the distance, m, between positions along two lines, which are treated as the same line if either is unknown.
+/// Returns the distance, m, of positions along two lines, treated as one line if either is unknown.
 fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f64 {
     let on_earth = |axis: &Option<Axis>, place| axis.as_ref().and_then(|axis| axis.point(place));
     let [one, other] = lines;

@@ -58,10 +58,10 @@ pub(crate) struct NewOptions {
     new_min_separation: Option<f32>,
 }
 
-/// Distance along the line at which the order of two relays is certain, m: twice the companion's default position error.
+/// Distance along the line at which the order of two relays is certain, m. Twice the companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance of the new line's ends from the present line, in addition to the new line's length, m.
+/// Maximum distance of the new line's ends from the present line, beyond the new line's length, m.
 const FAR_M: f64 = 100_000.0;
 
 /// Mission that supplies the values which are not given.
@@ -94,7 +94,7 @@ impl Basis {
 }
 
 impl NewOptions {
-    /// Returns the upload that replaces `basis` at relays loaded with `loaded`, between the sites `sited` if given.
+    /// Returns the upload that replaces `basis` at relays loaded with `loaded` and, if given, `sited`.
     pub(crate) fn upload(
         &self,
         version: u16,
@@ -225,7 +225,7 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     ))
 }
 
-/// Returns the largest turn t of the line, degrees, that keeps the relays in order despite position errors of 1 m.
+/// Returns the largest turn t of the line, degrees, that keeps the order despite position errors of 1 m.
 ///
 /// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
 /// For the separation s and the width w of the lateral range it solves s cos t - w sin t = min(2 m, s / 2).

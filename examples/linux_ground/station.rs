@@ -261,7 +261,7 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer, which is available: a line, or an empty text at the end of standard input.
+/// Reads the operator's answer, which is available. The text is empty at the end of standard input.
 fn answered() -> String {
     let mut line = String::new();
     match std::io::stdin().read_line(&mut line) {

@@ -74,7 +74,7 @@ impl Autopilot {
         })
     }
 
-    /// Creates the link along the line between `sites`, in static RAM; `None` if the mission can not be flown there.
+    /// Creates the link along the line between `sites`, in static RAM. `None` if the mission can not be flown there.
     #[inline(never)] // its stack frame is released
     pub(crate) fn begin(
         uart: Uart,

@@ -41,7 +41,7 @@ fn uploads() -> Journal<Sectors> {
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Restores the votes from before the reboot into a `relay` that has been given nothing but an upload yet.
+    /// Restores the votes from before the reboot into a `relay` that has got at most an upload so far.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());

@@ -19,7 +19,7 @@ pub(crate) use uav_relay_block::BAUD;
 /// Capacity of the receive queue, bytes: 11 ms at full speed.
 pub(crate) const RECEIVED: usize = 128;
 
-/// Capacity of the send queue, bytes: more than the longest frame, so that the main loop can sleep meanwhile.
+/// Capacity of the send queue, bytes. It exceeds the longest frame, so that the main loop can sleep meanwhile.
 pub(crate) const OUTGOING: usize = 256;
 
 pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> =

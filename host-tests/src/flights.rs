@@ -72,7 +72,7 @@ pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
 }
 
-/// Returns profiles of eight relays: three times in ten each has its own power and altitude, otherwise none.
+/// Returns own powers and altitudes of all eight relays three times in ten, otherwise none.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();
@@ -99,7 +99,7 @@ pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     }
 }
 
-/// Returns a mission with the altitudes and lateral positions of `corridor`; `None` if its numbers are refused.
+/// Returns a mission with the altitudes and lateral positions of `corridor`. `None` if its numbers are refused.
 pub fn with_room(config: &MissionConfig, corridor: Corridor) -> Option<Mission> {
     let config = MissionConfig {
         band: Band {

@@ -8,7 +8,7 @@ use rustix::fs::{FlockOperation, flock};
 
 const PACKAGES: &str = include_str!("../python.txt");
 
-/// Returns the interpreter of a virtual environment under `target/` with the packages of `python.txt`; the first call installs
+/// Returns the interpreter of a virtual environment under `target/` with the packages of `python.txt`. The first call installs
 /// it.
 ///
 /// # Panics

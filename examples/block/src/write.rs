@@ -7,7 +7,7 @@ use super::{
     Secret, Sites, VERSION, crc,
 };
 
-/// Returns the block of `config`, `secret` and the autopilot's key; `numbers` are the parameters of its channel.
+/// Returns the block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of its channel.
 ///
 /// A block can not hold adjust's grid search or more than `MAX_POINTS` points; such a configuration is read back differently.
 pub fn write(

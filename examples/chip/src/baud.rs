@@ -2,7 +2,7 @@
 
 use crate::crystal::HSI_HZ;
 
-/// Returns the bit rate to request from a HAL that assumes the reset clock, 16 MHz, so that the port runs at `baud` bit/s.
+/// Returns the bit rate to request from a HAL that assumes the reset clock, for a port at `baud` bit/s.
 ///
 /// `apb_hz` is the true clock of the UART, a multiple of 1 MHz.
 pub const fn believed(baud: u32, apb_hz: u32) -> u32 {

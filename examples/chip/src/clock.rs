@@ -128,7 +128,7 @@ const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
 /// RCC_APB1ENR, PWREN.
 const POWER_ON: u32 = 1 << 28;
 
-/// PWR_CR: voltage scale 1 (one bit on the STM32F405, two on the STM32F446), ODEN and ODSWEN; their states in PWR_CSR.
+/// PWR_CR: voltage scale 1 (one bit on the STM32F405, two on the STM32F446), ODEN and ODSWEN. PWR_CSR has their states.
 const SCALE_1: u32 = 1 << 14;
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
 const SCALE_READY: u32 = 1 << 14;
@@ -144,7 +144,7 @@ const CACHES: u32 = 0b11 << 9;
 /// ID of the STM32F405 with a defective prefetch: revision A (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Maximum reads of a register while a PLL, a voltage or a switch settles: some 10 ms at 16 MHz; the data sheets allow at most
+/// Maximum reads of a register while a PLL, a voltage or a switch settles: some 10 ms at 16 MHz. The data sheets allow at most
 /// 0.3 ms.
 const POLLS: u32 = 20_000;
 
@@ -182,7 +182,7 @@ pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     Clocks::HSI
 }
 
-/// Finds out what [`start`] reaches, and returns to the HSI: for a HAL whose own clock set-up has unbounded waits.
+/// Finds out what [`start`] reaches, and returns to the HSI. For a HAL whose own clock set-up has unbounded waits.
 pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     let clocks = start(chip, plan);
     if clocks.pll.is_some() && back_to_hsi(chip) {

@@ -31,7 +31,7 @@ impl Reset {
         Self::of(status)
     }
 
-    /// Selects the most specific cause: every reset sets the bit of the pin, and power-up that of a brownout.
+    /// Selects the most specific cause: every reset sets the pin's bit, and power-up the brownout's.
     fn of(status: u32) -> Self {
         let is = |bit: u32| status >> bit & 1 != 0;
         match status {

@@ -20,7 +20,7 @@ pub const WORDS: usize = 1;
 /// Journal key, the same for every configuration block, because no block may lower the epoch.
 pub const KEY: u32 = 0;
 
-/// Returns the epoch of this start, at least `floor`, and true if it was stored; `None` after the last epoch, 4294967294.
+/// Returns the epoch of this start, at least `floor`, and true if it was stored. `None` after the last epoch, 4294967294.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {
     log.tidy();
     let [newest] = log.newest::<WORDS>().unwrap_or([0]);

@@ -8,7 +8,7 @@ use crate::journal::{BLANK, Flash};
 
 const WORD: usize = 4;
 
-/// Words per read or write: a driver call costs more than a word, and some flashes write a whole page each time.
+/// Words per read or write. A driver call costs more than a word, and some flashes write a whole page each time.
 const PIECE: usize = 16;
 
 /// Two sectors of a flash, each of one or more erase units, as offsets into it. The flash must read and write whole words.

@@ -43,7 +43,7 @@ pub struct Views {
 }
 
 impl Views {
-    /// Restores the votes from before the reboot into a `relay` that has been given nothing but an upload yet.
+    /// Restores the votes from before the reboot into a `relay` that has got at most an upload so far.
     ///
     /// If a record exists, `stands_by` gets true if the relay accepts it; a record of another firmware may be refused.
     pub fn resume<F: Flash>(

@@ -180,7 +180,7 @@ impl Chain {
     }
 }
 
-/// Returns the receivers, with their ports, of a frame from relay `index` (from 0) of `count` through `port`.
+/// Returns the receivers and their ports for a frame from relay `index` (from 0) of `count`.
 fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     let next = |at: usize, port| (at < count).then_some((at, port));
     match port {

@@ -42,8 +42,8 @@ fn bits(places: &[f32]) -> Vec<u32> {
     places.iter().map(|x_m| x_m.to_bits()).collect()
 }
 
-/// Returns the SIR of every hop, in f64 by the paper's formulas: excess loss 0.1 dB with line of sight in the air, 21 dB from the
-/// interferer to the receiver.
+/// Returns the SIR of every hop, in f64 by the paper's formulas. The excess loss is 0.1 dB with line of sight in the air, 21 dB
+/// from the interferer to the receiver.
 fn hops(places: &[f32]) -> Vec<f64> {
     let squared = |x: f64, y: f64, h: f64| x * x + y * y + h * h;
     let mut before = (0.0, 0.0, 1.0);

@@ -35,7 +35,7 @@ pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
 
-/// Runs [`chain()`] and returns its relays at the end; `None` if the mission or the settings are refused.
+/// Runs [`chain()`] and returns its relays at the end. `None` if the mission or the settings are refused.
 ///
 /// # Panics
 /// Those of [`chain()`].
@@ -218,7 +218,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Delivers the oldest frame to each relay without faults; if no frame is in transit, first advances the time.
+    /// Delivers the oldest frame to each relay without faults. If no frame is in transit, first advances the time.
     fn round(&mut self) {
         if self.members.iter().all(|member| member.arriving.is_empty()) {
             self.wake();
@@ -337,7 +337,7 @@ impl Chain {
         }
     }
 
-    /// Checks the separation of relay `at` (from 0) and its predecessor if both hold positions of the same pass.
+    /// Checks the separation of relay `at` (from 0) and its predecessor if both have positions of one pass.
     fn look_at_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

@@ -86,7 +86,7 @@ fn taken_apart(plain: &[u8]) {
     assert_eq!(opened.handshake, flags == 3);
 }
 
-/// Checks a relay that requires tags: the body with valid addresses and tag is accepted once, and rejected as forged with a
+/// Checks a relay that requires tags. The body with valid addresses and tag is accepted once, and rejected as forged with a
 /// flipped bit.
 fn signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();

@@ -13,7 +13,7 @@ use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
 
-/// Reads `data` as a stream of noise, frames and damaged frames, or as operations on an autopilot link, with or without signing.
+/// Reads `data` as a stream of frames, intact or damaged, or as operations on an autopilot link.
 ///
 /// # Panics
 /// - The parser deviates from the definition of frames, misses an intact one, or exceeds its bound on work.

@@ -103,7 +103,7 @@ impl Member {
         plain
     }
 
-    /// Returns the tag: keyed BLAKE2s over the nonces of both ends and the signed bytes, cut to eight bytes.
+    /// Returns the tag: keyed BLAKE2s over both nonces and the signed bytes, cut to eight bytes.
     fn tag(&self, to: &[u8], signed: &[u8]) -> [u8; 8] {
         let Ok(mut mac) = Blake2sMac::<U8>::new_from_slice(&self.key) else {
             unreachable!("a key of 32 bytes");

@@ -32,7 +32,7 @@ pub fn relay(data: &[u8]) {
     _ = flown(data);
 }
 
-/// Runs [`relay()`] and returns the relay at the end; `None` if the mission or the settings are refused.
+/// Runs [`relay()`] and returns the relay at the end. `None` if the mission or the settings are refused.
 ///
 /// # Panics
 /// Those of [`relay()`].
@@ -117,7 +117,7 @@ impl Bench {
         }
     }
 
-    /// Returns Tx or Rx as the neighbour at `side`, if it answers a handshake: the relay does not greet the ground first.
+    /// Returns Tx or Rx as the neighbour at `side` after a handshake. The relay does not greet the ground first.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();

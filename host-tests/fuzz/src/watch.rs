@@ -223,7 +223,7 @@ impl Watched {
         (sent, events)
     }
 
-    /// Checks views: they increase, are reported and counted; the relay has an index in its view, between its neighbours.
+    /// Checks views: they increase, are reported and counted. The relay has an index in its view, between its neighbours.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -251,7 +251,7 @@ impl Watched {
         self.stats = stats;
     }
 
-    /// Checks the setpoint: each change is reported, and it is the agreed position, or inside the guard's geofence.
+    /// Checks the setpoint. Each change is reported, and it is the agreed position, or inside the guard's geofence.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
@@ -294,7 +294,7 @@ impl Watched {
         }
     }
 
-    /// Checks an agreed position: on the line's length and in its lateral range, at an altitude that this relay may have.
+    /// Checks an agreed position. It is on the line's length and in its lateral range, at an altitude that this relay may have.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.final_setpoint();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {

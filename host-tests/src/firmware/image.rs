@@ -9,7 +9,7 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// Profile of flashed images.
 pub const PROFILE: &str = "firmware";
 
-/// Builds `examples`, with the log alone if `smallest`, else with all features; returns their folder, valid until the next build.
+/// Builds `examples`, with the log alone if `smallest`, else with all features. Returns their folder, valid until the next build.
 ///
 /// # Errors
 /// The output of cargo, if it fails.

@@ -39,7 +39,7 @@ struct Heard {
 /// Receivers of each port, by their index in the list of ports.
 pub type Hearers = Vec<Vec<usize>>;
 
-/// Returns the receivers in a chain with two ports per drone, upstream first: each port leads to its neighbour.
+/// Returns the receivers in a chain with two ports per drone, upstream first. Each port leads to its neighbour.
 pub fn chain(drones: usize) -> Hearers {
     let downstream_of = |drone: usize| drone.checked_sub(1).map(|before| 2 * before + 1);
     let upstream_of = |drone: usize| (drone < drones).then_some(2 * drone);
@@ -49,7 +49,7 @@ pub fn chain(drones: usize) -> Hearers {
         .collect()
 }
 
-/// Returns the receivers on one radio channel with one port per drone: all others within `range` drones.
+/// Returns the receivers on a radio channel with one port per drone: all others within `range` drones.
 pub fn radio(drones: usize, range: usize) -> Hearers {
     (0..drones)
         .map(|sender| {

@@ -70,7 +70,7 @@ pub(crate) struct Drone<F> {
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
-/// Creates the drone of a board, with its relay in `room`; `flies` is true if there is a port to an autopilot.
+/// Creates the drone of a board, with its relay in `room`. `flies` is true if there is a port to an autopilot.
 pub(crate) fn begin<F: NorFlash>(
     room: &'static mut Room,
     mut board: Board<F>,

@@ -65,7 +65,7 @@ pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 /// Longest delay of a relay's timer with which the watchdog is fed.
 const LATE: uav_relay::Duration = uav_relay::Duration::from_millis(watchdog::LATE_MS);
 
-/// Calls `feed` every [`TURN`], for a board that takes no part, so that the watchdog does not restart it.
+/// Calls `feed` every [`TURN`], so that the watchdog does not restart a board that takes no part.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -87,7 +87,7 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     }
 }
 
-/// Flies the relay of `board` with a UART to each neighbour, as reader and writer, and one to the autopilot if the board has one.
+/// Flies the relay of `board` with a UART to each neighbour and, if `autopilot` is given, one to that.
 ///
 /// It never completes if the drone takes part, and calls the watchdog's `feed` every [`TURN`] while the relay makes progress.
 ///

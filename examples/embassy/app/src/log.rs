@@ -101,7 +101,7 @@ pub(crate) fn refused(why: Refused) {
     }
 }
 
-/// Logs events and setpoints, and shows events on the operator's ground station if there is an autopilot.
+/// Logs events and setpoints, and shows events on the operator's ground station, if any.
 pub(crate) async fn events(
     relay: &AsyncRelay<'_>,
     autopilot: Option<&AsyncAutopilot>,

@@ -182,7 +182,7 @@ where
     Ok((rx, tx))
 }
 
-/// Returns a seed from the chip's unique number, because the random number generator's clock, PLLQ, is not set up here.
+/// Returns a seed from the chip's unique number. The random number generator's clock, PLLQ, is not set up here.
 fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);

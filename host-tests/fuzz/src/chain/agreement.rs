@@ -4,8 +4,8 @@ use uav_relay::{Phase, Schedule, ViewId};
 
 use super::{Chain, Member};
 
-/// Maximum number of wake-ups and deliveries until agreement: 24 passes of 4 relays, each in 65 portions, after a few minutes of
-/// probation with a few dozen hellos a second.
+/// Maximum number of wake-ups and deliveries until agreement. It covers 24 passes of 4 relays, each in 65 portions, after a few
+/// minutes of probation with a few dozen hellos a second.
 const PATIENCE: usize = 40_000;
 
 impl Chain {

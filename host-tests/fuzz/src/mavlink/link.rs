@@ -19,7 +19,7 @@ use crate::input::Input;
 
 const MOST_OPERATIONS: usize = 256;
 
-/// Maximum number of frames due at once: a heartbeat, three requests, an answer, a target, three lines, four numbers, twice.
+/// Maximum number of frames due at once. Twice a heartbeat, three requests, an answer, a target, three lines, four numbers.
 const MOST_FRAMES: usize = 26;
 
 /// Maximum distance of a target from the line, m: 5 km, and the error of a flat earth there.
@@ -187,7 +187,7 @@ impl Link {
         }
     }
 
-    /// Delivers bytes in one piece, and to a clone in pieces of two alternating lengths: the results must be equal.
+    /// Delivers bytes in one piece, and to a clone in pieces of two alternating lengths. The results must be equal.
     fn hear(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
         without(|| self.autopilot.handle_bytes(self.now, bytes));

@@ -34,7 +34,7 @@ pub(super) struct Peer {
     /// Current stamp of the autopilot, and its signed frames.
     stamp: u64,
     history: Vec<Vec<u8>>,
-    /// State of the link: the time in stamps at a time of its clock, its known senders, and its last own stamp.
+    /// State of the link: the time in stamps at a time of its clock, the known senders, the last own stamp.
     time: u64,
     at: Instant,
     senders: Vec<Sender>,
@@ -68,7 +68,7 @@ impl Peer {
         (peer, Signing::new(KEY, 3, stamp, now))
     }
 
-    /// Signs a frame, mostly correctly; else leaves it unsigned, uses another key or an old stamp, damages it, or replays an old
+    /// Signs a frame, mostly correctly. Otherwise leaves it unsigned, uses another key or an old stamp, damages it, or replays
     /// one.
     pub(super) fn signs(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();

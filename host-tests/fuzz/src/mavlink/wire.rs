@@ -82,7 +82,7 @@ pub(super) struct Placed {
 /// Maximum number of parts of a stream, which is read twice, byte by byte.
 const MOST_PARTS: usize = 64;
 
-/// Builds a stream of noise, intact, damaged and truncated frames, and enough zeros at the end to complete a false start.
+/// Builds a stream of noise, intact, damaged and truncated frames. Zeros at its end complete any false start.
 pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
     let (mut bytes, mut placed) = (Vec::new(), Vec::new());
     for _ in 0..MOST_PARTS {

@@ -2,8 +2,8 @@
 
 use super::parts::Body;
 
-/// Numbers of the paper's scenario between the number of relays and the interferer: distance and minimum separation, m, power of
-/// Tx, W, common altitude, m, common power, W.
+/// Numbers of the paper's scenario between the number of relays and the interferer. They are distance and minimum separation, m,
+/// power of Tx, W, common altitude, m, common power, W.
 const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 
 /// Path-loss factors of the paper, with and without line of sight.
@@ -44,7 +44,7 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// Appends sites: mostly none, else two a kilometre apart as in the paper's scenario, or arbitrary numbers.
+    /// Appends sites: mostly none, else two a kilometre apart as in the paper, or arbitrary numbers.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -75,7 +75,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with another interferer, with a range of altitudes or one, and with lateral positions or none.
+    /// Appends the paper's mission with another interferer, perhaps with altitudes and lateral positions to choose from.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));

@@ -178,7 +178,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a pulse's number, mostly one of the first, and the digest of the relay's view, rarely a wrong one.
+    /// Appends a pulse's number, mostly one of the first, and the digest of the view, rarely a wrong one.
     pub(super) fn pulse_number(&mut self) {
         self.question();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -221,7 +221,7 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the view's mark, which is added to the digest of the flown mission: its lower half plus its byte-swapped upper half.
+/// Returns the view's mark, which is added to the mission's digest: the lower half plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -14,8 +14,7 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     log.newest::<WORDS>().and_then(|kept| record(&kept))
 }
 
-/// Returns the promised view in a record: in `ViewRecord::to_bytes` it follows the format, the mission, the agreed view and the
-/// membership flag.
+/// Returns the promised view in a record: 4 bytes from offset 10 of `ViewRecord::to_bytes`.
 fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
