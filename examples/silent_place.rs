@@ -1,6 +1,7 @@
-//! A relay that must keep radio silence finds its own place from the mission alone.
+//! A relay under radio silence computes its own position from the mission alone.
 //!
-//! `cargo run --example silent_place`: the places of a chain of five, each worked out by itself, as messages would have it.
+//! `cargo run --example silent_place` prints the positions of a chain of five, each computed separately, as the relays would
+//! agree on by messages.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use uav_relay::channel::{AirGround, Channel};
@@ -52,7 +53,7 @@ use panic_halt as _;
 #[cfg(target_os = "none")]
 use stm32f4xx_hal as _;
 
-/// On the target the place is left to the debugger.
+/// Leaves the result to the debugger on the target.
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {

@@ -1,5 +1,4 @@
-//! What the runners cost around a relay: a full sweep from the bytes of one port to those of the other, on polled ports and on
-//! asynchronous ones.
+//! Cost of the runners around a relay: a full sweep from one port to the other, on polled and on asynchronous ports.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -17,7 +16,7 @@ use uav_relay::{FrameBuf, Instant, Mission, Phase, Relay, Settings};
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
-/// Bytes that come in at once, and those that have gone out.
+/// Port in memory: the frame to receive with its read range, and the number of bytes sent.
 struct Memory {
     coming: Cell<(FrameBuf, usize, usize)>,
     gone: Cell<usize>,
@@ -48,7 +47,6 @@ impl Memory {
     }
 }
 
-/// One port, however it is asked.
 #[derive(Clone, Copy)]
 struct End<'m>(&'m Memory);
 
@@ -90,7 +88,6 @@ impl Write for End<'_> {
     }
 }
 
-/// A time that stands still.
 struct Still(Instant);
 
 impl Clock for Still {
@@ -108,7 +105,7 @@ impl Clock for Still {
     }
 }
 
-/// The middle of three relays, and the sweep that the first one sends it.
+/// Returns the middle of three relays, and the first relay's sweep for it.
 fn before() -> Option<(Relay, FrameBuf, usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -125,7 +122,7 @@ fn before() -> Option<(Relay, FrameBuf, usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Both runners, from the same moment on.
+/// Measures both runners, from the same moment on.
 pub(crate) fn runners() {
     let byte_time = byte_time(115_200);
     let Some((mut middle, frame, len, now)) = before() else {
@@ -174,10 +171,10 @@ fn awaited(byte_time: uav_relay::Duration) {
     let mut run = pin!(run);
     let mut cx = Context::from_waker(Waker::noop());
     let mut poll = || {
-        // It goes on for good.
+        // The future never completes.
         let _ = run.as_mut().poll(&mut cx);
     };
-    // Everybody waits for bytes.
+    // Both ports wait for bytes.
     poll();
     poll();
     up.coming.set((frame, 0, len));

@@ -1,4 +1,4 @@
-//! What tags cost, and a sweep whose frames have them.
+//! Cost of authentication tags, and of a sweep of signed frames.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -18,14 +18,14 @@ use super::missions::mission;
 
 pub(crate) const KEY: Key = Key::new([0xA5; 32]);
 
-/// One tag of a frame with a body of this many bytes, as the sender makes it and the receiver again.
+/// Returns the cost of one tag of a frame with `body` bytes, at the sender and again at the receiver.
 fn tag(body: usize) -> u32 {
     const LONGEST: [u8; 231] = [0x5A; 231];
     let signed = black_box(LONGEST.get(..10 + body).unwrap_or_default());
     instructions(|| KEY.tag(1 << 32, 2 << 32, signed))
 }
 
-/// Bytes to and fro between two relays, until neither has anything to say.
+/// Exchanges frames between two relays until neither has any to send.
 fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     loop {
         let (down, up) = (sends(upper, now), sends(lower, now));
@@ -41,7 +41,7 @@ fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// A full sweep through a middle relay, and a frame that is refused there.
+/// Measures a full sweep through a middle relay, and a frame rejected there.
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));
@@ -56,7 +56,7 @@ pub(crate) fn auth() {
     let mut middle = relay(2, settings, THREE);
     let mut tail = relay(3, settings, THREE);
     let start = Instant::ZERO;
-    // Who is there is known before the first pass: the handshakes of the last relay go first.
+    // The handshakes must end before the first sweep; those of the last relay go first.
     settle(&mut middle, &mut tail, start);
     settle(&mut head, &mut middle, start);
     settle(&mut middle, &mut tail, start);
@@ -82,7 +82,7 @@ pub(crate) fn auth() {
         "passed_on {}",
         u32::from(sent.is_some_and(|sent| sent.len > 90))
     );
-    // The same once more is a replay: its tag is right, and that takes longest to find out.
+    // A repeated frame is a replay: with a valid tag, it takes longest to reject.
     let before = middle.stats().replayed;
     let refused = instructions(|| middle.handle_bytes(now, Port::Upstream, bytes));
     hprintln!("refused {}", refused);

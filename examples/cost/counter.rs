@@ -1,4 +1,4 @@
-//! How instructions are counted, and relays made.
+//! Instruction counter, and creation of relays.
 
 use core::hint::black_box;
 use cortex_m::peripheral::SYST;
@@ -11,17 +11,15 @@ use uav_relay::Mission;
 use uav_relay::Relay;
 use uav_relay::Settings;
 
-/// SysTick's largest value.
 pub(crate) const TOP: u32 = 0x00FF_FFFF;
 
-/// Ticks of SysTick in `work`.
 pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
     let before = SYST::get_current();
     black_box(work());
     before.wrapping_sub(SYST::get_current()) & TOP
 }
 
-/// Instructions of `work`, at most 780 000; those of the measurement itself are taken off.
+/// Returns the instructions of `work`, at most 780 000, without those of the measurement.
 pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
     let empty = ticks(|| ());
     // 128 ns at 168 MHz are 21.504 ticks, 2 688 / 125: the largest count of ticks times 125 is still a u32.
@@ -37,14 +35,14 @@ pub(crate) fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
     stop()
 }
 
-/// What `relay` sends next, if anything.
+/// Returns the next frame that `relay` sends, if any.
 pub(crate) fn sends(relay: &mut Relay, now: Instant) -> Option<(FrameBuf, usize)> {
     let mut frame: FrameBuf = [0; MAX_FRAME];
     let transmit = relay.poll_transmit(now, &mut frame)?;
     Some((frame, transmit.len))
 }
 
-/// Where the program ends should QEMU not take its leave.
+/// Sleeps for good, if QEMU does not exit.
 pub(crate) fn stop() -> ! {
     loop {
         cortex_m::asm::wfi();

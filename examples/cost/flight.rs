@@ -1,4 +1,4 @@
-//! What it costs to know where a drone is, and to tell it where to fly: the line on earth, in f64, which this core has no instructions for.
+//! Cost of converting positions between the line and the earth, in f64, for which this core has no instructions.
 
 use core::hint::black_box;
 
@@ -8,7 +8,7 @@ use uav_relay::{Geodetic, Placement, Sites};
 
 use super::counter::instructions;
 
-/// The line of `examples/site.toml`, and a place beside its middle.
+/// Measures the line of `examples/site.toml`, and a position beside its middle.
 pub(crate) fn flight() {
     let site = Geodetic::from_degrees;
     let (Some(tx), Some(rx)) = (site(47.40, 8.54, 420.0), site(47.41, 8.55, 431.0)) else {

@@ -1,8 +1,8 @@
-//! What the calls of a relay cost on a Cortex-M4F, in instructions and bytes of stack; run by `cargo cost` in QEMU.
+//! Cost of a relay's calls on a Cortex-M4F, in instructions and bytes of stack; run by `cargo cost` in QEMU.
 //!
-//! QEMU with `-icount shift=7` lets 128 ns pass with every instruction and counts SysTick at 168 MHz on this machine, so
-//! the counter tells instructions. They are exact and the same in every run; cycles they are not. Results go out by
-//! semihosting, which traps on a board without a debugger: this image is not one to flash.
+//! With `-icount shift=7` QEMU advances 128 ns with every instruction, and SysTick counts at 168 MHz on this machine, so that the
+//! counter measures instructions. They are exact and the same in every run, but they are not cycles. Results are printed by
+//! semihosting, which traps on a board without a debugger: do not flash this image.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(all(target_os = "none", feature = "async"))]

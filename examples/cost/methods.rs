@@ -1,4 +1,4 @@
-//! What every call costs while three relays fly each method.
+//! Cost of every call while three relays fly each method.
 
 use cortex_m_semihosting::hprintln;
 use uav_relay::Adjust;
@@ -15,10 +15,10 @@ use uav_relay::Settings;
 use super::counter::{instructions, relay};
 use super::missions::{HIGH, UNEVEN};
 
-/// A chain of three that settles on its own terms, and what its calls cost.
+/// Chain of three relays, and the cost of its calls.
 pub(crate) struct Flight {
     relays: [Relay; 3],
-    /// The costliest call, and the longest frame.
+    /// Cost of the most expensive call, and length of the longest frame.
     most: u32,
     longest: usize,
 }
@@ -32,7 +32,6 @@ impl Flight {
         }
     }
 
-    /// Delivers what relay `at` has to say.
     fn drain(&mut self, at: usize, now: Instant) {
         let mut frame: FrameBuf = [0; MAX_FRAME];
         loop {
@@ -56,11 +55,11 @@ impl Flight {
         }
     }
 
-    /// Until all hold their places, or for `turns` turns.
+    /// Runs until all relays hold their positions, at most `turns` turns; returns true if they do.
     fn settle(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
-            // Twice, so that what a relay says in return is heard.
+            // In both directions, so that answers are delivered.
             for at in [0, 1, 2, 1, 0] {
                 self.drain(at, now);
             }
@@ -86,14 +85,14 @@ impl Flight {
     }
 }
 
-/// What a chain came to: whether it settled, its costliest call and its longest frame.
+/// Result of a chain: whether it settled, its most expensive call and its longest frame.
 struct Flown {
     settled: u32,
     most: u32,
     longest: usize,
 }
 
-/// One chain: the stack has no room for several at once.
+/// Runs one chain, because the stack has no room for several at once.
 #[inline(never)]
 fn fly(mission: Mission, settings: Settings) -> Flown {
     let mut flight = Flight::new(mission, settings);

@@ -1,4 +1,4 @@
-//! What the chains here fly.
+//! Missions of the measured chains.
 
 use uav_relay::Band;
 use uav_relay::Field;
@@ -48,7 +48,7 @@ pub(crate) const INTERFERER: Interferer = Interferer {
     y_m: 150.0,
 };
 
-/// As the others, with altitudes to choose from.
+/// Mission with altitudes to choose from.
 pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     band: Band {
         least_m: 20.0,
@@ -58,7 +58,7 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// The same, with room to the side as well.
+/// Mission with altitudes and lateral positions to choose from.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,
@@ -86,7 +86,7 @@ pub(crate) const POINTS: [FieldPoint; 4] = [
     },
 ];
 
-/// As the others, in a field that is not the same everywhere.
+/// Mission in a non-uniform interference field.
 pub(crate) const UNEVEN: Mission = Mission::new(MissionConfig {
     interference: Interference::Field(Field::new(&POINTS)),
     ..*mission(3).config()

@@ -1,4 +1,4 @@
-//! What it costs to place one relay, and to count relays, on board.
+//! Cost of placing one relay, and of finding the number of relays, on board.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -10,7 +10,7 @@ use uav_relay::planning::single::{free, given_altitude, given_x};
 use super::counter::instructions;
 use super::missions::{HIGH, MISSION, WIDE};
 
-/// The theorems in the scenario with a band of altitudes, and the fewest relays for a target.
+/// Measures the theorems with a band of altitudes, and the search for the fewest relays for a target.
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
@@ -29,8 +29,9 @@ pub(crate) fn planning() {
     hprintln!("fewest_relays {}", relays);
 }
 
-/// A chain of so many by the joint method in the scenario `of`: instructions in all, of the costliest portion, and
-/// how many portions.
+/// Solves a chain of `relays` relays by the joint method.
+///
+/// Returns the total instructions, those of the most expensive portion, and the number of portions.
 fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
@@ -52,7 +53,7 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     }
 }
 
-/// The joint method without a message.
+/// Measures the joint method without messages.
 pub(crate) fn joint() {
     let (all, most, portions) = solved(&HIGH, 8);
     hprintln!("solved_8 {}", all);

@@ -1,4 +1,4 @@
-//! What one relay's share of a turn and of a measurement costs.
+//! Cost of one relay's share of a turn and of a measurement.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -12,7 +12,7 @@ use uav_relay::optimiser::local::LocalSearch;
 use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
-/// The local search of Algorithm 2, and an estimate of what is measured.
+/// Measures the local search of Algorithm 2, and an estimate of the interference.
 pub(crate) fn shares() {
     let place = Placement::on_line;
     let beside = |place| HopEnd {

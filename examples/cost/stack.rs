@@ -1,4 +1,4 @@
-//! How much stack the calls of a relay use.
+//! Stack use of a relay's calls.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -14,7 +14,7 @@ use uav_relay::Settings;
 use super::counter::relay;
 use super::missions::mission;
 
-/// Bytes of stack that the calls of a relay use, at most: the stack below is painted, and the paint looked for.
+/// Measures the maximum stack use of a relay's calls, bytes, by the paint that is left below.
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);
     let mut head = relay(1, Settings::default(), TWO);
@@ -35,7 +35,6 @@ pub(crate) fn stack() {
     );
 }
 
-/// Hands over what one relay has to say.
 pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant) {
     let mut frame: FrameBuf = [0; MAX_FRAME];
     while let Some(transmit) = from.poll_transmit(now, &mut frame) {
@@ -43,13 +42,12 @@ pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant)
     }
 }
 
-/// Words that are painted: more than any call uses.
+/// Number of painted words: more than any call uses.
 pub(crate) const PAINTED: usize = 1024;
 
-/// What untouched stack looks like.
 pub(crate) const PAINT: u32 = 0xC0FF_EE11;
 
-/// Bytes of stack that `work` uses below this frame.
+/// Returns the bytes of stack that `work` uses below this frame.
 #[inline(never)]
 pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
     paint();
@@ -67,13 +65,13 @@ pub(crate) fn paint() {
     black_box(&words);
 }
 
-/// How much of the paint is gone, in bytes. The array is laid where that of `paint` was, and not written.
+/// Returns the bytes without paint. Its array lies where that of `paint` was, and is not written.
 #[inline(never)]
 pub(crate) fn look() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();
     let first = black_box(words.as_ptr().cast::<u32>());
     let untouched = (0..PAINTED)
-        // SAFETY: inside the array; that it may hold anything is the point, and volatile reads take it as it is.
+        // SAFETY: inside the array. Its content is arbitrary on purpose, and volatile reads take it as it is.
         .take_while(|at| unsafe { first.add(*at).read_volatile() } == PAINT)
         .count();
     u32::try_from(4 * (PAINTED - untouched)).unwrap_or(u32::MAX)

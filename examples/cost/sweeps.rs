@@ -1,4 +1,4 @@
-//! What sweeps, verdicts, frames and the prediction of Algorithm 1 cost.
+//! Cost of sweeps, verdicts, frames and the prediction of Algorithm 1.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -39,7 +39,7 @@ pub(crate) fn reach() {
     reach_in_noise();
 }
 
-/// The same hops in noise, from a ten-thousandth of what of the interferer arrives 100 m from it to a hundred times that.
+/// Measures the same hops with noise of 1e-4 to 100 times the interference 100 m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -70,7 +70,7 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// A full sweep through a middle relay, and through the last one of a chain of three; the verdict on its way back.
+/// Measures a full sweep through a middle and the last relay of three, and the verdict on its way back.
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -100,7 +100,7 @@ pub(crate) fn sweep() {
             black_box(middle.poll_transmit(now, &mut out));
             black_box(&out);
         }));
-        // Once more, out of the measured path: the frame itself.
+        // The same frame through a clone, outside of the measurement.
         again.handle_bytes(now, Port::Upstream, bytes);
         let Some((frame, len)) = sends(&mut again, now) else {
             break;
@@ -139,7 +139,7 @@ pub(crate) fn sweep() {
     hprintln!("settled {}", u32::from(head.phase() == Phase::Holding));
 }
 
-/// A full frame through the deframer and the checks.
+/// Measures a full frame through the deframer and the checks.
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -168,7 +168,7 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// The largest portion of the leader's prediction, and how many it takes for a hundred relays.
+/// Measures the largest portion of the leader's prediction for a hundred relays; counts the portions.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

@@ -1,4 +1,4 @@
-//! What it costs to take a new mission.
+//! Cost of accepting a new mission.
 
 use cortex_m_semihosting::hprintln;
 use uav_relay::Auth;
@@ -17,7 +17,7 @@ use super::auth::KEY;
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
-/// The transmitter offers relay 1 the mission that this was loaded with, as version 1.
+/// Measures relay 1 receiving the offer of its loaded mission as version 1 from the transmitter.
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);
     let now = Instant::ZERO;
@@ -35,7 +35,7 @@ pub(crate) fn upload() {
     if ground.upload(now, upload).is_err() {
         return;
     }
-    // Handshakes first; the offer is what is longer than they are.
+    // Handshakes come first; the offer is the frame after which the relay holds an upload.
     loop {
         while let Some(len) = ground.poll_transmit(&mut frame) {
             let bytes = frame.get(..len).unwrap_or_default();

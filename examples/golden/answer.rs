@@ -1,4 +1,4 @@
-//! What the golden image answers, byte by byte, on the target and on the host alike.
+//! Answers of the golden image, byte by byte the same on the target and on the host.
 
 use uav_relay::FrameBuf;
 use uav_relay::optimiser::verdict::Verdict;
@@ -6,24 +6,26 @@ use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Answer, Message, MessageError};
 
-/// What it says once it can hear.
+/// First output, once it can receive.
 pub const READY: &[u8] = b"ready\0";
 
-/// Answers what it hears: a good frame with itself, decoded and encoded again, and behind a sweep a verdict whose slacks are
-/// the sweep's targets, with a word about own profiles that is the sweep's about places chosen; a bad frame with a digit that says why, and a delimiter.
+/// Answers received frames.
+///
+/// A valid frame is answered with itself, decoded and encoded again; a sweep also with a verdict that repeats its targets as
+/// slacks and its `chosen` field as `own`; an invalid frame with a digit for the error, and a delimiter.
 pub struct Answerer {
     deframer: Deframer,
 }
 
 impl Answerer {
-    /// Has heard nothing yet.
+    /// Creates an answerer without any received bytes.
     pub const fn new() -> Self {
         Self {
             deframer: Deframer::new(),
         }
     }
 
-    /// Hears `byte`, and sends the answer if that was the last one of a frame.
+    /// Handles a received `byte`, and sends the answer if it completes a frame.
     pub fn hear(&mut self, byte: u8, mut send: impl FnMut(&[u8])) {
         let decoded = match self.deframer.push(byte) {
             None => return,

@@ -1,5 +1,5 @@
-//! Shows that the target and a PC agree on every byte: on USART2 (TX PA2, RX PA3), 115 200 baud, it answers each frame with
-//! what the crate makes of it. `host-tests/tests/qemu/golden.rs` has the same answers from a PC, and compares.
+//! Firmware that shows that target and PC agree on every byte: on USART2 (TX PA2, RX PA3), 115 200 baud, it answers each frame
+//! with the crate's result. `host-tests/tests/qemu/golden.rs` compares the answers with those of a PC.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -42,7 +42,7 @@ fn serve(mut uart: Uart) -> ! {
     use embedded_hal_nb::serial::Read as _;
 
     let mut answerer = answer::Answerer::new();
-    // What is sent to it before this would be lost.
+    // Bytes sent to it before this would be lost.
     say(&mut uart, answer::READY);
     loop {
         if let Ok(byte) = uart.read() {

@@ -1,4 +1,4 @@
-//! A command line that is wrong: one line with the option, its value and what it may be.
+//! Command-line parsing. A mistake is reported in one line with the option, its value and the allowed range.
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -8,16 +8,15 @@ use uav_relay_scenario::deployment::Deployment;
 
 use crate::config::{self, Beyond, Given};
 
-/// Reads the command line, and the file that `--config` names in it; where there is nothing to run, help or the mistake has been printed.
-/// `section` is the program's own part of the file.
+/// Parses the command line and the file named by `--config`. `section` adds the program's own section of that file.
 ///
 /// # Errors
-/// The status to end with.
+/// The exit status after `--help` or a mistake, which has been printed.
 pub fn read<T: Parser>(section: fn(&Deployment, &mut Given)) -> Result<(T, Beyond), ExitCode> {
     let (words, beyond) = config::read::<T>(section).map_err(|line| refuse(&line))?;
     let options = T::try_parse_from(words).map_err(|error| {
         if !error.use_stderr() {
-            // Help. Nobody is left to be told that it cannot be printed.
+            // Help text. A closed standard output is ignored.
             let _ = error.print();
             return ExitCode::SUCCESS;
         }
@@ -26,7 +25,7 @@ pub fn read<T: Parser>(section: fn(&Deployment, &mut Given)) -> Result<(T, Beyon
     Ok((options, beyond))
 }
 
-/// The mistake is the first paragraph; of the tips and the usage that follow, only what was meant is of use.
+/// Extracts clap's first paragraph and the suggested spelling. The other tips and the usage are dropped.
 fn first(text: &str) -> String {
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
@@ -43,21 +42,21 @@ fn first(text: &str) -> String {
     }
 }
 
-/// Says what is wrong.
+/// Prints the mistake and returns exit status 2.
 pub fn refuse(line: &str) -> ExitCode {
     complain(line);
     ExitCode::from(2)
 }
 
-/// One line on standard error. Not `eprintln!`: that panics where nobody reads any more.
+/// Writes one line to standard error. Unlike `eprintln!` it does not panic on a closed stream.
 pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// A whole number within `least` to `most`.
+/// Parses a whole number within `least` to `most`.
 ///
 /// # Errors
-/// The range, where it is not one of them.
+/// A message with the allowed range.
 pub fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, String> {
     let value: Option<u64> = text.trim().parse().ok();
     value
@@ -66,10 +65,10 @@ pub fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, St
         .ok_or_else(|| format!("must be a whole number within {least} to {most}"))
 }
 
-/// A number within `least` to `most`.
+/// Parses a number within `least` to `most`.
 ///
 /// # Errors
-/// The range, where it is not one of them.
+/// A message with the allowed range.
 pub fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
     let value = text.trim().parse().ok();
     value
@@ -77,10 +76,10 @@ pub fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
         .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
-/// One of several numbers.
+/// Parses a number that is one of several in an option's value; errors begin with its `name`.
 ///
 /// # Errors
-/// As [`number`], with its name.
+/// A message with the name and the allowed range.
 pub fn named(name: &str, text: &str, least: f32, most: f32) -> Result<f32, String> {
     number(text, least, most).map_err(|error| format!("{name} {error}"))
 }

@@ -1,6 +1,6 @@
-//! One file for all tools: what a scenario file says, as the options that would say it, before those of the command line.
+//! The `--config` file of all tools, translated to command-line options and inserted before those of the command line.
 //!
-//! So each number has one check and one name, and an option that is given in both places is that of the command line.
+//! Every number therefore has one name and one check, and the command line overrides the file.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -16,24 +16,23 @@ use uav_relay_scenario::mission;
 use crate::log::Log;
 use crate::site::degrees;
 
-/// The tolerance on the SIR that every relay of a chain is given.
 const TOLERANCE: f64 = 1e-4;
 
-/// What only a file can say.
+/// Settings that only a file can give.
 #[derive(Clone, Debug, Default)]
 pub struct Beyond {
-    /// The channel; without it that of the paper.
+    /// Channel of the file; `None` for the paper's.
     pub channel: Option<Channel>,
-    /// The field, where the file has one.
+    /// Interference field of the file, if any.
     pub field: Option<Interference>,
-    /// What single relays have of their own.
+    /// Profiles of single relays, with their indices.
     pub profiles: Vec<(u16, Profile)>,
-    /// What the command line says otherwise than the file.
+    /// Options of the command line that override the file.
     pub overrides: Vec<Override>,
 }
 
 impl Beyond {
-    /// Refuses an option for all relays where relay `index`, which has something of its own by the file, would not fly by it.
+    /// Refuses an option for all relays that relay `index` would ignore for its own `[[relay]]` profile.
     ///
     /// # Errors
     /// One line that names the option and the file's table.
@@ -48,25 +47,25 @@ impl Beyond {
     }
 }
 
-/// An option of the command line that counts, where the file says something else.
+/// Command-line option that overrides a different value in the file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Override {
-    /// The option and its value.
+    /// Option and its value.
     pub option: String,
-    /// What the file has in its place.
+    /// Value in the file that is overridden.
     pub instead: String,
     file: String,
 }
 
 impl Override {
-    /// Whether it is that option.
+    /// Returns true if the overriding option has this name.
     #[must_use]
     pub fn is(&self, name: &str) -> bool {
         self.option.split(' ').next() == Some(name)
     }
 }
 
-/// Says what the command line says otherwise than the file, a line each: nobody is to fly by a file that does not count unawares.
+/// Logs a line for each override, so that an ignored value of the file is noticed.
 pub fn tell(overrides: &[Override], log: &Log) {
     for one in overrides {
         let Override {
@@ -83,7 +82,7 @@ pub fn tell(overrides: &[Override], log: &Log) {
     }
 }
 
-/// Options that a file gives: their names, and their values; none for those without one.
+/// Options given by a file: names and values; `None` for flags without a value.
 #[derive(Debug, Default)]
 pub struct Given {
     options: Vec<(&'static str, Option<OsString>)>,
@@ -91,19 +90,19 @@ pub struct Given {
 }
 
 impl Given {
-    /// An option with a value, if there is one.
+    /// Adds an option if it has a value.
     pub fn value(&mut self, name: &'static str, value: Option<impl ToString>) {
         let value = value.map(|value| value.to_string().into());
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
-    /// An option with a path, which is relative to the folder of the file.
+    /// Adds an option with a path relative to the file's folder.
     pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
     }
 
-    /// An option with a path, as [`path`](Self::path), or with an address that begins with `udp:`.
+    /// Adds an option with a relative path, see [`path`](Self::path), or with a `udp:` address unchanged.
     pub fn path_or_udp(&mut self, name: &'static str, place: Option<&String>) {
         match place {
             Some(path) if !path.starts_with("udp:") => self.path(name, Some(&PathBuf::from(path))),
@@ -111,14 +110,14 @@ impl Given {
         }
     }
 
-    /// An option without a value.
+    /// Adds an option without a value if `is` is true.
     pub fn flag(&mut self, name: &'static str, is: Option<bool>) {
         if is == Some(true) {
             self.options.push((name, None));
         }
     }
 
-    /// Refuses what a file says of an autopilot that neither the file nor the command line has.
+    /// Refuses autopilot settings in the file when no autopilot is configured there or on the command line.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let value_of = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if value_of("--autopilot").is_some() || said(line, "--autopilot").is_some() {
@@ -135,7 +134,7 @@ impl Given {
         })
     }
 
-    /// The same less what the command line says, and less what it says otherwise; what of that is something else.
+    /// Removes options that the command line also gives or excludes. Returns the rest and the overrides with a different value.
     fn less(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
@@ -170,7 +169,7 @@ impl Given {
     }
 }
 
-/// What the command line gives for the option of that name, nothing for one without a value.
+/// Returns the command line's value for the option `name`; an empty text at the end of the line.
 fn said(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
@@ -183,24 +182,24 @@ fn said(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Whether two values are the same text, or the same numbers.
+/// Returns true if two values are the same text or the same list of numbers.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
         numbers.map(|number| Some(number?.to_bits())).collect()
     };
-    // An option without a value is followed by any other word.
+    // An empty value means that nothing follows the option.
     one == other || other.is_empty() || numbers(one).is_some_and(|one| Some(one) == numbers(other))
 }
 
-/// Options of an autopilot, and the keys of a file that give them.
+/// Autopilot options, and the file's keys for them.
 const OF_AUTOPILOTS: [(&str, &str); 3] = [
     ("--autopilot-baud", "autopilot_baud"),
     ("--autopilot-key-file", "autopilot_key_file"),
     ("--speed", "speed_m_s"),
 ];
 
-/// Options of the command line, and those of a file whose place they take.
+/// Command-line options, and the file's options that they exclude.
 const OTHERWISE: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
@@ -218,8 +217,9 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// The words of the command line, behind those of the file that `--config` names among them; and what only that can say. `section` is the
-/// program's own part of it.
+/// Returns the words of the `--config` file and the command line, and the settings that only a file can give.
+///
+/// `section` adds the program's own section of the file.
 ///
 /// # Errors
 /// One line that says what is wrong with the file.
@@ -277,7 +277,6 @@ pub fn read<T: Parser>(
     ))
 }
 
-/// The file that the command line names.
 fn named(line: &[OsString]) -> Option<PathBuf> {
     line.iter().enumerate().find_map(|(at, word)| {
         if word == "--config" {
@@ -288,9 +287,9 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// The scenario, as options of a mission.
+/// Adds the scenario's mission as options; returns the settings that have no option.
 fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
-    // For one relay: how many there are is in another section, or on the command line.
+    // The mission is built for one relay, because the number of relays is in another section or on the command line.
     let (mission, profiles) =
         mission::mission(scenario, 1, TOLERANCE).map_err(|error| error.to_string())?;
     let config = mission.config();
@@ -302,7 +301,7 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
     given.value("--distance", Some(config.distance_m));
     given.value("--altitude", Some(config.common.altitude_m));
     let (band, lateral) = (config.band, config.lateral);
-    // One altitude alone follows from that.
+    // A single altitude is given by `--altitude` alone.
     let is_band = band.least_m < band.most_m;
     let ends = format!("{},{}", band.least_m, band.most_m);
     given.value("--band", is_band.then_some(ends));
@@ -343,7 +342,7 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
     })
 }
 
-/// The scenario with room for any number of relays.
+/// Returns the scenario without a minimum separation, so that any number of relays fits.
 fn unspaced(scenario: &Scenario) -> Scenario {
     Scenario {
         min_separation_m: 0.0,
@@ -351,7 +350,7 @@ fn unspaced(scenario: &Scenario) -> Scenario {
     }
 }
 
-/// The sections that every program reads.
+/// Adds the `[network]` section, which every program reads.
 pub fn network(deployment: &Deployment, given: &mut Given) {
     let network = &deployment.network;
     given.value("--network", network.id);

@@ -1,9 +1,9 @@
-//! What is counted of the frames that come and go, as JSON.
+//! Frame counters as JSON.
 
 use serde_json::{Value, json};
 use uav_relay::Stats;
 
-/// Every counter of `stats`.
+/// Returns every counter of `stats`.
 #[must_use]
 pub fn counted(stats: &Stats) -> Value {
     json!({

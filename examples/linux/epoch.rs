@@ -1,7 +1,6 @@
-//! The number that rises at every start, in a file.
+//! Epoch file: a number that increases at every start.
 //!
-//! It is on the disk before it is used. So a loss of power at any moment leaves the number of the start before, or the next one, and
-//! no number is used twice.
+//! The new number is on the disk before it is used, so no power failure makes a relay use a number twice.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -9,11 +8,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::keep::keep;
 
-/// The epoch of this start: one more than `file` says, and written there. Without a file it is the seconds of the clock, so that
-/// a file that is lost does not begin again from 1.
+/// Returns this start's epoch, one more than in `file`, and writes it to the file.
+///
+/// A missing file counts as the clock's seconds since 1970, so that the epoch does not restart from 1.
 ///
 /// # Errors
-/// One line that names the file and what is wrong.
+/// One line that names the file and the fault.
 pub fn next(file: &Path) -> Result<u32, String> {
     let named = |error: &str| format!("--epoch-file {}: {error}", file.display());
     let last = match std::fs::read_to_string(file) {

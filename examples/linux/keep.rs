@@ -1,23 +1,23 @@
-//! A file that is on the disk whole, or as it was before: written beside, synced, and put in its place.
+//! Atomic file replacement: written beside, synced, then renamed.
 
 use std::fs::{File, remove_file, rename};
 use std::io::Write as _;
 use std::path::Path;
 
-/// Makes `bytes` all that is in `file`.
+/// Replaces the content of `file` with `bytes`. After a crash the file holds either the old or the new content.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn keep(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut beside = file.as_os_str().to_owned();
     beside.push(".new");
     let written = write(Path::new(&beside), bytes).and_then(|()| rename(&beside, file));
     if written.is_err() {
-        // On a full disk not even what was begun is left behind.
+        // Removes the partial file, which matters on a full disk.
         let _ = remove_file(&beside);
     }
     written?;
-    // The name too has to be on the disk.
+    // The renamed directory entry must be synced, too.
     let folder = file
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());

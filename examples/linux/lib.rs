@@ -1,23 +1,22 @@
-//! What the Linux programs of a chain have in common: `examples/linux_companion`, a relay, and `examples/linux_ground`, the ground's end
-//! of the chain.
+//! Modules shared by the Linux programs: `examples/linux_companion`, a relay, and `examples/linux_ground`, the ground station.
 //!
-//! | module | one idea |
+//! | module | content |
 //! | --- | --- |
-//! | [`command`] | a command line, checked; what is said of a mistake |
-//! | [`config`] | a file, as options before those of the command line |
-//! | [`mission`], [`site`] | the mission, and where its line is on earth, as options give them |
-//! | [`tty`] | a tty that never blocks, as a `SerialPort` |
-//! | [`replug`] | the same, opened again whenever it vanishes: all bytes of a port pass here |
-//! | [`tap`] | what goes over ports, in a capture |
-//! | [`lines`] | lines of a FIFO, whoever comes and goes |
-//! | [`sleep`] | sleep until a port, or something else, needs the program |
-//! | [`service`] | what a program that runs for days has beside its work |
-//! | [`log`] | its lines, written without ever waiting |
-//! | [`requests`], [`system`] | signals that ask something of it; those that end it, and time |
-//! | [`socket`], [`counters`] | a socket that tells what is counted; that, as JSON |
-//! | [`refusals`] | why frames are refused, in words |
-//! | [`notify`] | what systemd is told |
-//! | [`epoch`], [`keep`] | the number of this start, in a file; a file that is written whole or not at all |
+//! | [`command`] | command-line parsing and its error messages |
+//! | [`config`] | `--config` file, as options before those of the command line |
+//! | [`mission`], [`site`] | options of the mission, and of the line's place on earth |
+//! | [`tty`] | non-blocking tty as a `SerialPort` |
+//! | [`replug`] | tty that is reopened when it disappears; counts and captures its bytes |
+//! | [`tap`] | capture of the ports' traffic |
+//! | [`lines`] | lines from a FIFO, for any sequence of writers |
+//! | [`sleep`] | sleeps until a port or another file descriptor is ready |
+//! | [`service`] | clock, log, signals, status socket and systemd |
+//! | [`log`] | log lines, written without blocking the program |
+//! | [`requests`], [`system`] | SIGHUP and SIGUSR1; SIGINT, SIGTERM and the clock |
+//! | [`socket`], [`counters`] | status socket; frame counters as JSON |
+//! | [`refusals`] | reasons of rejected frames, in words |
+//! | [`notify`] | systemd notifications |
+//! | [`epoch`], [`keep`] | epoch file; atomic file replacement |
 #![cfg(unix)]
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Lines from a FIFO, whoever writes to it comes and goes.
+//! Lines from a FIFO. Writers may open and close it at any time.
 
 use std::fmt;
 use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
@@ -8,15 +8,14 @@ use rustix::fs::{FileType, Mode, OFlags, fstat, open};
 use rustix::io::{Errno, read};
 use uav_relay_scenario::number::{narrow, watts};
 
-/// No line is longer, bytes.
+/// Longest accepted line, bytes.
 pub const LONGEST: usize = 200;
 
-/// What a line may say of a power.
+/// Description of a valid power, for error messages.
 pub const POWER: &str =
     "a power within 1e-30 to 1e6 W, or that in dBm with the unit behind it, as -95 dBm";
 
-/// Returns the power in W that the words of a line give: a number of W, or a number of dBm with that unit behind it. `None` for anything else and
-/// outside 1e-30 to 1e6 W.
+/// Parses a power, W, from the words of a line: a number of W, or of dBm with that unit. `None` outside 1e-30 to 1e6 W.
 #[must_use]
 pub fn power_w(words: &[&str]) -> Option<f32> {
     let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
@@ -32,10 +31,9 @@ pub fn power_w(words: &[&str]) -> Option<f32> {
     (1e-30..=1e6).contains(&power_w).then_some(power_w)
 }
 
-/// Buffers that are read at once, at most.
 const READS: usize = 16;
 
-/// An open FIFO.
+/// Open FIFO.
 #[derive(Debug)]
 pub struct Fifo {
     fd: OwnedFd,
@@ -43,13 +41,13 @@ pub struct Fifo {
     begun: Begun,
 }
 
-/// What has come of a line so far; one byte more than the longest for one that is too long.
+/// Incomplete line: at most one byte more than [`LONGEST`], which marks it as too long.
 #[derive(Debug, Default)]
 pub struct Begun(Vec<u8>);
 
 impl Begun {
-    /// Takes bytes, and hands every line that ends in them to `line`, without its end. Of one that is longer than [`LONGEST`] it hands on the
-    /// first bytes, one more than that.
+    /// Appends bytes and passes each completed line to `line` without its line feed. Cuts a line to one byte more than
+    /// [`LONGEST`].
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {
@@ -63,13 +61,13 @@ impl Begun {
 }
 
 impl Fifo {
-    /// Opens it.
+    /// Opens the FIFO.
     ///
     /// # Errors
-    /// One line that names `option` and says what does not work.
+    /// One line that names `option` and the fault.
     pub fn open(option: &str, path: &Path) -> Result<Self, String> {
         let name = format!("{option} {}", path.display());
-        // With an end of its own to write to it is never at its end, whoever comes and goes.
+        // We open it for writing, too, so that it never reports an end of file when a writer leaves.
         let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
         let fd = open(path, flags, Mode::empty()).map_err(|error| format!("{name}: {error}"))?;
         let kind = fstat(&fd).map(|stat| FileType::from_raw_mode(stat.st_mode));
@@ -83,20 +81,20 @@ impl Fifo {
         })
     }
 
-    /// What to sleep on.
+    /// Returns the file descriptor to poll.
     #[must_use]
     pub fn fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
     }
 
-    /// Hands every line that has come since to `line`. Work: 64 KiB at most, whoever writes how much.
+    /// Passes each line received since the last call to `line`. Work: at most 64 KiB.
     pub fn read(&mut self, mut line: impl FnMut(&[u8])) {
         let mut buffer = [0; 4096];
         for _ in 0..READS {
             let count = match read(&self.fd, &mut buffer) {
                 Ok(count @ 1..) => count,
                 Err(Errno::INTR) => continue,
-                // This end holds the other one open as well, so there is no end, and no other error that a FIFO has.
+                // Nothing to read. An end of file can not occur, because this process holds the FIFO open for writing.
                 _ => break,
             };
             let bytes = buffer.get(..count).unwrap_or_default();

@@ -1,5 +1,5 @@
-//! The lines of the program. A thread of its own writes them, so whoever does not read them, or a disk that is full, holds up nobody: a
-//! line that cannot be written is dropped and counted, and the next one that can be says how many were.
+//! Log lines, written by a separate thread, so that a slow reader or a full disk never blocks the program. A line that can not be
+//! written is dropped and counted; the next written line reports how many were.
 
 use std::fmt;
 use std::fs::File;
@@ -15,33 +15,32 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use uav_relay::Instant;
 
-/// Lines that wait for a slow reader, at most.
+/// Maximum number of lines waiting for the writer.
 const QUEUE: usize = 1_024;
 
-/// How the lines are written, and where.
+/// Options of the log.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Log")]
 pub struct LogOptions {
-    /// Every line is one JSON object
+    /// Write every line as one JSON object
     #[arg(long)]
     json: bool,
-    /// File that the lines are added to, in place of standard output; made if it is missing
+    /// Append lines to this file, created if missing, instead of standard output
     #[arg(long, value_name = "FILE")]
     log_file: Option<PathBuf>,
 }
 
-/// The program that writes the lines. Logs of several programs are read side by side, so every line names it.
+/// Program that writes the lines. Logs of several programs are read side by side, so every line names it.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// Its name in a line of text: `relay 2`.
+    /// Name in a line of text: `relay 2`.
     pub name: String,
-    /// The field of a JSON line that names it: `index`.
+    /// Field of a JSON line that identifies the program: `index`.
     pub key: &'static str,
-    /// The value of that field.
+    /// Value of that field.
     pub value: Value,
 }
 
-/// How a line is written.
 #[derive(Debug)]
 struct Format {
     json: bool,
@@ -50,18 +49,18 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// All before it has been written, or dropped.
+    /// Acknowledges that all earlier lines have been written or dropped.
     Flush(SyncSender<()>),
 }
 
-/// What the two sides of the queue share.
+/// State shared by the two ends of the queue.
 #[derive(Debug, Default)]
 struct Shared {
     dropped: AtomicU64,
     reopen: AtomicBool,
 }
 
-/// Takes lines. No call waits, and none fails.
+/// Handle of the log. No call blocks, except `flush`, and none fails.
 #[derive(Clone, Debug)]
 pub struct Log {
     orders: SyncSender<Order>,
@@ -70,10 +69,10 @@ pub struct Log {
 }
 
 impl Log {
-    /// Starts the thread that writes lines; each line names `source`.
+    /// Starts the writer thread; each line names `source`.
     ///
     /// # Errors
-    /// One line that names the file that cannot be opened.
+    /// One line that names the file that can not be opened.
     pub fn open(options: &LogOptions, source: Source) -> Result<Self, String> {
         let out = Out::open(options.log_file.as_deref())?;
         let (orders, taken) = sync_channel(QUEUE);
@@ -100,7 +99,7 @@ impl Log {
         })
     }
 
-    /// One line: what happened at `now`, in one word or two and for people; `fields` are for programs alone.
+    /// Logs an event at `now`: a short name, fields for programs, and a text for people.
     pub fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
         let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
@@ -108,22 +107,22 @@ impl Log {
         }
     }
 
-    /// The same without fields.
+    /// Logs an event without fields.
     pub fn tell(&self, now: Instant, event: &str, text: fmt::Arguments<'_>) {
         self.say(now, event, Value::Null, text);
     }
 
-    /// Opens the file again before the next line, as after it was moved away.
+    /// Reopens the file before the next line, for log rotation.
     pub fn reopen(&self) {
         self.shared.reopen.store(true, Ordering::Relaxed);
     }
 
-    /// Lines that nobody took.
+    /// Returns the number of dropped lines.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
-    /// Waits until all lines are written, but no longer than `at_most`.
+    /// Waits until all lines are written, at most `at_most`.
     pub fn flush(&self, at_most: Duration) {
         let end = Clock::now() + at_most;
         let (done, heard) = sync_channel(1);
@@ -139,7 +138,6 @@ impl Log {
     }
 }
 
-/// Where lines go.
 struct Out {
     file: File,
     path: Option<PathBuf>,
@@ -151,7 +149,7 @@ impl Out {
             Some(path) => {
                 appended(path).map_err(|error| format!("--log-file {}: {error}", path.display()))?
             }
-            // Not `Stdout`: what is in its buffer would be written at the end of the program, which may take for ever.
+            // Not `Stdout`, because flushing its buffer at exit could block for ever.
             None => std::io::stdout()
                 .as_fd()
                 .try_clone_to_owned()
@@ -169,12 +167,11 @@ fn appended(path: &Path) -> std::io::Result<File> {
     File::options().append(true).create(true).open(path)
 }
 
-/// The other side of the queue.
 struct Writer {
     out: Out,
-    /// Whether the last line was written in part.
+    /// True if the last line was written only in part.
     torn: bool,
-    /// Dropped lines that were spoken of.
+    /// Number of dropped lines reported so far.
     told: u64,
     format: Arc<Format>,
     shared: Arc<Shared>,
@@ -217,7 +214,6 @@ impl Writer {
         }
     }
 
-    /// Whether all of it was written.
     fn put(&mut self, mut bytes: &[u8]) -> bool {
         while !bytes.is_empty() {
             match self.out.file.write(bytes) {
@@ -234,7 +230,7 @@ impl Writer {
 }
 
 impl Format {
-    /// Returns a line with its end: the time of day in UTC, the time since the start, the source, the event.
+    /// Formats a line: time of day in UTC, time since the start, source, event, text and a line feed.
     fn line(&self, now: Instant, event: &str, fields: Value, text: &str) -> String {
         let time = humantime::format_rfc3339_millis(SystemTime::now()).to_string();
         let micros = now.as_micros();
@@ -260,7 +256,7 @@ impl Format {
     }
 }
 
-/// A name with a line feed in it must not make two lines.
+/// Escapes control characters, so that a name with a line feed does not make two lines.
 fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for sign in text.chars() {

@@ -1,4 +1,4 @@
-//! The mission that the relays are loaded with, as options give it.
+//! Options of the mission.
 
 use clap::Args;
 use uav_relay::channel::AirGround;
@@ -7,14 +7,13 @@ use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig,
 
 use crate::command::{named, number};
 
-/// The interferer of the paper's multi-hop scenario.
 const PAPERS: Interference = Interference::Source(Interferer {
     power_w: 80.0,
     x_m: 500.0,
     y_m: 400.0,
 });
 
-/// The options of a mission but for the number of relays.
+/// Options of a mission, except the number of relays.
 #[derive(Args, Debug)]
 pub struct MissionOptions {
     /// Distance from transmitter to receiver, m, 1 to 1e6
@@ -23,13 +22,13 @@ pub struct MissionOptions {
     /// Altitude of every relay, m, 0.1 to 1e4
     #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = altitude)]
     pub altitude: f32,
-    /// Altitudes to choose from, m, 0.1 to 1e4, --altitude among them; without it that alone
+    /// Range of altitudes to choose from, m, 0.1 to 1e4, including --altitude; default: --altitude alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     pub band: Option<Band>,
-    /// Room to the left of the line to the receiver, as y in m, -1e5 to 0, for places that `joint` chooses
+    /// Left limit of the places that `joint` chooses, facing the receiver, as y in m, -1e5 to 0
     #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = left)]
     pub lateral_min: f32,
-    /// Room to its right, as y in m, 0 to 1e5
+    /// Right limit of these places, as y in m, 0 to 1e5
     #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = right)]
     pub lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
@@ -38,25 +37,25 @@ pub struct MissionOptions {
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
     pub uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7); or `unknown`, to relays
-    /// that listen; without it 80,500,400
+    /// Interferer: power (W, 1e-6 to 1e9), position along the line to the receiver and to the right of it (m, -1e7 to 1e7);
+    /// `unknown` for relays that listen; default 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
     pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = noise)]
     pub noise: f32,
-    /// Least distance between two relays, m, 0 to 1e5
+    /// Minimum distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = separation)]
     pub min_separation: f32,
 }
 
 impl MissionOptions {
-    /// What disturbs the hops: what was given, else the `field` of a file, else the paper's interferer.
+    /// Returns the given interferer, else the `field` of a file, else the paper's interferer.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// The parameters, for so many relays in this interference, over this channel or that of the paper.
+    /// Returns the parameters for `relays` relays; without a channel, the paper's.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -66,7 +65,7 @@ impl MissionOptions {
         interference: Interference,
         channel: Option<Channel>,
     ) -> Result<MissionConfig, String> {
-        // 2 GHz, excess losses of 0.1 dB with line of sight and 21 dB without: as the simulator has them, to the bit.
+        // 2 GHz, excess losses of 0.1 dB with line of sight and 21 dB without: bit-identical to the simulator's channel.
         let channel = match channel {
             Some(channel) => channel,
             None => Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)
@@ -94,10 +93,10 @@ impl MissionOptions {
     }
 }
 
-/// The mission of these parameters; `prefix` is that of the options that gave them, "--" or "--new-".
+/// Checks the parameters. Messages name options with their `prefix`, "--" or "--new-".
 ///
 /// # Errors
-/// One line that names the option and what is wrong.
+/// One line that names the option and the fault.
 pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     let MissionConfig {
         relays,
@@ -119,66 +118,66 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     })
 }
 
-/// m, 1 to 1e6.
+/// Parses a distance, m, 1 to 1e6.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn distance(text: &str) -> Result<f32, String> {
     number(text, 1.0, 1e6)
 }
 
-/// m, 0.1 to 1e4.
+/// Parses an altitude, m, 0.1 to 1e4.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn altitude(text: &str) -> Result<f32, String> {
     number(text, 0.1, 1e4)
 }
 
-/// y, m, -1e5 to 0.
+/// Parses the left limit, y in m, -1e5 to 0.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn left(text: &str) -> Result<f32, String> {
     number(text, -1e5, 0.0)
 }
 
-/// y, m, 0 to 1e5.
+/// Parses the right limit, y in m, 0 to 1e5.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn right(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1e5)
 }
 
-/// W, 1e-6 to 1e6.
+/// Parses a transmit power, W, 1e-6 to 1e6.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn power(text: &str) -> Result<f32, String> {
     number(text, 1e-6, 1e6)
 }
 
-/// W, 0 to 1.
+/// Parses a noise power, W, 0 to 1.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn noise(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1.0)
 }
 
-/// m, 0 to 1e5.
+/// Parses a separation, m, 0 to 1e5.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The allowed range.
 pub fn separation(text: &str) -> Result<f32, String> {
     number(text, 0.0, 1e5)
 }
 
-/// `unknown`, or power, W, and place, m.
+/// Parses `unknown`, or an interferer's power, W, and position, m.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The expected form or range.
 pub fn guess(text: &str) -> Result<Interference, String> {
     if text == "unknown" {
         return Ok(Interference::Unknown);
@@ -186,10 +185,10 @@ pub fn guess(text: &str) -> Result<Interference, String> {
     interferer(text).map(Interference::Source)
 }
 
-/// Power, W, and place, m.
+/// Parses an interferer's power, W, and position, m.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The expected form or range.
 pub fn interferer(text: &str) -> Result<Interferer, String> {
     let [power, x, y] = text.split(',').collect::<Vec<_>>()[..] else {
         return Err("must be three numbers: P,X,Y".to_owned());
@@ -201,10 +200,10 @@ pub fn interferer(text: &str) -> Result<Interferer, String> {
     })
 }
 
-/// Two altitudes, m.
+/// Parses the two ends of a range of altitudes, m.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The expected form or range.
 pub fn band(text: &str) -> Result<Band, String> {
     let (least, most) = text
         .split_once(',')

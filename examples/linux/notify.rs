@@ -1,22 +1,22 @@
-//! What systemd is told, by a datagram each: that the relay is ready, and again and again that it is alive (sd_notify(3)). Elsewhere nothing.
+//! Notifications to systemd (sd_notify(3)): ready, alive (watchdog) and stopping. They do nothing without systemd.
 
 use std::ffi::OsStr;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 
 use uav_relay::{Duration, Instant};
 
-/// Where it is told.
+/// Socket of systemd's notifications.
 #[derive(Debug)]
 pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
-    /// Between two signs of life, where they are asked for.
+    /// Watchdog period, if systemd requests one.
     every: Option<Duration>,
     due: Instant,
 }
 
 impl Notify {
-    /// As the environment asks for it; `None` where it does not, or where that cannot be reached: no reason not to fly.
+    /// Opens the socket named by the environment. `None` without one or if it can not be reached: the relay flies all the same.
     pub fn open() -> Option<Self> {
         let to = address(&std::env::var_os("NOTIFY_SOCKET")?)?;
         let socket = UnixDatagram::unbound().ok()?;
@@ -29,12 +29,12 @@ impl Notify {
         })
     }
 
-    /// Says that the relay has begun.
+    /// Reports that the program has started.
     pub fn ready(&self) {
         self.send("READY=1");
     }
 
-    /// Says that it is alive, when it is time to, and when to come back for that.
+    /// Reports that the program is alive when due; returns the time of the next report.
     pub fn tend(&mut self, now: Instant) -> Option<Instant> {
         let every = self.every?;
         if self.due <= now {
@@ -44,7 +44,7 @@ impl Notify {
         Some(self.due)
     }
 
-    /// Says that it ends as it was told to.
+    /// Reports that the program stops on request.
     pub fn stopping(&self) {
         self.send("STOPPING=1");
     }
@@ -54,7 +54,7 @@ impl Notify {
     }
 }
 
-/// A path, or behind an @ a name that is in no folder.
+/// Parses a path, or `@` and an abstract socket name.
 fn address(name: &OsStr) -> Option<SocketAddr> {
     #[cfg(target_os = "linux")]
     if let Some(name) = name.to_str().and_then(|name| name.strip_prefix('@')) {
@@ -64,7 +64,7 @@ fn address(name: &OsStr) -> Option<SocketAddr> {
     SocketAddr::from_pathname(name).ok()
 }
 
-/// Half of the silence that is allowed.
+/// Returns half of the watchdog timeout that systemd requests of this process.
 fn watchdog() -> Option<Duration> {
     let micros: u64 = std::env::var("WATCHDOG_USEC").ok()?.parse().ok()?;
     let pid = std::env::var("WATCHDOG_PID").ok();

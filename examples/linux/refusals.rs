@@ -1,17 +1,17 @@
-//! Why frames that arrive are refused, in words: said once for each reason.
+//! Reasons of rejected frames, in words. Each reason is reported once.
 
 use uav_relay::{Duration, Instant, Stats};
 
-/// Between two looks at the counters.
+/// Interval between two checks of the counters.
 const EVERY: Duration = Duration::from_millis(2_000);
 
-/// So many frames between two looks are no accident.
+/// Rejected frames between two checks before a reason is reported.
 const MANY: u32 = 3;
 
-/// So many damaged ones, and none that is whole, are no noise.
+/// Damaged frames between two checks, with no intact one, before a wrong baud rate is suspected.
 const DAMAGED: u32 = 10;
 
-/// What was seen, and what was said.
+/// Counters at the last check, and reasons already reported.
 #[derive(Debug, Default)]
 pub struct Refusals {
     last: Stats,
@@ -20,7 +20,7 @@ pub struct Refusals {
 }
 
 impl Refusals {
-    /// A reason that was not said before, if there is one now.
+    /// Returns a reason that was not reported before, if there is one.
     pub fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.look_at {
             return None;

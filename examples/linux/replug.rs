@@ -1,4 +1,4 @@
-//! A tty that is opened again whenever it vanishes: a cable that comes loose is no reason to leave the air.
+//! Tty that is reopened whenever it disappears, so that a loose cable does not end the program.
 
 use std::fmt;
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -14,13 +14,11 @@ use crate::log::Log;
 use crate::tap::Tap;
 use crate::tty::Tty;
 
-/// The first pause before it is tried again; each is twice the one before, up to [`LONGEST`].
+/// Pause before the first retry; each further pause doubles, up to [`LONGEST`].
 const FIRST: Duration = Duration::from_millis(250);
 const LONGEST: Duration = Duration::from_millis(4_000);
 
-/// A tty by its name, there or not.
-///
-/// All that comes and goes over a port passes through its `read` and `write`.
+/// Tty identified by its name, present or not. All its traffic passes through `read` and `write`.
 #[derive(Debug)]
 pub struct Replug {
     option: &'static str,
@@ -30,25 +28,25 @@ pub struct Replug {
     again_at: Instant,
     pause: Duration,
     counts: Counts,
-    /// Where what it carries is written down, if it is.
+    /// Capture of its traffic, if enabled.
     tap: Option<Tap>,
 }
 
-/// What a port has carried.
+/// Traffic counters of a port.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,
     written: u64,
-    /// Bytes for a port that was not there.
+    /// Bytes written while the port was missing.
     lost: u64,
     times_gone: u32,
 }
 
 impl Replug {
-    /// Opens it. That has to work once: a wrong name is a mistake, a cable that comes loose is not.
+    /// Opens the tty. This must succeed at the start, because a wrong name is a mistake.
     ///
     /// # Errors
-    /// One line that names the option and what is wrong.
+    /// One line that names the option and the fault.
     pub fn open(option: &'static str, path: &Path, baud: u32) -> Result<Self, String> {
         Ok(Self {
             option,
@@ -62,12 +60,12 @@ impl Replug {
         })
     }
 
-    /// What it carries from now on is written down there.
+    /// Captures all further traffic with `tap`.
     pub fn tapped(&mut self, tap: Tap) {
         self.tap = Some(tap);
     }
 
-    /// Gives a tty up that is of no use any more, and opens it again when it is time to. Each is said once.
+    /// Closes a failed tty and reopens it when a retry is due. Logs each change once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
@@ -102,24 +100,24 @@ impl Replug {
         }
     }
 
-    /// When it is to be tried again.
+    /// Returns the time of the next retry.
     pub fn wake(&self) -> Option<Instant> {
         self.tty.is_none().then_some(self.again_at)
     }
 
-    /// What to sleep on.
+    /// Returns the file descriptor and the events to poll.
     pub fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         self.tty.as_ref().map(|tty| (tty.as_fd(), tty.interest()))
     }
 
-    /// Takes note of what poll(2) has found.
+    /// Records the events that poll(2) reported.
     pub fn noticed(&mut self, events: PollFlags) {
         if let Some(tty) = &mut self.tty {
             tty.noticed(events);
         }
     }
 
-    /// Whether it is there.
+    /// Returns true while the tty is open.
     pub const fn is_open(&self) -> bool {
         self.tty.is_some()
     }
@@ -139,7 +137,7 @@ impl Replug {
         self.counts.read
     }
 
-    /// What it has counted.
+    /// Returns the state and the counters as JSON.
     pub fn status(&self) -> Value {
         json!({
             "option": self.option,
@@ -168,7 +166,7 @@ impl SerialPort for Replug {
         let count = tty.read(into)?;
         if count > 0 {
             self.counts.read += count as u64;
-            // One that dies as soon as it is opened is not tried more often for it.
+            // Only received bytes reset the pause: a tty that fails right after opening is not retried more often.
             self.pause = FIRST;
             if let Some(tap) = &mut self.tap {
                 tap.take(Direction::In, into.get(..count).unwrap_or_default());
@@ -179,7 +177,7 @@ impl SerialPort for Replug {
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
         let Some(tty) = &mut self.tty else {
-            // What is of today is of no use when it is back.
+            // The bytes would be outdated when the port is back.
             self.counts.lost += bytes.len() as u64;
             return Ok(bytes.len());
         };

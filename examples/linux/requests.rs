@@ -1,4 +1,4 @@
-//! What the operator asks of a relay in flight by signals: to open its log again (SIGHUP), and to say what it has counted (SIGUSR1).
+//! Requests by signals: reopen the log (SIGHUP), report the counters (SIGUSR1).
 
 use std::io::Read as _;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -10,7 +10,7 @@ use signal_hook::consts::{SIGHUP, SIGUSR1, SIGXFSZ};
 
 use crate::system::on;
 
-/// A stream for each of the two.
+/// Stream of each signal.
 #[derive(Debug)]
 pub struct Requests {
     hangup: UnixStream,
@@ -18,10 +18,10 @@ pub struct Requests {
 }
 
 impl Requests {
-    /// Begins to listen for them. A file that may not grow (SIGXFSZ) is an error like a full disk from now on, and no end of the program.
+    /// Registers the signals. SIGXFSZ becomes a write error, like a full disk, and does not end the program.
     ///
     /// # Errors
-    /// One line that says what does not work.
+    /// One line that names the fault.
     pub fn new() -> Result<Self, String> {
         signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
             .map_err(|error| format!("cannot wait for signals: {error}"))?;
@@ -31,17 +31,17 @@ impl Requests {
         })
     }
 
-    /// What to sleep on.
+    /// Returns the file descriptors to poll.
     pub fn fds(&self) -> [BorrowedFd<'_>; 2] {
         [self.hangup.as_fd(), self.status.as_fd()]
     }
 
-    /// Whether there was a SIGHUP since.
+    /// Returns true if SIGHUP arrived since the last call.
     pub fn take_hangup(&mut self) -> bool {
         drained(&mut self.hangup)
     }
 
-    /// Whether there was a SIGUSR1 since.
+    /// Returns true if SIGUSR1 arrived since the last call.
     pub fn take_status(&mut self) -> bool {
         drained(&mut self.status)
     }

@@ -1,4 +1,4 @@
-//! What a program that runs for days has beside its work: a clock, a log, signals, a socket that tells its counters, and systemd.
+//! Services of a long-running program: clock, log, signals, status socket and systemd.
 
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::os::unix::net::UnixStream;
@@ -15,16 +15,16 @@ use crate::requests::Requests;
 use crate::socket::StatusSocket;
 use crate::system::{now, on_stop};
 
-/// How long the last lines may take.
+/// Maximum time for the last log lines at exit.
 const LAST_LINES: Duration = Duration::from_millis(500);
 
-/// Where it is not possible to sleep as it should be.
+/// Longest sleep after poll(2) has failed.
 const NAP: Duration = Duration::from_millis(10);
 
-/// All of that.
+/// Services of a long-running program.
 #[derive(Debug)]
 pub struct Service {
-    /// Its lines.
+    /// Log of the program.
     pub log: Log,
     clock: Clock,
     socket: Option<StatusSocket>,
@@ -34,10 +34,10 @@ pub struct Service {
 }
 
 impl Service {
-    /// Begins: from now on signals are heard, and time runs. Every line of the log names `source`.
+    /// Registers the signals and starts the clock, the log and the socket. Every log line names `source`.
     ///
     /// # Errors
-    /// One line that says what does not work.
+    /// One line that names the fault.
     pub fn begin(
         log: &LogOptions,
         source: Source,
@@ -55,19 +55,21 @@ impl Service {
         })
     }
 
-    /// Time since the start.
+    /// Returns the time since the start.
     #[must_use]
     pub fn now(&self) -> Instant {
         now(self.clock)
     }
 
-    /// Tells systemd that it is ready.
+    /// Reports to systemd that the program is ready.
     pub fn ready(&self) {
         self.notify.iter().for_each(Notify::ready);
     }
 
-    /// Does what signals and the socket ask for: `answer` gets `None` for the state, or a command and the name of its sender. `who` goes on after
-    /// a hang-up. Returns the time to come back at the latest.
+    /// Handles signals and status requests, and reports to the watchdog; returns the time of the next call.
+    ///
+    /// `answer` gets `None` for a status request, or a command and its sender. `who` names the program in the line after a
+    /// SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,
@@ -98,7 +100,7 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// What to sleep on.
+    /// Returns the file descriptors and events to poll.
     pub fn interests(&self) -> impl Iterator<Item = (BorrowedFd<'_>, PollFlags)> {
         let [hangup, status] = self.requests.fds();
         let socket = self.socket.iter().flat_map(StatusSocket::fds);
@@ -108,30 +110,30 @@ impl Service {
             .map(|fd| (fd, PollFlags::IN))
     }
 
-    /// Whether a signal has asked it to end, by what was found at its [`interests`](Self::interests).
+    /// Returns true if SIGINT or SIGTERM arrived, given the poll results of [`interests`](Self::interests).
     #[must_use]
     pub fn is_over(found: &[PollFlags]) -> bool {
         found.first().is_some_and(|stop| !stop.is_empty())
     }
 
-    /// How long it is until `wake`; `None` for ever.
+    /// Returns the time left until `wake`; `None` means for ever.
     #[must_use]
     pub fn until(&self, wake: Option<Instant>) -> Option<Duration> {
         let time = self.now();
         wake.map(|at| Duration::from_micros(at.since(time).as_micros()))
     }
 
-    /// Sleeps for a moment where it is not possible to sleep as it should be: for want of memory, say.
+    /// Sleeps for at most 10 ms, as a substitute when poll(2) fails, for want of memory for instance.
     pub fn nap(span: Option<Duration>) {
         std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
     }
 
-    /// Tells systemd that it ends as it was told to.
+    /// Reports to systemd that the program stops on request.
     pub fn stopping(&self) {
         self.notify.iter().for_each(Notify::stopping);
     }
 
-    /// Writes the last lines.
+    /// Writes the last log lines.
     pub fn end(&self) {
         self.log.flush(LAST_LINES);
     }

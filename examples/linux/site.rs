@@ -1,4 +1,4 @@
-//! Where the transmitter and the receiver are on earth, as options give it.
+//! Options of the positions of transmitter and receiver on earth.
 
 use std::fmt;
 
@@ -6,19 +6,19 @@ use clap::Args;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Sites};
 
-/// The two ends of the line.
+/// Options of the two ends of the line.
 #[derive(Args, Debug)]
 pub struct SiteOptions {
-    /// Where the transmitter is: latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
+    /// Position of the transmitter: latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_rx", allow_hyphen_values = true, value_parser = site)]
     site_tx: Option<Geodetic>,
-    /// Where the receiver is
+    /// Position of the receiver
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     site_rx: Option<Geodetic>,
 }
 
 impl SiteOptions {
-    /// Both, if they were given.
+    /// Returns both sites if they were given.
     pub fn sites(&self) -> Option<Sites> {
         let (Some(tx), Some(rx)) = (self.site_tx, self.site_rx) else {
             return None;
@@ -26,10 +26,10 @@ impl SiteOptions {
         Some(Sites { tx, rx })
     }
 
-    /// The same, for a mission over `distance_m` metres.
+    /// Returns both sites if they were given, and checks that they are `distance_m` apart.
     ///
     /// # Errors
-    /// One line that says what is wrong.
+    /// One line that names the option and the right distance.
     pub fn of(&self, distance_m: f32) -> Result<Option<Sites>, String> {
         let Some(sites) = self.sites() else {
             return Ok(None);
@@ -45,7 +45,7 @@ impl SiteOptions {
     }
 }
 
-/// Two sites for people, and for other programs: as options give them.
+/// Displays two sites in the format of the options.
 #[derive(Clone, Copy, Debug)]
 pub struct Between(pub Sites);
 
@@ -56,17 +56,17 @@ impl fmt::Display for Between {
     }
 }
 
-/// A site as options give it.
+/// Formats a site in the format of the options.
 pub fn degrees(at: Geodetic) -> String {
     let part = |number: i32, unit: f64| f64::from(number) / unit;
     let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));
     format!("{lat:.7},{lon:.7},{:.3}", part(at.amsl_mm, 1e3))
 }
 
-/// Latitude, longitude, height.
+/// Parses latitude, longitude and height above the mean sea level.
 ///
 /// # Errors
-/// What it must be, where it is not.
+/// The expected form.
 pub fn site(text: &str) -> Result<Geodetic, String> {
     let form = "must be LAT,LON,AMSL: degrees within -90 to 90 and -180 to 180, and metres within -1000 to 10000";
     let numbers: Option<Vec<f64>> = text

@@ -1,4 +1,4 @@
-//! Sleep until a port has bytes, or room after it had none, or something else happens.
+//! Sleep until a port or another file descriptor is ready.
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
@@ -8,17 +8,18 @@ use rustix::io::Errno;
 
 use crate::replug::Replug;
 
-/// Sleeps until one of `ttys` has bytes, or room after it had none, or one of `others` what it waits for; for `at_most`, or for ever. What
-/// was found at each of `others`.
+/// Sleeps until one of `ttys` or `others` is ready, at most `at_most`, else for ever. Returns the events of each of `others`.
+///
+/// A tty is ready when it has bytes, or room after it had none.
 ///
 /// # Errors
-/// What the system says where it is not possible to sleep.
+/// The system's error if poll(2) fails.
 pub fn sleep<'a>(
     at_most: Option<Duration>,
     ttys: impl Iterator<Item = &'a mut Replug>,
     others: &[(BorrowedFd<'_>, PollFlags)],
 ) -> Result<Vec<PollFlags>, Errno> {
-    // Longer than a Timespec can be is for ever.
+    // A span too long for a Timespec means for ever.
     let timeout = at_most.and_then(|span| Timespec::try_from(span).ok());
     let mut ttys: Vec<&mut Replug> = ttys.filter(|tty| tty.is_open()).collect();
     let on_ttys = ttys.iter().filter_map(|tty| tty.interest());

@@ -1,5 +1,6 @@
-//! A unix socket for the operator: one JSON object for each connection, which is closed then. A client that sends a line gives a command, and the
-//! object says whether it was done; a client that sends nothing gets the state. No client is waited for: what it does not take it does not get.
+//! Unix socket for the operator: one JSON object for each connection, which is then closed. A client that sends a line gives a
+//! command, and the object reports the result; a client that sends nothing gets the state. The program never waits for a client:
+//! an answer that does not fit the kernel's buffer is cut.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -12,16 +13,15 @@ use uav_relay::{Duration, Instant};
 
 use crate::lines::LONGEST;
 
-/// Connections that are accepted at once, at most.
+/// Maximum number of connections accepted by one call.
 const ANSWERS: usize = 4;
 
-/// Connections that may be about to send a command, at most; further ones get the state at once.
+/// Maximum number of unanswered connections; the oldest beyond that get the state at once.
 const CLIENTS: usize = 16;
 
-/// How long a client may take to send a command.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// The socket; its name is removed in the end.
+/// Listening socket; its file is removed on drop.
 #[derive(Debug)]
 pub struct StatusSocket {
     listener: UnixListener,
@@ -29,7 +29,6 @@ pub struct StatusSocket {
     clients: Vec<Client>,
 }
 
-/// A connection that is not answered yet.
 #[derive(Debug)]
 struct Client {
     stream: UnixStream,
@@ -37,19 +36,19 @@ struct Client {
     until: Instant,
 }
 
-/// What a client asks for.
+/// Complete request of a client.
 #[derive(Debug)]
 pub struct Question {
     stream: UnixStream,
-    /// The line that it has sent, `None` for the state.
+    /// Received command line; `None` requests the state.
     pub command: Option<String>,
 }
 
 impl StatusSocket {
-    /// Makes it, in place of one that a program before has left behind.
+    /// Creates the socket, and replaces a stale one of an earlier program.
     ///
     /// # Errors
-    /// One line that names it and what is wrong.
+    /// One line that names the socket and the fault.
     pub fn open(path: &Path) -> Result<Self, String> {
         let named =
             |error: &dyn std::fmt::Display| format!("--status-socket {}: {error}", path.display());
@@ -73,13 +72,13 @@ impl StatusSocket {
         })
     }
 
-    /// Returns what to sleep on.
+    /// Returns the file descriptors to poll.
     pub fn fds(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         let clients = self.clients.iter().map(|client| client.stream.as_fd());
         std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Accepts connections and reads from them; returns the questions that are complete, and the time to look again.
+    /// Accepts connections and reads from them. Returns the complete requests, and the time of the next call.
     pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());
@@ -101,7 +100,7 @@ impl StatusSocket {
 }
 
 impl Client {
-    /// Reads; returns true once a line, the end or the time has come.
+    /// Reads; returns true after a line, the end of the stream, an overlong line or a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {
@@ -127,7 +126,7 @@ impl Client {
 }
 
 impl Question {
-    /// Returns the user and the process at the other end, as the system knows them.
+    /// Returns the user and the process at the other end, as reported by the system.
     #[must_use]
     pub fn user(&self) -> String {
         #[cfg(target_os = "linux")]
@@ -138,7 +137,7 @@ impl Question {
         "an unknown user".to_owned()
     }
 
-    /// Answers. It fits into what the kernel holds for a connection; a client that leaves no room gets less.
+    /// Sends the answer and closes the connection. A client that leaves no room in the kernel's buffer gets only a part.
     pub fn answer(mut self, answer: &Value) {
         let _ = self.stream.write_all(format!("{answer}\n").as_bytes());
     }

@@ -1,4 +1,4 @@
-//! What the system is asked for: time and signals.
+//! Monotonic time and signals.
 
 use std::io;
 use std::os::unix::net::UnixStream;
@@ -7,23 +7,23 @@ use std::time::Instant as Clock;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use uav_relay::Instant;
 
-/// Time since the start, by a clock that nobody sets.
+/// Returns the time since `clock`, a monotonic time.
 pub fn now(clock: Clock) -> Instant {
     Instant::from_micros(u64::try_from(clock.elapsed().as_micros()).unwrap_or(u64::MAX))
 }
 
-/// A stream that gets a byte at SIGINT or SIGTERM, so that poll(2) notices.
+/// Returns a stream that gets a byte at SIGINT or SIGTERM, for poll(2).
 ///
 /// # Errors
-/// One line that says what does not work.
+/// One line that names the fault.
 pub fn on_stop() -> Result<UnixStream, String> {
     on(&[SIGINT, SIGTERM])
 }
 
-/// A stream that gets a byte at each of these signals.
+/// Returns a stream that gets a byte at each of `signals`.
 ///
 /// # Errors
-/// One line that says what does not work.
+/// One line that names the fault.
 pub fn on(signals: &[i32]) -> Result<UnixStream, String> {
     let pipe = || -> io::Result<UnixStream> {
         let (ours, theirs) = UnixStream::pair()?;

@@ -1,5 +1,5 @@
-//! What goes over the neighbours' ports, in a capture that `cargo decode` and Wireshark read. It is written by a thread of its own: a slow
-//! disk holds up nobody, and what the thread cannot keep up with is left out and counted.
+//! Capture of the neighbour ports' traffic, for `cargo decode` and Wireshark. A separate thread writes it, so a slow disk blocks
+//! nothing; pieces that exceed the queue are left out and counted.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -14,13 +14,12 @@ use uav_relay_capture::{Capture, Cut, Direction, Frame, Interface};
 
 use crate::log::Log;
 
-/// Pieces that wait to be written, at most.
+/// Maximum number of pieces waiting to be written.
 const WAITING: usize = 1_024;
 
-/// Captures of one name, at most.
 const MOST: u32 = 9_999;
 
-/// What came or went at once, at a port of that number.
+/// Bytes received or sent by one call, at port number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -28,15 +27,15 @@ struct Piece {
     bytes: Vec<u8>,
 }
 
-/// What became of a capture, as all its taps see it.
+/// State of a capture, shared by all its taps.
 #[derive(Debug, Default)]
 struct Fate {
-    /// Why it ended before the program did.
+    /// Error that ended the capture early.
     fault: OnceLock<String>,
     is_told: AtomicBool,
 }
 
-/// The tap of one port.
+/// Tap of one port.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
@@ -47,7 +46,7 @@ pub struct Tap {
 }
 
 impl Tap {
-    /// Bytes have come or gone.
+    /// Queues received or sent bytes for the capture.
     pub fn take(&mut self, direction: Direction, bytes: &[u8]) {
         if bytes.is_empty() || self.is_over {
             return;
@@ -68,12 +67,12 @@ impl Tap {
         }
     }
 
-    /// Whether the file could not be written any more.
+    /// Returns true if the capture has ended because its file could not be written.
     pub const fn is_over(&self) -> bool {
         self.is_over
     }
 
-    /// Why the file could not be written any more; said by the first of its taps that is asked.
+    /// Returns the error that ended the capture, at the first call on any of its taps only.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let is_told = self.fate.is_told.swap(true, Ordering::Relaxed);
@@ -81,16 +80,16 @@ impl Tap {
         (!is_told).then_some(fault)
     }
 
-    /// Pieces that are missing in it.
+    /// Returns the number of pieces left out of the capture.
     pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 }
 
-/// Starts the capture of `program`, and returns a tap for each of the ports of these names and the file that is written.
+/// Starts a capture of `program`; returns one tap for each port, and the file that is written.
 ///
-/// An earlier capture is never overwritten, because it may be the only record of a crash that this start follows: where `path` exists, the file
-/// is `numbered`.
+/// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if `path` exists, the
+/// file is `numbered`.
 ///
 /// # Errors
 /// One line that names the file.
@@ -108,7 +107,7 @@ pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<(Vec<Tap>, P
     let fate = Arc::new(Fate::default());
     let ended = Arc::clone(&fate);
     std::thread::spawn(move || {
-        // Whoever taps is told by the channel that is gone.
+        // The closed channel informs the taps.
         if let Err(error) = write(&mut capture, &interfaces, &receiver) {
             _ = ended.fault.set(error.to_string());
         }
@@ -123,7 +122,7 @@ pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<(Vec<Tap>, P
     Ok((taps.collect(), path))
 }
 
-/// Logs which file is written instead of `asked`, if another one is.
+/// Logs the name of the written file if it differs from the requested one.
 pub fn tell(log: &Log, asked: &Path, written: &Path) {
     if asked == written {
         return;
@@ -141,7 +140,7 @@ pub fn tell(log: &Log, asked: &Path, written: &Path) {
     );
 }
 
-/// Creates the file, under the first name that is free; a device or a FIFO is opened as it is.
+/// Creates the file under the first free name; opens a device or a FIFO directly.
 fn create(path: &Path) -> Result<(File, PathBuf), String> {
     let named = |error: io::Error| format!("--capture {}: {error}", path.display());
     let is_other = path.metadata().is_ok_and(|it| !it.is_file());
@@ -177,7 +176,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Cuts what comes into frames, and writes them; what is written is in the file whenever nothing more waits.
+/// Splits pieces into frames and writes them; flushes whenever the queue is empty.
 fn write(
     capture: &mut Capture<BufWriter<File>>,
     interfaces: &[Interface],

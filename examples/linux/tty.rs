@@ -1,4 +1,4 @@
-//! A tty as a [`SerialPort`]: raw, 8N1, without flow control, and every call returns at once.
+//! Non-blocking tty as a [`SerialPort`]: raw, 8N1, without flow control.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::Path;
@@ -11,22 +11,21 @@ use rustix::termios::{
 };
 use uav_relay::serial::{Fault, SerialPort};
 
-/// An open tty.
+/// Open tty.
 #[derive(Debug)]
 pub struct Tty {
     fd: OwnedFd,
-    /// Option and path, as messages have it.
     name: String,
-    /// Whether it took less than it was last offered.
+    /// True if the last write was accepted only in part.
     full: bool,
     failure: Option<String>,
 }
 
 impl Tty {
-    /// Opens the tty that was given for `option`.
+    /// Opens the tty given by `option`.
     ///
     /// # Errors
-    /// One line that says what does not work.
+    /// One line that names the option, the path and the fault.
     pub fn open(option: &str, path: &Path, baud: u32) -> Result<Self, String> {
         let name = format!("{option} {}", path.display());
         let fd = configured(path, baud).map_err(|error| match error {
@@ -48,7 +47,7 @@ impl Tty {
         })
     }
 
-    /// What to sleep on: bytes that come in, and room if there was none.
+    /// Returns the events to poll: bytes received, and room to write after a partial write.
     pub fn interest(&self) -> PollFlags {
         if self.full {
             PollFlags::IN | PollFlags::OUT
@@ -57,14 +56,14 @@ impl Tty {
         }
     }
 
-    /// Takes note of what poll(2) has found. An adapter that is pulled out stays ready for ever: without this, a busy loop.
+    /// Records the events of poll(2). An unplugged adapter stays ready for ever and would otherwise cause a busy loop.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
             self.fail("is gone");
         }
     }
 
-    /// The line that says why this tty is of no use any more.
+    /// Returns the error that made this tty unusable.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
@@ -75,7 +74,7 @@ impl Tty {
             .get_or_insert_with(|| format!("{name}: {what}"));
     }
 
-    /// What has come of a read or write; none where that is for later.
+    /// Returns the number of bytes of a read or write; `None` if it must be retried later.
     fn done(&mut self, result: Result<usize, Errno>) -> Result<Option<usize>, Fault> {
         match result {
             Ok(count) => Ok(Some(count)),
@@ -106,7 +105,7 @@ impl SerialPort for Tty {
         let result = rustix::io::read(&self.fd, into);
         let count = self.done(result)?;
         if count == Some(0) {
-            // With VMIN = 1 the end of file is the other end's, not a lack of bytes.
+            // With VMIN = 1 an end of file means that the other end hung up.
             self.fail("is gone");
         }
         Ok(count.unwrap_or(0))
@@ -123,17 +122,17 @@ impl SerialPort for Tty {
     }
 
     fn has_left(&mut self) -> Result<Option<bool>, Fault> {
-        // Only asked where a pin enables the driver; the kernel does that for a tty (TIOCSRS485).
+        // Only called for a pin that enables the driver; for a tty the kernel does that (TIOCSRS485).
         Ok(None)
     }
 }
 
 fn configured(path: &Path, baud: u32) -> Result<OwnedFd, Errno> {
-    // Non-blocking from the start: opening must not wait for a carrier either.
+    // Non-blocking from the start, because opening must not wait for a carrier.
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let fd = open(path, flags, Mode::empty())?;
     let mut line = tcgetattr(&fd)?;
-    // Two readers would each get half of every frame. A lock, as terminal programs take it, ends with the process.
+    // Two readers would each get a part of every frame. This lock, used by terminal programs, ends with the process.
     flock(&fd, FlockOperation::NonBlockingLockExclusive)?;
     line.make_raw();
     line.input_modes -= InputModes::IXOFF | InputModes::IXANY;
@@ -141,7 +140,7 @@ fn configured(path: &Path, baud: u32) -> Result<OwnedFd, Errno> {
     line.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
     line.set_speed(baud)?;
     tcsetattr(&fd, OptionalActions::Now, &line)?;
-    // What came in before this relay was switched on, perhaps at another baud rate.
+    // Discards bytes from before the start, perhaps of another baud rate.
     tcflush(&fd, QueueSelector::IFlush)?;
     Ok(fd)
 }

@@ -1,31 +1,29 @@
-//! An autopilot that does not answer after a start, said once: no bytes, no MAVLink, or no autopilot.
+//! Reports an autopilot that does not answer after a start, once for each kind of fault: no bytes, no MAVLink, no autopilot.
 
 use uav_relay::{Duration, Instant};
 
-/// How long an autopilot may take to answer. It says something every second.
+/// Time that an autopilot has to answer. It sends a HEARTBEAT every second.
 const PATIENCE: Duration = Duration::from_millis(3_000);
 
-/// What has come from the port since the start.
+/// Best data received from the port since the start.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Answer {
-    /// No byte.
+    /// Empty so far: no byte has arrived.
     Nothing,
-    /// Bytes, and no whole frame of MAVLink 2.
+    /// Bytes without an intact MAVLink 2 frame.
     Noise,
-    /// Frames, and none from a known autopilot.
+    /// Frames, but none from a known autopilot.
     Others,
 }
 
-/// Watches a port until its autopilot is found.
 #[derive(Debug)]
 pub(crate) struct Answers {
-    /// What has come so far, and since when nothing better has; `None` once the autopilot is found.
+    /// Best data so far, and the time since when; `None` once the autopilot is found.
     newest: Option<(Answer, Instant)>,
     told: Option<Answer>,
 }
 
 impl Answers {
-    /// Begins to watch.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             newest: Some((Answer::Nothing, now)),
@@ -33,7 +31,7 @@ impl Answers {
         }
     }
 
-    /// Takes what has come so far, `None` for an autopilot; returns what to tell, once for each kind.
+    /// Takes the data received so far, `None` for an autopilot. Returns a fault to report, once for each kind.
     pub(crate) fn look(&mut self, now: Instant, heard: Option<Answer>) -> Option<Answer> {
         let (answer, since) = self.newest?;
         let Some(heard) = heard else {
@@ -51,12 +49,11 @@ impl Answers {
         self.told
     }
 
-    /// Returns what is missing, once it has been told.
+    /// Returns the reported fault while no autopilot is found.
     pub(crate) fn missing(&self) -> Option<Answer> {
         self.newest.and(self.told)
     }
 
-    /// Returns when to look at the latest.
     pub(crate) fn wake(&self) -> Option<Instant> {
         let (answer, since) = self.newest?;
         (self.told < Some(answer)).then(|| since + PATIENCE)

@@ -1,9 +1,9 @@
-//! A drone that is far from its line: sites with latitude and longitude swapped are places on earth like any other, and nothing else looks wrong.
+//! Detects a drone that is far from its line, for instance because latitude and longitude of the sites are swapped.
 //!
-//! | kind | position | told |
+//! | kind | position | reported |
 //! | --- | --- | --- |
-//! | off the line | more than 5 km from the line, so that the relay has no position | on the ground once, in the air every 10 s, and to the operator |
-//! | off the fence | more than [`FENCE_M`] outside the mission's geofence, horizontally | in the air every 10 s |
+//! | off the line | more than 5 km from the line, so that the relay has no position | once on the ground, every 10 s in the air; also to the operator |
+//! | off the fence | more than [`FENCE_M`] outside the mission's geofence, horizontally | every 10 s in the air |
 
 use std::fmt;
 
@@ -12,37 +12,33 @@ use uav_relay::flight::autopilot::OffLine;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Band, Duration, Geodetic, Instant, Placement, Sites};
 
-/// Least time from one line of a kind to the next.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// A position older than this is none.
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// How far outside the geofence a pilot may fly without a word, m.
+/// Distance outside the geofence that is not reported, m.
 const FENCE_M: f64 = 100.0;
 
-/// Sites that are so many times nearer with latitude and longitude swapped are asked about.
+/// Factor by which swapped sites must be nearer to the drone before the log asks about a swap.
 const NEARER: f64 = 10.0;
 
-/// The ways in which a drone is off.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
     Line,
     Fence,
 }
 
-/// A drone that is off.
+/// Drone outside its area.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Off {
     kind: Kind,
     away_m: f64,
-    /// How far outside the geofence, m.
     outside_m: f64,
     /// True where swapping latitude and longitude of both sites brings the line to the drone.
     is_swapped: bool,
 }
 
-/// Judges where the drone is: by its place near the line, and by what the link tells of a drone that has none.
+/// Compares the drone's position with its line and geofence.
 #[derive(Debug, Default)]
 pub(crate) struct Astray {
     newest: Option<(Instant, Placement)>,
@@ -53,24 +49,22 @@ pub(crate) struct Astray {
 }
 
 impl Astray {
-    /// Takes a place along the line.
     pub(crate) const fn handle_place(&mut self, now: Instant, place: Placement) {
         self.newest = Some((now, place));
     }
 
-    /// Returns the newest place, unless it is stale.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns what to tell of a drone that the link says is off the line between `sites`.
+    /// Returns the report for a drone that the autopilot link has found off the line between `sites`.
     pub(crate) fn is_off_line(&mut self, sites: Sites, off_line: OffLine) -> Option<Off> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Compares where the drone is now, off the line or at its newest place, with the line between `sites` and the mission's room beside it;
-    /// returns what to tell of the geofence, if anything.
+    /// Returns a geofence report if one is due. Compares the position, off the line or the newest one, with the line between
+    /// `sites` and the mission's `lateral` range.
     pub(crate) fn look(
         &mut self,
         now: Instant,
@@ -93,7 +87,7 @@ impl Astray {
         };
         (self.away_m, self.off) = (away_m, off);
         let off = off.filter(|off| off.kind == Kind::Fence)?;
-        // A drone waits on the ground, wherever that is; it is flown to its line from beside it.
+        // No report on the ground: a drone may wait anywhere, and is flown to its line from beside it.
         let is_due = self.fence_told_at.is_none_or(|at| now.since(at) >= AGAIN);
         if !is_in_air || !is_due {
             return None;
@@ -109,7 +103,7 @@ impl Astray {
         self.lines.as_ref()
     }
 
-    /// Returns the distance from the line, and how the drone is off, as JSON.
+    /// Returns the distance from the line and the deviation as JSON.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
@@ -122,7 +116,7 @@ impl Astray {
     }
 }
 
-/// The line between two sites, and the one with latitude and longitude of both swapped, where there is one.
+/// Line between two sites, and the line with latitude and longitude swapped where both are valid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
@@ -144,7 +138,6 @@ impl Lines {
         })
     }
 
-    /// Judges a drone that has no place along the line.
     fn off_line(&self, OffLine { at, away_m }: OffLine) -> Off {
         let away_m = f64::from(away_m);
         let swapped = self.swapped.as_ref().and_then(|axis| axis.away_m(at));
@@ -156,13 +149,13 @@ impl Lines {
         }
     }
 
-    /// Returns the distance from a place to the line, m.
+    /// Returns the horizontal distance from a position to the line, m.
     fn away_m(&self, place: Placement) -> f64 {
         let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
         along_m.hypot(place.y_m.into())
     }
 
-    /// Judges a drone at `place`, with the mission's room beside the line.
+    /// Evaluates a drone at `place`, given the mission's lateral range.
     fn off_fence(&self, place: Placement, lateral: Band) -> Option<Off> {
         let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
         let aside_m = beyond(
@@ -180,19 +173,18 @@ impl Lines {
     }
 }
 
-/// Returns how far a number is outside of a range.
+/// Returns the distance of a number from a range.
 fn beyond(value: f64, least: f64, most: f64) -> f64 {
     (least - value).max(value - most).max(0.0)
 }
 
 impl Off {
-    /// Returns what the operator reads on a ground station, of at most 50 bytes; `None` for what the log alone has.
+    /// Returns the text for the operator's ground station, at most 50 bytes. `None` for reports that are only logged.
     pub(crate) fn for_operator(&self) -> Option<String> {
         (self.kind == Kind::Line)
             .then(|| format!("relay: the drone is {} from its line", Far(self.away_m)))
     }
 
-    /// Returns the distances, for programs.
     pub(crate) fn fields(&self) -> Value {
         json!({ "from_line_m": self.away_m, "outside_m": self.outside_m })
     }
@@ -221,7 +213,7 @@ impl fmt::Display for Off {
     }
 }
 
-/// A distance, m, as a person would write it.
+/// Displays a distance, m, rounded for people.
 struct Far(f64);
 
 impl fmt::Display for Far {
@@ -232,7 +224,7 @@ impl fmt::Display for Far {
             ..9.95 => write!(f, "{km:.1} km"),
             ..999.5 => write!(f, "{km:.0} km"),
             _ => {
-                // No distance on earth has more digits.
+                // The longest distance on earth has five digits in km.
                 let (thousands, rest) = ((km.round() / 1e3).floor(), km.round() % 1e3);
                 write!(f, "{thousands:.0} {rest:03.0} km")
             }
@@ -286,7 +278,7 @@ mod tests {
         assert!(swapped.kind == Kind::Line && swapped.is_swapped);
         let text = swapped.to_string();
         assert!(text.ends_with("km from the line between transmitter and receiver: are latitude and longitude swapped?"), "{text}");
-        // Another valley.
+        // Sites in another valley.
         let other = off(site(46.54, 7.40), site(46.55, 7.41), drone).expect("off");
         assert!(other.kind == Kind::Line && !other.is_swapped);
         assert!(
@@ -294,7 +286,7 @@ mod tests {
                 .to_string()
                 .ends_with("sites of this flight, and is its position right?")
         );
-        // Longitudes that are no latitude cannot be swapped.
+        // A longitude above 90 degrees is no latitude, so there is no swapped line.
         let far = off(site(47.40, 138.54), site(47.41, 138.55), drone).expect("off");
         assert!(!far.is_swapped);
         for off in [swapped, other, far] {
@@ -306,7 +298,8 @@ mod tests {
     #[test]
     fn the_geofence_has_room_around_it() {
         let (tx, rx) = (site(47.40, 8.54), site(47.40, 8.55));
-        // Eastward, the room is on the left, in the north: 50 m, and 100 m more. A hundredth of a degree is 1112 m.
+        // The line points east, so its left side is north: 50 m in the mission and 100 m of tolerance. 0.01 degrees of latitude
+        // are 1112 m.
         for (lat, lon, outside) in [
             (47.400, 8.545, None),
             (47.4013, 8.545, None),

@@ -1,4 +1,4 @@
-//! The drone's autopilot, over a tty or UDP: opened again whenever it vanishes.
+//! Link to the drone's autopilot over a tty or UDP. A tty is reopened whenever it disappears.
 
 use std::fmt;
 use std::os::fd::BorrowedFd;
@@ -27,21 +27,17 @@ use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// What waits for a tty that is slow, at most, bytes: some seconds of what is said.
+/// Capacity of the send queue of a slow tty, bytes: some seconds of traffic.
 const WAITING: usize = 4_096;
 
-/// What its lines are about.
 const EVENT: &str = "autopilot";
 
-/// The number of this link in what is signed.
+/// MAVLink link number in signatures.
 const LINK: u8 = 0;
 
-/// The port that leads to the autopilot.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Where {
-    /// A tty, and its bit/s.
     Tty(PathBuf, u32),
-    /// A UDP port.
     Udp(Endpoint),
 }
 
@@ -54,7 +50,6 @@ impl fmt::Display for Where {
     }
 }
 
-/// What the autopilot signs with.
 #[derive(Clone, Copy)]
 pub(crate) struct SigningKey(pub(crate) [u8; 32]);
 
@@ -64,7 +59,6 @@ impl fmt::Debug for SigningKey {
     }
 }
 
-/// What to reach, and between which sites it flies.
 #[derive(Clone, Debug)]
 pub(crate) struct AutopilotPlan {
     pub(crate) place: Where,
@@ -79,27 +73,22 @@ enum Port {
     Udp(Datagrams),
 }
 
-/// The link, and what it goes over.
 #[derive(Debug)]
 pub(crate) struct Companion {
     plan: AutopilotPlan,
     link: Autopilot,
-    /// Between which sites it flies.
     between: Sites,
     port: Port,
     waiting: Vec<u8>,
     state: Option<&'static str>,
     answers: Answers,
     astray: Astray,
-    /// Lost relays that the operator has cleared over MAVLink, until they are taken.
+    /// Lost relays cleared by the operator over MAVLink, until collected.
     cleared: Vec<u16>,
 }
 
 impl Companion {
-    /// Opens it. That has to work once: a wrong name is a mistake, a cable that comes loose is not.
-    ///
-    /// # Errors
-    /// One line that says what does not work.
+    /// Opens the port. This must succeed at the start, because a wrong name is a mistake.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.place)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
@@ -121,7 +110,7 @@ impl Companion {
         })
     }
 
-    /// Says what is flown by what.
+    /// Logs the port, the speed limit and signing.
     pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.place, self.plan.pace);
         let from = match place {
@@ -142,7 +131,6 @@ impl Companion {
         }
     }
 
-    /// Says what was not believed.
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         let refused = self.link.refused();
         if refused > 0 {
@@ -154,7 +142,6 @@ impl Companion {
         }
     }
 
-    /// What it has counted, and how it is.
     pub(crate) fn status(&self) -> Value {
         let port = match &self.port {
             Port::Tty(tty) => tty.status(),
@@ -170,12 +157,12 @@ impl Companion {
         })
     }
 
-    /// Returns the drone's place along the line, unless it is older than 3 s.
+    /// Returns the drone's position along the line, unless it is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         self.astray.place(now)
     }
 
-    /// Moves bytes either way; hands the relay where the drone is and whether its setpoints are flown, and the autopilot the setpoint.
+    /// Exchanges bytes; passes position and control state to the relay, and its setpoint to the autopilot.
     pub(crate) fn drive(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
         if let Port::Tty(tty) = &mut self.port {
             tty.tend(now, log);
@@ -225,12 +212,12 @@ impl Companion {
         self.tell_astray(now, log, relay);
     }
 
-    /// Removes the lost relays that the operator has cleared over MAVLink.
+    /// Returns and removes the lost relays that the operator has cleared over MAVLink.
     pub(crate) fn take_cleared(&mut self) -> Vec<u16> {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Writes a line about a drone that is far from its line, and has the operator read it.
+    /// Reports a drone far from its line to the log and the operator, if due.
     fn tell_astray(&mut self, now: Instant, log: &Log, relay: &Relay) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -253,7 +240,7 @@ impl Companion {
         }
     }
 
-    /// Writes a line about an autopilot that has not answered since the start, once for each kind of answer in its place.
+    /// Logs an autopilot that has not answered since the start, once for each kind of fault.
     fn tell_unanswered(&mut self, now: Instant, log: &Log) {
         let heard = self.heard();
         if let Some(missing) = self.answers.look(now, heard) {
@@ -264,9 +251,9 @@ impl Companion {
         }
     }
 
-    /// Returns what has come so far in place of an autopilot's frames; `None` for those.
+    /// Returns the best data received so far; `None` once the autopilot is found.
     fn heard(&self) -> Option<Answer> {
-        // A frame that is refused for its signature is told in a line of its own.
+        // A rejected signature is logged separately.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
             return None;
         }
@@ -281,7 +268,7 @@ impl Companion {
         })
     }
 
-    /// Returns a line about an answer that is not an autopilot's: where, and what to look at.
+    /// Returns the log line for a missing autopilot: the port, and what to check.
     fn unanswered(&self, answer: Answer) -> String {
         match (answer, &self.port) {
             (Answer::Nothing, Port::Udp(datagrams)) => {
@@ -307,10 +294,10 @@ impl Companion {
         }
     }
 
-    /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
+    /// Switches to the sites of a newly adopted mission before any position along its line is sent.
     fn follow(&mut self, now: Instant, relay: &Relay) {
         let sites = relay.sites().unwrap_or(self.plan.sites);
-        // The relay has found that they make a line.
+        // The relay has checked that these sites form a valid line.
         if core::mem::replace(&mut self.between, sites) != sites
             && let Ok(axis) = Axis::between(sites)
         {
@@ -318,12 +305,12 @@ impl Companion {
         }
     }
 
-    /// Has the operator's ground station show what happened.
+    /// Shows an event of the relay on the operator's ground station.
     pub(crate) fn tell(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 
-    /// When to come back at the latest.
+    /// Returns the time of the next call of [`drive`](Self::drive).
     pub(crate) fn wake(&self, now: Instant) -> Instant {
         let link = self.link.poll_timeout(now);
         let again = match &self.port {
@@ -334,7 +321,6 @@ impl Companion {
         others.fold(link, |wake, again| wake.min(again.max(now)))
     }
 
-    /// What to sleep on.
     pub(crate) fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         match &self.port {
             Port::Tty(tty) => tty.interest(),
@@ -342,14 +328,13 @@ impl Companion {
         }
     }
 
-    /// Takes note of what poll(2) has found.
     pub(crate) fn noticed(&mut self, events: PollFlags) {
         if let Port::Tty(tty) = &mut self.port {
             tty.noticed(events);
         }
     }
 
-    /// Reads bytes of the autopilot, and returns how many; `None` if there are none.
+    /// Reads bytes; returns their number, or `None` if there are none.
     fn read(&mut self, into: &mut [u8]) -> Option<usize> {
         let count = match &mut self.port {
             Port::Tty(tty) => tty.read(into).ok(),
@@ -440,12 +425,11 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
     }
 }
 
-/// Returns the numbers of relays that a command names.
 fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
     relays.into_iter().filter(|node| *node != 0)
 }
 
-/// Writes a line about an operator's command over MAVLink, with its sender.
+/// Logs an operator's command over MAVLink, with its sender.
 fn commanded(
     now: Instant,
     log: &Log,
@@ -504,7 +488,6 @@ const fn waits(reason: WaitReason) -> &'static str {
     }
 }
 
-/// A state in one word, for programs.
 const fn word(state: State) -> &'static str {
     match state {
         State::Silent => "silent",
@@ -534,7 +517,7 @@ const fn mistrusted(why: Mistrust) -> &'static str {
     }
 }
 
-/// The stamp of this machine's clock. One that is behind the autopilot's takes that of what it hears.
+/// Returns this machine's time as a MAVLink stamp. A clock behind the autopilot's follows the stamps it receives.
 fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

@@ -1,4 +1,4 @@
-//! A UDP port of an autopilot, from a local port that stays the same from one start to the next.
+//! UDP port of an autopilot, from a local port that is the same at every start.
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, ToSocketAddrs as _, UdpSocket};
@@ -7,10 +7,9 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 use serde_json::{Value, json};
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// How often a call is repeated that only reports an earlier refusal.
+/// Maximum number of attempts of a call that reports an earlier refusal.
 const ATTEMPTS: usize = 4;
 
-/// The socket, and its counters.
 #[derive(Debug)]
 pub(crate) struct Datagrams {
     socket: UdpSocket,
@@ -18,15 +17,12 @@ pub(crate) struct Datagrams {
     endpoint: Endpoint,
     read: u64,
     written: u64,
-    /// How often the other computer has said that no program listens at that port.
+    /// Number of "connection refused" answers: no program listens at the autopilot's port.
     refused: u64,
 }
 
 impl Datagrams {
-    /// Binds the local port, and takes datagrams from the autopilot's address and port alone.
-    ///
-    /// # Errors
-    /// One line without the address: what is wrong, and what else may be stated.
+    /// Binds the local port; accepts datagrams only from the autopilot's address and port.
     pub(crate) fn open(endpoint: &Endpoint) -> Result<Self, String> {
         let Endpoint {
             host, port, local, ..
@@ -58,17 +54,17 @@ impl Datagrams {
         })
     }
 
-    /// Reads one datagram; returns its length, 0 where there is none.
+    /// Reads one datagram; returns its length, 0 if there is none.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> usize {
         for _ in 0..ATTEMPTS {
             match self.socket.recv(into) {
-                // An empty datagram says nothing; the next one may.
+                // An empty datagram is skipped.
                 Ok(0) => {}
                 Ok(count) => {
                     self.read += count as u64;
                     return count;
                 }
-                // The answer to an earlier datagram of ours. It hides what has come since.
+                // The refusal of an earlier datagram hides datagrams received since.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => return 0,
@@ -77,7 +73,7 @@ impl Datagrams {
         0
     }
 
-    /// Sends a frame. One that does not fit is dropped: the next one is newer.
+    /// Sends a frame. A frame that does not fit is dropped, because the next one is newer.
     pub(crate) fn send(&mut self, frame: &[u8]) {
         for _ in 0..ATTEMPTS {
             match self.socket.send(frame) {
@@ -85,7 +81,7 @@ impl Datagrams {
                     self.written += count as u64;
                     return;
                 }
-                // The answer to an earlier datagram of ours: this one has not been sent yet.
+                // The refusal of an earlier datagram: this one has not been sent yet.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => return,
@@ -93,12 +89,11 @@ impl Datagrams {
         }
     }
 
-    /// Returns the bytes received so far.
     pub(crate) const fn bytes_in(&self) -> u64 {
         self.read
     }
 
-    /// Returns where nobody answers, and what to look at.
+    /// Returns the address that does not answer, and what to check.
     pub(crate) fn silence(&self) -> String {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
@@ -111,7 +106,6 @@ impl Datagrams {
         )
     }
 
-    /// Returns the address and the counters.
     pub(crate) fn status(&self) -> Value {
         json!({
             "option": "--autopilot",
@@ -124,7 +118,6 @@ impl Datagrams {
         })
     }
 
-    /// Returns what to sleep on.
     pub(crate) fn fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }
@@ -149,7 +142,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// A refusal is the answer to an earlier datagram: it takes the place of neither the next one sent nor the next one received.
+    /// A refusal answers an earlier datagram and must lose neither the next sent nor the next received one.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

@@ -1,9 +1,9 @@
-//! Whether the ports toward other relays may send: not while what they would say is on its way to the disk.
+//! Send gate of the neighbour ports, closed while the state that frames would report is being written to disk.
 
 use std::cell::Cell;
 use std::rc::Rc;
 
-/// The same gate wherever it is cloned to; open at first.
+/// Shared gate: all clones have the same state, open at first.
 #[derive(Clone, Debug)]
 pub(crate) struct Gate(Rc<Cell<bool>>);
 

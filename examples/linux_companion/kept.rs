@@ -1,5 +1,5 @@
-//! A file that is written in flight, by a thread of its own: neither a slow disk nor a full one holds up the relay. Where the disk does not
-//! take it the relay stays in the air: it is said once, counted, and tried again every second.
+//! File written in flight by a separate thread, so that a slow or full disk never blocks the relay. After a failed write the
+//! relay flies on; the failure is logged once, counted, and retried every second.
 
 use std::io::{Read as _, Write as _};
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -13,23 +13,19 @@ use uav_relay::{Duration, Instant};
 use uav_relay_linux::keep::keep;
 use uav_relay_linux::log::Log;
 
-/// Between two tries.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// How long the end of the program waits for the disk.
 const LAST: Span = Span::from_millis(500);
 
-/// How a write ended, and how long it took.
 type Done = (std::io::Result<()>, Span);
 
-/// A file, and how it went.
 #[derive(Debug)]
 pub(crate) struct Kept {
     option: &'static str,
     file: PathBuf,
     orders: SyncSender<Vec<u8>>,
     done: Receiver<Done>,
-    /// Has a byte for every write that has ended, so that poll(2) notices.
+    /// Receives a byte for each finished write, for poll(2).
     ended: UnixStream,
     is_writing: bool,
     writes: u64,
@@ -40,10 +36,7 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
-    /// The file that was given for `option`; nothing is written yet.
-    ///
-    /// # Errors
-    /// One line that says what does not work.
+    /// Starts the writer thread of `file`, given by `option`; writes nothing yet.
     pub(crate) fn new(option: &'static str, file: &Path) -> Result<Self, String> {
         let named = |error: std::io::Error| format!("{option} {}: {error}", file.display());
         let (ended, mut end) = UnixStream::pair().map_err(named)?;
@@ -58,7 +51,7 @@ impl Kept {
                 if told.send((result, begun.elapsed())).is_err() {
                     return;
                 }
-                // It has room for a byte: the one before was taken with what it told of.
+                // It has room for this byte: the earlier one was read together with its result.
                 let _ = end.write(&[0]);
             }
         };
@@ -81,32 +74,29 @@ impl Kept {
         })
     }
 
-    /// Whether a write has not ended yet.
     pub(crate) const fn is_writing(&self) -> bool {
         self.is_writing
     }
 
-    /// Whether it is of use to try: not so soon after a try that failed.
+    /// Returns true unless the last attempt has failed less than a second ago.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         !self.failing || self.again_at <= now
     }
 
-    /// When to come back to try again.
     pub(crate) fn wake(&self) -> Option<Instant> {
         (self.failing && !self.is_writing).then_some(self.again_at)
     }
 
-    /// What to sleep on while it writes.
     pub(crate) fn fd(&self) -> BorrowedFd<'_> {
         self.ended.as_fd()
     }
 
-    /// Begins to make `bytes` all that is in the file. Nothing where it writes already.
+    /// Starts replacing the file's content with `bytes`; does nothing while a write is in progress.
     pub(crate) fn put(&mut self, bytes: Vec<u8>) {
         self.is_writing |= self.orders.try_send(bytes).is_ok();
     }
 
-    /// Whether what was put last is in the file, once that is known.
+    /// Returns the result of a finished write: true if it succeeded.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<bool> {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);
@@ -114,7 +104,7 @@ impl Kept {
         Some(self.took(now, log, result, took))
     }
 
-    /// Waits for a write that goes on, but not for long: the program ends.
+    /// Waits at most 0.5 s for a write in progress, at exit.
     pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
         if self.is_writing
             && let Ok((result, took)) = self.done.recv_timeout(LAST)
@@ -162,17 +152,14 @@ impl Kept {
         is_kept
     }
 
-    /// How often it was written.
     pub(crate) const fn writes(&self) -> u64 {
         self.writes
     }
 
-    /// How long a write took at most, ms.
     pub(crate) fn slowest_ms(&self) -> f64 {
         1e3 * self.slowest.as_secs_f64()
     }
 
-    /// How often it could not be written.
     pub(crate) const fn failures(&self) -> u64 {
         self.failures
     }

@@ -1,7 +1,7 @@
 //! Lost relays, and the operator's command to clear them: `clear-lost 3`.
 //!
-//! The guard keeps clear of a relay that fell silent, because its drone may still hover. Only a person can know that it has landed. The guard
-//! frees all of one side at once, so the command has to name every relay that is lost there.
+//! The guard keeps clear of a silent relay, because its drone may still hover. Only a person can know that it has landed. The
+//! guard frees all of one side at once, so the command has to name every lost relay of that side.
 
 use std::collections::BTreeSet;
 
@@ -10,20 +10,18 @@ use uav_relay::{Event, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// The command.
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// The relays that are lost, as far as this relay has noticed since its start.
+/// Relays that this relay has lost since its start.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,
-    /// Relays that were loaded.
+    /// Number of relays in the loaded mission.
     relays: u16,
     nodes: BTreeSet<u16>,
 }
 
 impl Lost {
-    /// Starts with no relay lost.
     pub(crate) const fn new(index: u16, relays: u16) -> Self {
         Self {
             index,
@@ -32,7 +30,6 @@ impl Lost {
         }
     }
 
-    /// Takes an event of the relay.
     pub(crate) fn event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { node, .. } if (1..=self.relays).contains(&node) => {
@@ -45,12 +42,11 @@ impl Lost {
         }
     }
 
-    /// Returns the relays that are lost.
     pub(crate) const fn nodes(&self) -> &BTreeSet<u16> {
         &self.nodes
     }
 
-    /// Does a command of `user`; returns the answer for the socket, and logs it.
+    /// Executes and logs a command of `user`; returns the answer for the socket.
     pub(crate) fn command(
         &mut self,
         now: Instant,
@@ -112,12 +108,12 @@ impl Lost {
         Ok(cleared(named, side))
     }
 
-    /// The operator has cleared these relays by a command over MAVLink.
+    /// Removes relays that the operator has cleared over MAVLink.
     pub(crate) fn are_cleared(&mut self, named: &[u16]) {
         self.nodes.retain(|node| !named.contains(node));
     }
 
-    /// Returns the number of a relay that can be lost.
+    /// Parses the number of a relay that may be cleared.
     fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
@@ -137,7 +133,7 @@ impl Lost {
     }
 }
 
-/// Returns the line about relays of one side that were cleared.
+/// Returns the log line for cleared relays of one side.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
     let stream = match side {
         Side::Upstream => "upstream",
@@ -149,7 +145,6 @@ pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> Strin
     )
 }
 
-/// Returns `relay 3 is` or `relays 3, 4 are`.
 fn listed(nodes: impl IntoIterator<Item = u16>) -> String {
     let nodes: Vec<String> = nodes.into_iter().map(|node| node.to_string()).collect();
     match &nodes[..] {

@@ -5,49 +5,48 @@
 //! cargo companion --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
 //! cargo companion --help
 //! ```
-//! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain are given the same `--of`,
-//! `--baud`, `--network` and mission; a neighbour that was given another mission is reported.
+//! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain get the same `--of`, `--baud`,
+//! `--network` and mission; a neighbour with another mission is reported.
 //!
-//! With `--key-file` and `--epoch-file` its frames are signed; without, anybody in range can move the drones, and it says so. One
-//! that signs takes new missions in flight (`examples/linux_ground` uploads them), and with `--upload-file` it still has them when it
-//! is switched on again. With `--view-file` it stands by what it has said in votes on who is in the chain when it is switched on again
-//! in flight; before another flight that file is removed.
+//! With `--key-file` and `--epoch-file` frames are signed; without, anybody in range can move the drones, and the log warns. A
+//! signing relay accepts new missions in flight (uploaded by `examples/linux_ground`), and `--upload-file` keeps them over a
+//! restart. `--view-file` keeps the relay's votes on the membership of the chain over a restart in flight; remove the file before
+//! another flight.
 //!
-//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with a PX4 or an ArduCopter, over a tty or UDP: it streams where to
-//! fly and hears where the drone is, so its setpoints keep drones apart on their way. With `--positions` it is told where the drone is by
-//! another program, which flies to the setpoints that are printed. Without either nothing keeps drones apart, and it says so.
+//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with a PX4 or an ArduCopter over a tty or UDP: it streams
+//! targets and receives positions, so that the guard can keep drones apart. With `--positions` another program reports the
+//! position, and flies to the logged setpoints. Without either nothing keeps drones apart, and the log warns.
 //!
-//! `--config` reads all of that from one file, the scenario of the other tools with sections of its own.
+//! `--config` reads all options from one file: the scenario of the other tools, with further sections.
 //!
-//! Every event is one line on standard output or in a file; an f32 also as its bits. In flight neither a port that vanishes nor a full disk nor
-//! a reader that stops ends it or holds it up. It ends with status 0 at Ctrl-C or SIGTERM, 1 where it cannot begin, 2 when
-//! the options or the --view-file are wrong.
+//! Every event is one line on standard output or in a file, with each f32 also as its bits. In flight the relay survives a lost
+//! port, a full disk and a blocked log. Exit status: 0 after Ctrl-C or SIGTERM, 1 if it can not start, 2 if the options or the
+//! --view-file are wrong.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `options.rs` | the command line, checked |
-//! | `section.rs` | the companion's part of the file, as options |
-//! | `listen.rs` | the part of it that is how the chain finds its interferer |
-//! | `ports.rs` | the ttys of either wiring |
-//! | `autopilot.rs` | the autopilot |
-//! | `datagrams.rs` | its UDP port |
-//! | `answers.rs` | an autopilot that does not answer |
-//! | `astray.rs` | a drone that is far from its line |
-//! | `positions.rs` | where the drone is, and what is heard there, from a FIFO |
-//! | `relay.rs` | the loop |
-//! | `report.rs` | the lines it says |
+//! | `options.rs` | command line, checked |
+//! | `section.rs` | `[companion]` section of the file, as options |
+//! | `listen.rs` | options of sensing |
+//! | `ports.rs` | ttys of either wiring |
+//! | `autopilot.rs` | link to the autopilot |
+//! | `datagrams.rs` | UDP port of the autopilot |
+//! | `answers.rs` | report of an autopilot that does not answer |
+//! | `astray.rs` | report of a drone far from its line |
+//! | `positions.rs` | positions and measurements from a FIFO |
+//! | `relay.rs` | main loop |
+//! | `report.rs` | log lines |
 //! | `movement.rs` | log lines for setpoints and the arrival |
-//! | `status.rs` | how the relay is, as JSON |
-//! | `uploads.rs` | the newest mission that was uploaded, in a file |
-//! | `views.rs` | what it has said in the votes on views, in a file |
-//! | `waits.rs` | log lines for what keeps the drone from its place |
+//! | `status.rs` | state of the relay as JSON |
+//! | `uploads.rs` | file of the newest uploaded mission |
+//! | `views.rs` | file of the relay's votes on views |
+//! | `waits.rs` | log lines for the reasons of a hold |
 //! | `lost.rs` | lost relays, and the operator's command to clear them |
-//! | `kept.rs` | a file that is written in flight, by a thread of its own |
-//! | `gate.rs` | nothing is sent before it is in such a file |
+//! | `kept.rs` | file written in flight by a separate thread |
+//! | `gate.rs` | send gate, closed while such a file is written |
 //!
-//! What it has in common with the ground station is a library, `examples/linux`.
-//!
-//! It runs on other kinds of Unix too; on a Mac the ttys are called `/dev/cu.*`.
+//! It shares a library with the ground station, `examples/linux`. It runs on other kinds of Unix, too; on a Mac the ttys are
+//! called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]
@@ -104,7 +103,7 @@ fn main() -> std::process::ExitCode {
         Err(Refusal { line, is_final }) => {
             uav_relay_linux::command::complain(&line);
             if is_final {
-                // As for wrong options: the unit does not start it again.
+                // Status 2, as for wrong options: the systemd unit does not restart the program.
                 ExitCode::from(2)
             } else {
                 ExitCode::FAILURE

@@ -1,7 +1,7 @@
 //! Log lines about the flight to the agreed position: setpoints, and the arrival.
 //!
-//! With an autopilot the guard moves the setpoint several times a second, so a line is written for each 0.5 m and for the end of each move.
-//! Without one another program may fly the drone by these lines, so a line is written for each change.
+//! With an autopilot the guard moves the setpoint several times a second, so a line is written for each 0.5 m and for the end of
+//! each move. Without one another program may fly the drone by these lines, so every change is logged.
 
 use serde_json::json;
 use uav_relay::{Duration, Instant, Placement, Relay};
@@ -9,28 +9,25 @@ use uav_relay::{Duration, Instant, Placement, Relay};
 use crate::status::at;
 use uav_relay_linux::log::Log;
 
-/// Least change of the setpoint that is logged, m.
 const STEP_M: f32 = 0.5;
 
-/// A drone that is this close to its agreed position has arrived, m: autopilots hover up to 0.9 m off their target.
+/// Maximum distance from the agreed position at arrival, m. Autopilots hover up to 0.9 m off their target.
 const NEAR_M: f32 = 1.0;
 
-/// How long a setpoint has to stay the same, and a drone close to it, for the end of the move: an overshoot is not an arrival.
+/// Time that setpoint and drone must stay at the end of a move, because an overshoot is no arrival.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
-/// A line to write.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Step {
-    /// The setpoint has changed.
     Setpoint(Placement),
-    /// The drone is close to its agreed position: where that is, and how far the drone is from it, m.
+    /// Agreed position that the drone has reached, and its remaining distance, m.
     Arrived(Placement, f32),
 }
 
-/// The setpoint and the drone's position, and the lines written about them.
+/// Setpoint and position of the drone, and the state of their log lines.
 #[derive(Debug)]
 pub(crate) struct Movement {
-    /// True where only changes above [`STEP_M`] are logged.
+    /// True if only changes above [`STEP_M`] are logged.
     is_sparse: bool,
     logged: Option<Placement>,
     newest: Option<Placement>,
@@ -43,7 +40,6 @@ pub(crate) struct Movement {
 }
 
 impl Movement {
-    /// Starts without a setpoint.
     pub(crate) const fn new(is_sparse: bool) -> Self {
         Self {
             is_sparse,
@@ -56,7 +52,7 @@ impl Movement {
         }
     }
 
-    /// Takes the event that the setpoint has changed; returns the line to write.
+    /// Handles a setpoint change; returns the line to log, if any.
     pub(crate) fn changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
         if self.is_sparse {
             return self.next(now, relay.setpoint(), relay.final_setpoint());
@@ -66,7 +62,7 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the line to write at `now` for a drone at `drone`, if there is one, and the time to look again.
+    /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next check.
     pub(crate) fn look(
         &mut self,
         now: Instant,
@@ -87,7 +83,7 @@ impl Movement {
         (step, end.into_iter().chain(near).min())
     }
 
-    /// Returns the setpoint if it is to be logged.
+    /// Returns the setpoint if it must be logged.
     fn next(
         &mut self,
         now: Instant,
@@ -122,7 +118,7 @@ impl Movement {
         self.near_since = None;
     }
 
-    /// Returns the arrival at `goal`, the setpoint once it is the agreed position.
+    /// Returns the arrival at `goal`, which is the setpoint once it equals the agreed position.
     fn arrival(
         &mut self,
         now: Instant,
@@ -145,8 +141,8 @@ impl Movement {
 }
 
 impl Step {
-    /// Writes the line. The setpoint is for people and other programs: `x_m` metres from the transmitter toward the receiver, `y_m` to the right
-    /// of that line as seen from above, at `altitude_m` above the ground; each number also as the bits of its f32.
+    /// Writes the line. A setpoint has `x_m` metres from the transmitter toward the receiver, `y_m` to the right of that line
+    /// seen from above, and `altitude_m` above the ground; each number also as the bits of its f32.
     pub(crate) fn tell(self, now: Instant, log: &Log) {
         match self {
             Self::Setpoint(place) => {
@@ -199,7 +195,7 @@ mod tests {
         }
     }
 
-    /// A setpoint that moves by 0.1 m every 0.2 s is logged every 0.6 m and where it stops; a small change later is not.
+    /// A setpoint moving 0.1 m every 0.2 s is logged every 0.6 m and where it stops. A small later change is not.
     #[test]
     fn a_line_for_each_half_metre_and_the_exact_end() {
         let mut movement = Movement::new(true);
@@ -219,7 +215,7 @@ mod tests {
         }
     }
 
-    /// Overshoot within 2 s is not an arrival; one arrival is logged for each move.
+    /// An overshoot within 2 s is no arrival; each move has one arrival.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

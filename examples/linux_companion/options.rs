@@ -1,4 +1,4 @@
-//! The command line, checked: what is wrong is one line with the option, its value and what it may be.
+//! Checked command line. A mistake is reported in one line with the option, its value and the allowed range.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,69 +25,66 @@ use uav_relay_linux::site::SiteOptions;
 use uav_relay_scenario::endpoint::{Endpoint, FORM};
 use uav_relay_scenario::key;
 
-/// A frame's way through two kernels and two USB adapters, and the computing: an adapter alone may wait 16 ms.
+/// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
 const LATENCY: Duration = Duration::from_millis(40);
 
-/// What a frame takes on a radio channel beside its bytes, in bytes: its header, and turning from receiving to sending.
+/// Overhead of a frame on a radio channel, bytes: its header, and the turnaround of the radio.
 const RADIO: u16 = 12;
 
-/// One relay of a chain, over ttys. Options of the mission must be the same for all relays; their defaults are the paper's
-/// multi-hop scenario.
+/// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
 #[derive(Parser, Debug)]
 #[command(name = "linux_companion", version)]
 struct Options {
-    /// TOML file with the scenario, as `cargo chain` and `cargo plan` read it, and sections `network` and `companion`: what it says, options
-    /// of the command line say otherwise
+    /// TOML file with the scenario, and the sections `network` and `companion`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Which relay this is: 1 is next to the transmitter
+    /// Number of this relay; 1 is next to the transmitter
     #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
     index: u16,
     /// Number of relays, 1 to 1000
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
     of: u16,
-    /// Tty toward the transmitter; relay 1 needs one only where that uploads missions
+    /// Tty toward the transmitter; relay 1 needs it only for uploads from there
     #[arg(long, value_name = "TTY")]
     upstream: Option<PathBuf>,
-    /// Tty toward the receiver; relay N needs one only where that uploads missions
+    /// Tty toward the receiver; relay N needs it only for uploads from there
     #[arg(long, value_name = "TTY")]
     downstream: Option<PathBuf>,
-    /// Tty to one channel that all relays hear, in place of the other two
+    /// Tty of one radio channel shared by all relays, instead of the other two
     #[arg(long, value_name = "TTY")]
     shared: Option<PathBuf>,
-    /// Bit/s on every tty, 1200 to 4000000
+    /// Bit rate of every tty, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     baud: u32,
-    /// Number of the network; frames of any other are ignored
+    /// Network number; frames of other networks are ignored
     #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
     network: u16,
-    /// File with the network's key, 64 hexadecimal digits: frames carry a tag, and only frames with one count
+    /// File with the network's key, 64 hexadecimal digits: frames are signed, and unsigned ones are rejected
     #[arg(long, value_name = "FILE", requires = "epoch_file")]
     key_file: Option<PathBuf>,
-    /// File that keeps the number of this start, made if it is missing; it must never go back
+    /// File with the epoch, a number increased at every start; created if missing; it must never go back
     #[arg(long, value_name = "FILE", requires = "key_file")]
     epoch_file: Option<PathBuf>,
-    /// File that keeps the newest mission that was uploaded in flight; without it a relay takes uploads, and has forgotten them when
-    /// it is switched on again
+    /// File for the newest mission uploaded in flight; without it an uploaded mission is lost at a restart
     #[arg(long, value_name = "FILE", requires = "key_file")]
     upload_file: Option<PathBuf>,
-    /// File that keeps what this relay has said in votes on who is in the chain, made if it is missing: with it a relay that is
-    /// switched on again in flight stands by that. Remove it before another flight
+    /// File for this relay's votes on the membership of the chain, created if missing; needed for a restart in flight. Remove it
+    /// before another flight
     #[arg(long, value_name = "FILE")]
     view_file: Option<PathBuf>,
-    /// Milliseconds of silence after which a neighbour is asked for a sign of life
+    /// Milliseconds of silence before a neighbour is probed
     #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
     probe_after_ms: u64,
-    /// Milliseconds of silence after which it counts as lost, above those of --probe-after-ms
+    /// Milliseconds of silence before a neighbour counts as lost, more than --probe-after-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
     dead_after_ms: u64,
-    /// FIFO with a line `x_m y_m altitude_m` whenever the autopilot knows better where the drone is, twice a second or more often:
-    /// setpoints then keep drones apart on their way. With --listen a line may end with the interference that was heard there, in W, or in dBm with that unit behind it
+    /// FIFO for lines `x_m y_m altitude_m` with the drone's position, twice a second or more often: setpoints then keep drones
+    /// apart. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
-    /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It is told where to fly, and tells where the
-    /// drone is. LOCAL is the local port that datagrams are sent from and received at, the same at every start: 14540 to 14549 for PORT 14580 to
-    /// 14589, as in PX4's simulation, and else PORT + 1000
+    /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
+    /// sends positions. LOCAL is the local port, the same at every start: 14540 to 14549 for PORT 14580 to 14589, as in PX4's
+    /// simulation, and else PORT + 1000
     #[arg(
         long,
         value_name = "TTY|udp:HOST:PORT[@LOCAL]",
@@ -95,39 +92,38 @@ struct Options {
         conflicts_with = "positions"
     )]
     autopilot: Option<String>,
-    /// Bit/s on its tty, 1200 to 4000000
+    /// Bit rate of its tty, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     autopilot_baud: u32,
-    /// File with the key that the autopilot signs with, 64 hexadecimal digits: then only what is signed with it counts, and what is said
-    /// to the autopilot is signed
+    /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits: frames to it are signed, and unsigned ones from it
+    /// are rejected
     #[arg(long, value_name = "FILE", requires = "autopilot")]
     autopilot_key_file: Option<PathBuf>,
-    /// The drone's greatest speed, m/s, 0.1 to 20
+    /// Maximum speed of the drone, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.1, 20.0))]
     speed: f32,
     #[command(flatten)]
     sites: SiteOptions,
-    /// How far off its place a hovering drone may be reported, m, 0 to 1000; it may come nearer to its neighbours by as much
+    /// Maximum position error of a hovering drone, m, 0 to 1000; drones may come closer to each other by as much
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.0, 1_000.0))]
     position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
-    /// How the places are found; with --field, only by `align`. What counts is what the first relay is given, with --field the
-    /// last one
+    /// Method of finding positions; with --field only `align`. The first relay's setting counts, with --field the last relay's
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
-    /// In place of --interferer, a field: Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the receiver
-    /// (m, -1e7 to 1e7), X rising
+    /// Interference field instead of --interferer: Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the
+    /// receiver (m, -1e7 to 1e7), X rising
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
-    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. A client that sends `clear-lost N` reports
-    /// that the lost relay N has landed: this relay need not keep clear of it any more
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The command `clear-lost N`
+    /// reports that the lost relay N has landed, so that this relay need not keep clear of it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     status_socket: Option<PathBuf>,
-    /// Write every frame that comes or goes at the ports toward other relays to a pcapng capture, for `cargo decode` and Wireshark. Where FILE
-    /// exists it is kept, and FILE-2, FILE-3 and so on is written. It grows as long as the relay flies
+    /// Write every frame of the neighbour ports to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2,
+    /// FILE-3 and so on is written instead. It grows throughout the flight
     #[arg(long, value_name = "FILE", help_heading = "Log")]
     capture: Option<PathBuf>,
     #[command(flatten)]
@@ -136,16 +132,16 @@ struct Options {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Method {
-    /// Algorithm 1, in a field Algorithm 4
+    /// Algorithm 1; in a field Algorithm 4
     Align,
-    /// Places, sides and altitudes together
+    /// Joint optimisation of positions, sides and altitudes
     #[value(alias = "altitude")]
     Joint,
     /// Algorithm 1, then Algorithm 2
     Adjust,
 }
 
-/// The ttys of either wiring, each with its option's name; none where there is no neighbour.
+/// Ttys of either wiring; `None` at an end of the chain.
 #[derive(Debug)]
 pub(crate) enum Ttys {
     Pair {
@@ -155,7 +151,6 @@ pub(crate) enum Ttys {
     Shared(PathBuf),
 }
 
-/// What to run.
 #[derive(Debug)]
 pub(crate) struct Plan {
     pub(crate) mission: Mission,
@@ -173,7 +168,6 @@ pub(crate) struct Plan {
     pub(crate) overrides: Vec<Override>,
 }
 
-/// What frames are signed with.
 pub(crate) struct Secret {
     pub(crate) key: [u8; 32],
     pub(crate) epoch_file: PathBuf,
@@ -186,7 +180,7 @@ impl std::fmt::Debug for Secret {
     }
 }
 
-/// Reads the command line; where there is nothing to run, help or the mistake has been printed.
+/// Reads the command line; otherwise returns the exit status after help or a mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     let (options, beyond) = command::read(section::companion)?;
     plan(&options, &beyond).map_err(|line| command::refuse(&line))
@@ -264,7 +258,6 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     })
 }
 
-/// The autopilot, and the line that it flies along.
 fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     let sites = options.sites.of(options.mission.distance)?;
     let (Some(name), Some(sites)) = (&options.autopilot, sites) else {
@@ -288,7 +281,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// How long a frame takes on a channel that all relays share, which has to carry them.
+/// Returns the hop time on a shared channel, and checks that the channel can carry all relays.
 fn carried(options: &Options) -> Result<Duration, String> {
     let load = ChannelLoad {
         in_range: options.of,
@@ -363,7 +356,7 @@ fn mission(options: &Options, beyond: &Beyond) -> Result<Mission, String> {
     mission::mission(config, "--")
 }
 
-/// The mission wants its field for as long as the program runs.
+/// Parses a field. Its points are leaked, because the mission refers to them until the program ends.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text

@@ -1,4 +1,4 @@
-//! The ttys of either wiring, and sleep until one of them or a timer needs the relay.
+//! Ttys of either wiring.
 
 use std::os::fd::BorrowedFd;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::{sleep, tap};
 
-/// A tty, or the end of the chain: nobody is there; behind a gate.
+/// Tty, or `None` at an end of the chain, behind the send gate.
 #[derive(Debug)]
 pub(crate) struct End(Option<Replug>, Gate);
 
@@ -27,7 +27,7 @@ impl SerialPort for End {
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
         if !self.1.is_open() {
-            // It waits, as for a port that takes nothing.
+            // Keeps the frame waiting, as a full port does.
             return Ok(0);
         }
         let all = Ok(bytes.len());
@@ -39,7 +39,6 @@ impl SerialPort for End {
     }
 }
 
-/// All that a relay is connected to.
 #[derive(Debug)]
 pub(crate) enum Ports {
     Pair(Box<Pair<End, End>>),
@@ -47,10 +46,7 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens them. Nothing is sent while `gate` is shut.
-    ///
-    /// # Errors
-    /// One line that names the tty.
+    /// Opens the ttys. Nothing is sent while `gate` is closed.
     pub(crate) fn open(ttys: &Ttys, baud: u32, gate: &Gate) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
             let tty = path
@@ -74,10 +70,7 @@ impl Ports {
         })
     }
 
-    /// Writes what goes over them to a capture from now on, and returns the file.
-    ///
-    /// # Errors
-    /// One line that names the file.
+    /// Captures all further traffic in a file; returns the file that is written.
     pub(crate) fn capture(&mut self, file: &Path) -> Result<PathBuf, String> {
         let (taps, file) = tap::taps(env!("CARGO_BIN_NAME"), file, &self.names())?;
         for (tty, tap) in self.ttys().zip(taps) {
@@ -86,7 +79,7 @@ impl Ports {
         Ok(file)
     }
 
-    /// Moves what can be moved, with a call of `keep` before anything is sent, and says when to come back at the latest.
+    /// Exchanges bytes with the relay, and calls `keep` before each send. Returns the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -99,7 +92,7 @@ impl Ports {
         }
     }
 
-    /// Opens again what has vanished, when it is time to, and says when to come back for that.
+    /// Reopens lost ttys when due; returns the time of the next retry.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         self.ttys()
             .filter_map(|tty| {
@@ -109,12 +102,10 @@ impl Ports {
             .min()
     }
 
-    /// Their names, as options give them.
     pub(crate) fn names(&mut self) -> Vec<String> {
         self.ttys().map(|tty| tty.to_string()).collect()
     }
 
-    /// What they have counted: bytes, and what went wrong with them.
     pub(crate) fn status(&mut self) -> Value {
         let links = match self {
             Self::Pair(pair) => vec![*pair.upstream.stats(), *pair.downstream.stats()],
@@ -141,11 +132,7 @@ impl Ports {
             .filter_map(|end| end.0.as_mut())
     }
 
-    /// Sleeps until a tty has bytes, or room after it had none, or one of `others` what it waits for; for `at_most`, or for ever. What was
-    /// found at each of `others`.
-    ///
-    /// # Errors
-    /// What the system says where it is not possible to sleep.
+    /// Sleeps until a tty or one of `others` is ready, at most `at_most`, else for ever. Returns the events of each of `others`.
     pub(crate) fn sleep(
         &mut self,
         at_most: Option<Duration>,

@@ -1,6 +1,5 @@
-//! Where the drone is, line by line from a FIFO: the autopilot's side writes `x_m y_m altitude_m` as often as it knows better, and behind
-//! that the interference that was heard there, if it was measured: `1.2e-12` in W, or `-95 dBm`. `receiver POWER` is what the ground receiver
-//! hears.
+//! Positions of the drone, read from a FIFO. Each line is `x_m y_m altitude_m`, optionally followed by the interference measured
+//! there, `1.2e-12` in W or `-95 dBm`; or `receiver POWER`, measured at the ground receiver.
 
 use std::os::fd::BorrowedFd;
 use std::path::Path;
@@ -9,26 +8,19 @@ use uav_relay::{Duration, Instant, Placement, Sample};
 use uav_relay_linux::lines::{self, Fifo, LONGEST, POWER};
 use uav_relay_linux::log::Log;
 
-/// A position older than this is not the drone's place any more.
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// The FIFO, and what its lines may say.
 #[derive(Debug)]
 pub(crate) struct Positions {
     fifo: Fifo,
-    /// Whether a line may have a power, too.
     listens: bool,
-    /// Lines that were none.
+    /// Number of invalid lines.
     bad: u64,
-    /// The newest position, and when it came.
     newest: Option<(Instant, Placement)>,
 }
 
 impl Positions {
-    /// Opens it.
-    ///
-    /// # Errors
-    /// One line that says what does not work.
+    /// Opens the FIFO; `listens` permits lines with a power.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
@@ -42,7 +34,7 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// The newest of the positions that have come since, and every measurement is handed to `heard`; the first line that is neither is said.
+    /// Returns the newest position received since the last call. Passes measurements to `heard` and logs the first invalid line.
     /// Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
@@ -71,12 +63,10 @@ impl Positions {
         fresh.map(|(_, place)| place)
     }
 
-    /// Lines that were none.
     pub(crate) const fn bad(&self) -> u64 {
         self.bad
     }
 
-    /// How many lines were no position, if any were.
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         if self.bad > 0 {
             log.tell(
@@ -88,7 +78,7 @@ impl Positions {
     }
 }
 
-/// The first line that is none is said.
+/// Counts an invalid line, and logs the first one.
 fn refuse(now: Instant, log: &Log, listens: bool, bad: &mut u64, line: &[u8]) {
     *bad += 1;
     if *bad > 1 {
@@ -109,7 +99,7 @@ fn refuse(now: Instant, log: &Log, listens: bool, bad: &mut u64, line: &[u8]) {
     );
 }
 
-/// Says whether drones are kept apart.
+/// Logs whether drones are kept apart.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     match positions {
         Some(positions) => log.tell(
@@ -128,7 +118,7 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Three numbers, a fourth where a power was measured there; or the word `receiver`, and the power that was measured at that.
+/// Parses a position, with a measured power or without, or the word `receiver` and a power.
 fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
     let text = std::str::from_utf8(text)
         .ok()

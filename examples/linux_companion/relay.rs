@@ -1,4 +1,4 @@
-//! The loop: move bytes, say what happened, sleep. Once it flies nothing ends it but a signal.
+//! Main loop: exchange bytes, log events, sleep. In flight only a signal ends it.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::os::fd::BorrowedFd;
@@ -24,7 +24,6 @@ use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::{config, epoch, tap};
 
-/// A relay, and all that it is connected to.
 struct Flight {
     service: Service,
     report: Report,
@@ -40,12 +39,10 @@ struct Flight {
     signs: bool,
 }
 
-/// Why the relay cannot start.
 #[derive(Debug)]
 pub(crate) struct Refusal {
-    /// The line for the user.
     pub(crate) line: String,
-    /// True if another start cannot succeed before somebody changes something; false for a port that may come back.
+    /// True if another start fails until somebody changes something; false for a port that may come back.
     pub(crate) is_final: bool,
 }
 
@@ -58,10 +55,7 @@ impl From<String> for Refusal {
     }
 }
 
-/// Runs the relay until it is told to stop.
-///
-/// # Errors
-/// Why it could not begin.
+/// Runs the relay until SIGINT or SIGTERM.
 pub(crate) fn fly(plan: &Plan) -> Result<(), Refusal> {
     let mut flight = Flight::begin(plan)?;
     flight.service.ready();
@@ -109,7 +103,7 @@ impl Flight {
         }
         let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
         let uploads = file.map(|file| Uploads::new(file)).transpose()?;
-        // Last of what may fail: a start that is refused again and again leaves no files.
+        // Last of the steps that may fail, so that repeated failing starts leave no files.
         if let Some(asked) = &plan.capture {
             tap::tell(&log, asked, &ports.capture(asked)?);
         }
@@ -149,7 +143,7 @@ impl Flight {
         })
     }
 
-    /// One turn of the loop; whether there is to be another.
+    /// Runs the loop once; returns false when the program must end.
     fn turn(&mut self) -> bool {
         let time = self.service.now();
         let Self { service, relay, .. } = self;
@@ -203,7 +197,7 @@ impl Flight {
         self.sleep(wake)
     }
 
-    /// Does what signals and the socket ask for, and says when to come back at the latest.
+    /// Handles signals and status requests; returns the time of the next call.
     fn tell(&mut self, time: Instant) -> Option<Instant> {
         let Self {
             service,
@@ -237,7 +231,7 @@ impl Flight {
         })
     }
 
-    /// Sleeps until there may be something to do; whether nobody said that it is enough.
+    /// Sleeps until there may be something to do; returns false after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> bool {
         let span = self.service.until(wake);
         let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
@@ -245,13 +239,13 @@ impl Flight {
         let files = [self.views.kept(), self.uploads.as_ref().map(Uploads::kept)];
         let files = files.into_iter().flatten().map(Kept::fd);
         others.extend(fifo.into_iter().chain(files).map(|fd| (fd, PollFlags::IN)));
-        // The last one, if any.
+        // The autopilot is the last entry, if there is one.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
         let found = self.ports.sleep(span, &others);
         let has_autopilot = autopilot.is_some();
         let Ok(found) = found else {
-            // A relay in the air goes on.
+            // A relay in flight continues.
             Service::nap(span);
             return true;
         };
@@ -281,7 +275,6 @@ impl Flight {
     }
 }
 
-/// What frames are signed with in this start.
 fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     let Some(secret) = &plan.secret else {
         return Ok(None);
@@ -292,14 +285,14 @@ fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     }))
 }
 
-/// Another number at every start, of the source that std keys its hash maps with.
+/// Returns a random number, from the seed of std's hash maps.
 pub(crate) fn seed() -> u32 {
     let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// Whether the relay goes on with what was uploaded before this start. A file that is of no use is no reason not to fly: the chain hands
-/// the relay the newer mission.
+/// Returns true if the relay resumes with an uploaded mission. An unusable file is logged and ignored: the chain sends the newer
+/// mission.
 fn resume(plan: &Plan, relay: &mut Relay, log: &Log) -> bool {
     let unused = |why: &str| log.tell(Instant::ZERO, "file", format_args!("{why}; not used"));
     match held(plan) {

@@ -1,5 +1,5 @@
-//! What the relay says, one line each: what happened, and every f32 also as its bits, so that two relays (or a relay and a simulation) can
-//! be compared exactly.
+//! Log lines of the relay. Each f32 is also printed as its bits, so that two relays, or a relay and a simulation, can be compared
+//! exactly.
 
 use std::fmt;
 
@@ -16,7 +16,6 @@ use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
 
-/// An f32 for people and, exactly, for programs.
 struct Exact(f32);
 
 impl fmt::Display for Exact {
@@ -26,21 +25,19 @@ impl fmt::Display for Exact {
     }
 }
 
-/// Writes the lines of one relay.
 #[derive(Debug)]
 pub(crate) struct Report {
     log: Log,
     identity: Identity,
-    /// As many as were loaded: nodes keep their numbers when some are lost.
+    /// Number of loaded relays; nodes keep their numbers when some are lost.
     relays: u16,
     digest: u16,
-    /// The box that no setpoint leaves, if there is a guard.
     fence: Option<Geofence>,
     movement: Movement,
 }
 
 impl Report {
-    /// Writes to `log`; `flies` is true where the companion itself hands the setpoints to an autopilot.
+    /// Writes to `log`; `flies` is true if the companion itself sends setpoints to an autopilot.
     pub(crate) fn new(
         log: Log,
         identity: Identity,
@@ -58,7 +55,7 @@ impl Report {
         }
     }
 
-    /// Who listens where. The digest of the mission is the same at all relays if they were given the same one.
+    /// Logs the relay's identity, ports and mission digest, which is equal at relays with the same mission.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -80,7 +77,7 @@ impl Report {
         );
     }
 
-    /// With which epoch frames are signed, if they are.
+    /// Logs the signing epoch, or that frames are not signed.
     pub(crate) fn signs(&self, epoch: Option<u32>) {
         match epoch {
             Some(epoch) => self.log.say(
@@ -97,7 +94,7 @@ impl Report {
         }
     }
 
-    /// That the relay flies what was uploaded before this start.
+    /// Logs that the relay flies a mission uploaded before this start.
     pub(crate) fn resumed(&self, relay: &Relay) {
         let version = relay.version();
         self.log.say(
@@ -108,7 +105,7 @@ impl Report {
         );
     }
 
-    /// That the relay stands by what it has said in the votes on views before this start.
+    /// Logs that the relay keeps its votes on views from before this start.
     pub(crate) fn stands_by(&self) {
         self.log.tell(
             Instant::ZERO,
@@ -164,7 +161,7 @@ impl Report {
         }
     }
 
-    /// Writes a line about the flight of a drone at `drone`, if one is due, and returns the time to look again.
+    /// Logs a setpoint or the arrival of a drone at `drone`, if due; returns the time of the next check.
     pub(crate) fn look(
         &mut self,
         now: Instant,
@@ -178,7 +175,7 @@ impl Report {
         again
     }
 
-    /// Why an upload is refused; of the geofence its numbers.
+    /// Logs a rejected upload, with the allowed range if it violates the geofence.
     fn refused(&self, now: Instant, why: LineError) {
         let Some(fence) = self.fence else {
             return self
@@ -201,7 +198,6 @@ impl Report {
             .say(now, "refused", json!({ "range_m": range }), what);
     }
 
-    /// Events about another node.
     fn of_a_node(&self, now: Instant, event: Event, relay: &Relay) {
         let (node, side) = match event {
             Event::NeighbourLost { side, node } | Event::NeighbourBack { side, node } => {
@@ -293,7 +289,7 @@ impl Report {
         self.identity.index
     }
 
-    /// What a node is called. Its number is that of its start, whoever was lost since: the receiver's is one above the last relay's.
+    /// Returns the name of a node by its initial number, with 0 for the transmitter and N + 1 for the receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),
@@ -302,7 +298,7 @@ impl Report {
         }
     }
 
-    /// The digest of the mission that is flown: that of the start, or of an upload.
+    /// Returns the digest of the mission in use, loaded or uploaded.
     fn flown(&self, relay: &Relay) -> u16 {
         match relay.upload() {
             Some(upload) if relay.version() == upload.version() => upload.id().digest,
@@ -310,7 +306,7 @@ impl Report {
         }
     }
 
-    /// Which mission is flown, and between which sites, if they are other ones than those that were loaded.
+    /// Logs the adopted mission and its sites, if they differ from the loaded ones.
     fn adopted(&self, now: Instant, relay: &Relay) {
         let version = relay.version();
         let fields = json!({ "version": version });
@@ -352,7 +348,6 @@ impl Report {
         );
     }
 
-    /// What is believed of the interference from now on.
     fn believed(&self, now: Instant, told: Told) {
         let tell = |text: fmt::Arguments<'_>| self.log.tell(now, "believed", text);
         match told.belief {

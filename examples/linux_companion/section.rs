@@ -1,10 +1,9 @@
-//! The companion's own part of the file, as options.
+//! `[companion]` section of the file, as options.
 
 use uav_relay_scenario::deployment::Deployment;
 
 use uav_relay_linux::config::{Given, network};
 
-/// What a file says to a companion.
 pub(crate) fn companion(deployment: &Deployment, given: &mut Given) {
     network(deployment, given);
     let own = &deployment.companion;

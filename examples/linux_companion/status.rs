@@ -1,4 +1,4 @@
-//! What a relay has counted and how it is, as one JSON object.
+//! State and counters of a relay as one JSON object.
 
 use serde_json::{Value, json};
 use uav_relay::{Placement, Relay, Side};
@@ -7,12 +7,11 @@ use uav_relay_linux::counters::counted;
 use crate::lost::Lost;
 use crate::waits;
 
-/// A place, m.
 pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }
 
-/// Returns the state of relay `index`, its number of the start, as JSON.
+/// Returns the state of relay `index`, its initial number, as JSON.
 pub(crate) fn of_relay(
     relay: &Relay,
     index: u16,

@@ -1,6 +1,6 @@
-//! The newest mission that was uploaded, in a file: [`Upload::encode`], and a CRC-32C behind it.
+//! File of the newest uploaded mission: [`Upload::encode`], followed by a CRC-32C.
 //!
-//! Without it, or with one that is of no use, a relay begins with the mission of its options; the chain hands it the newer one.
+//! Without a valid file a relay starts with the mission of its options; the chain sends it the newer one.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -12,13 +12,9 @@ use uav_relay::{Instant, Mission, Upload};
 use crate::kept::Kept;
 use uav_relay_linux::log::Log;
 
-/// Bytes of the file.
 const STORED: usize = Upload::LENGTH + 4;
 
-/// What was uploaded to relays that were loaded with `mission`; `None` if there is no `file`.
-///
-/// # Errors
-/// One line that names the file and says why it is of no use.
+/// Loads the mission uploaded to relays that were configured with `mission`. `None` if there is no `file`.
 pub(crate) fn load(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
     let named = |error: &str| format!("--upload-file {}: {error}", file.display());
     let bytes = match std::fs::read(file) {
@@ -42,20 +38,15 @@ fn parse(bytes: &[u8]) -> Option<Upload> {
     Upload::decode(upload).filter(|_| *check == sum(upload))
 }
 
-/// The file in flight: what is to be in it, until it is.
 #[derive(Debug)]
 pub(crate) struct Uploads {
     kept: Kept,
     unstored: Option<[u8; STORED]>,
-    /// What is being written.
     writing: Option<[u8; STORED]>,
 }
 
 impl Uploads {
-    /// Nothing is written yet.
-    ///
-    /// # Errors
-    /// One line that says what does not work.
+    /// Starts the writer thread; writes nothing yet.
     pub(crate) fn new(file: &Path) -> Result<Self, String> {
         Ok(Self {
             kept: Kept::new("--upload-file", file)?,
@@ -64,17 +55,17 @@ impl Uploads {
         })
     }
 
-    /// Has it written down by the next [`tend`](Self::tend).
+    /// Stores an upload at the next [`tend`](Self::tend).
     pub(crate) fn take(&mut self, upload: &Upload) {
         let mut bytes = [0; STORED];
         let (body, check) = bytes.split_at_mut(Upload::LENGTH);
-        // It has room for every upload.
+        // The buffer has room for every upload.
         upload.encode(body);
         check.copy_from_slice(&sum(body));
         self.unstored = Some(bytes);
     }
 
-    /// Has what is not written down yet written, and says when to come back for that. What cannot be kept is flown all the same.
+    /// Writes an unstored upload; returns the time of the next retry. A mission that can not be stored is flown all the same.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         if let Some(is_kept) = self.kept.tend(now, log) {
             let written = self.writing.take();
@@ -90,12 +81,10 @@ impl Uploads {
         self.kept.wake()
     }
 
-    /// The file.
     pub(crate) const fn kept(&self) -> &Kept {
         &self.kept
     }
 
-    /// Waits for the disk at the end, but not for long.
     pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
         self.kept.finish(now, log);
     }

@@ -1,8 +1,7 @@
-//! What the relay has said in the votes on views, in a file: [`ViewRecord::to_bytes`], and a CRC-32C behind it.
+//! File of the relay's votes on views: [`ViewRecord::to_bytes`], followed by a CRC-32C.
 //!
-//! It is on the disk before the others are told: a promise that is forgotten is none, and two parts of a chain could fly one view each. So while
-//! it is being written, by a thread of its own, nothing is sent; all else goes on.
-//! It is of one flight. Before another one the file is removed.
+//! A vote is on the disk before it is sent, because a relay that forgets a promise could split the chain into two views. While a
+//! separate thread writes it nothing is sent; everything else continues. Remove the file before another flight.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -17,23 +16,22 @@ use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--view-file";
 
-/// The file, and what stands in it.
 pub(crate) struct Views {
     kept: Option<Kept>,
     stored: Option<ViewRecord>,
-    /// What is being written.
     writing: Option<ViewRecord>,
-    /// What was written last, or could not be.
+    /// Record of the last write, successful or not.
     tried: Option<ViewRecord>,
-    /// Open where all that was said is stored.
+    /// Closed while the current record has not been written or tried.
     gate: Gate,
 }
 
 impl Views {
-    /// What was said before this start; nothing without a `file`, or if there is none yet.
+    /// Loads the record of an earlier start; no record without a `file`, or if it does not exist yet.
     ///
     /// # Errors
-    /// One line that names the file, what is wrong and what to do: a relay that has lost its votes must not vote again in the same flight.
+    /// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
+    /// flight.
     pub(crate) fn load(file: Option<&Path>, gate: Gate) -> Result<Self, Refusal> {
         let stored = match file {
             None => None,
@@ -58,13 +56,14 @@ impl Views {
         })
     }
 
-    /// What was stored before this start.
+    /// Returns the stored record, at the start that of an earlier run.
     pub(crate) const fn stored(&self) -> Option<&ViewRecord> {
         self.stored.as_ref()
     }
 
-    /// Has what `relay` has said written down, if that has changed; until it is, the gate is shut. Where it cannot be written it is tried again,
-    /// and the relay flies on, and speaks: a drone in the air is not to be switched off for it.
+    /// Writes the record of `relay` if it has changed, and closes the gate meanwhile.
+    ///
+    /// A failed write is retried, but the gate opens: a drone in the air must not fall silent for a full disk.
     pub(crate) fn keep(&mut self, now: Instant, log: &Log, relay: &Relay) {
         let Some(kept) = &mut self.kept else { return };
         if let Some(is_kept) = kept.tend(now, log) {
@@ -83,12 +82,10 @@ impl Views {
         self.gate.set(is_stored || is_tried);
     }
 
-    /// The file, if there is one.
     pub(crate) const fn kept(&self) -> Option<&Kept> {
         self.kept.as_ref()
     }
 
-    /// Waits for the disk at the end, but not for long.
     pub(crate) fn finish(&mut self, now: Instant, log: &Log) {
         if let Some(kept) = &mut self.kept {
             kept.finish(now, log);
@@ -96,7 +93,6 @@ impl Views {
     }
 }
 
-/// Returns the line about a record that the relay does not take.
 pub(crate) fn refused(file: Option<&Path>, error: RecordError) -> Refusal {
     let what = match error {
         RecordError::Base => format!(

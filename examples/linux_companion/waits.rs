@@ -1,4 +1,4 @@
-//! Log lines for what keeps the drone from its place.
+//! Log lines for the reasons that keep a drone from its position.
 
 use serde_json::json;
 use uav_relay::HoldReason;
@@ -6,17 +6,17 @@ use uav_relay::{Duration, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// A reason is logged once it has held for this time: others come and go while an agreement spreads.
+/// Time that a reason must hold before it is logged: short ones occur while an agreement spreads.
 const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns what keeps the drone from its place toward the transmitter and toward the receiver.
+/// Returns the reasons of a hold toward the transmitter and toward the receiver.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Reasons that were logged, and newer ones that have not held for long.
+/// Logged reasons, and newer ones that have not held long enough.
 #[derive(Debug, Default)]
 pub(crate) struct Waits {
     logged: [Option<HoldReason>; 2],
@@ -25,7 +25,7 @@ pub(crate) struct Waits {
 }
 
 impl Waits {
-    /// Logs reasons that have changed, and returns the time at which a change is to be looked at again.
+    /// Logs changed reasons; returns the time of the next check.
     pub(crate) fn tend(
         &mut self,
         now: Instant,
@@ -63,7 +63,6 @@ impl Waits {
     }
 }
 
-/// A reason in one word, for programs.
 pub(crate) const fn word(reason: HoldReason) -> &'static str {
     match reason {
         HoldReason::Unheard => "unheard",

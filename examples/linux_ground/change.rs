@@ -1,4 +1,4 @@
-//! Changes of an upload as log lines: each value that differs, and how far each relay moves.
+//! Log lines for an upload's changes: each value that differs, and the distance that each relay moves.
 
 use serde_json::json;
 use uav_relay::{Band, Instant, Interference, MissionConfig, Placement};
@@ -8,7 +8,6 @@ use uav_relay_linux::site::degrees;
 use crate::forecast::Move;
 use crate::new::Basis;
 
-/// Logs each value that differs.
 pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
     let pairs = values(before).into_iter().zip(values(after));
     let mut is_same = true;
@@ -27,7 +26,7 @@ pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
     }
 }
 
-/// Returns the values of a mission by their names, each as text with its unit.
+/// Returns the values of a mission with their names, each as text with its unit.
 fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     let MissionConfig {
         distance_m,
@@ -66,7 +65,6 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Logs how far each relay moves.
 pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
         let what = "cannot be computed in advance, since the relays measure the interference or find no positions";

@@ -1,4 +1,4 @@
-//! Where the relays will fly: a chain of simulated relays, running the on-board code, adopts the new mission beforehand.
+//! Forecast of the relays' positions: simulated relays with the on-board code adopt the new mission beforehand.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant as Clock};
@@ -10,29 +10,26 @@ use uav_relay::{
     Profile, Relay, Settings, Sites, Upload,
 };
 
-/// Time that a frame takes from one simulated relay to the next, µs.
+/// Latency of a frame between simulated relays, µs.
 const TURN_US: u64 = 1_000;
 
-/// Longest time that the computation may take.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Loaded mission of the relays, as far as a forecast needs it.
+/// Mission loaded into the relays, as needed for a forecast.
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded {
     pub(crate) mission: Mission,
     pub(crate) method: Method,
-    /// Profiles of single relays.
     pub(crate) profiles: Vec<(u16, Profile)>,
 }
 
-/// A frame on its way.
 struct Letter {
     to: usize,
     port: Port,
     bytes: Vec<u8>,
 }
 
-/// Simulated relays in a line, on wires without faults.
+/// Chain of simulated relays on perfect wires.
 struct Chain {
     relays: Vec<Relay>,
     agreed: Vec<bool>,
@@ -41,7 +38,7 @@ struct Chain {
 }
 
 impl Chain {
-    /// Relays that fly `flown`, or without it the mission that was loaded.
+    /// Creates relays that fly `flown`, or else the loaded mission.
     fn flying(loaded: &Loaded, flown: Option<&Upload>) -> Option<Self> {
         let relays = (1..=loaded.mission.relays()).map(|index| {
             let identity = Identity { network: 0, index };
@@ -72,12 +69,12 @@ impl Chain {
         })
     }
 
-    /// Delivers what was sent in the turn before, and takes what is sent in this one.
+    /// Delivers the frames of the previous turn and collects those of this one.
     fn turn(&mut self, version: u16) {
         self.now = Instant::from_micros(self.now.as_micros() + TURN_US);
         let now = self.now;
         for Letter { to, port, bytes } in std::mem::take(&mut self.letters) {
-            // Nobody answers for the transmitter and the receiver.
+            // Frames to the transmitter and the receiver are dropped.
             if let Some(relay) = to.checked_sub(1).and_then(|at| self.relays.get_mut(at)) {
                 relay.handle_bytes(now, port, &bytes);
             }
@@ -99,7 +96,7 @@ impl Chain {
         }
     }
 
-    /// Runs until all relays have agreed on their positions in the mission of that version; `None` where they do not by `end`.
+    /// Runs until all relays agree on positions in mission `version`. Returns `None` if they do not by `end`.
     fn positions(&mut self, version: u16, end: Clock) -> Option<Vec<Placement>> {
         self.agreed.fill(false);
         while !self.agreed.iter().all(|agreed| *agreed) {
@@ -112,18 +109,19 @@ impl Chain {
     }
 }
 
-/// A relay's agreed position before and after an upload.
+/// Agreed positions of a relay before and after an upload.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Move {
     pub(crate) index: u16,
     pub(crate) before: Placement,
     pub(crate) after: Placement,
-    /// Distance between the two, m.
     pub(crate) metres: f64,
 }
 
-/// Returns the move of each relay from `flown` (`None` for the loaded mission), along the line between `before`, to `new`, along the line between
-/// `after`. `None` where it cannot be told: the relays measure the interference, or do not agree within ten seconds of computing.
+/// Returns the move of each relay from `flown` to `new`; `flown` is `None` for the loaded mission.
+///
+/// The two pairs of sites are the lines before and after. `None` if the positions can not be predicted: the relays measure the
+/// interference, or do not agree within ten seconds of computing.
 pub(crate) fn moves(
     loaded: &Loaded,
     flown: Option<&Upload>,
@@ -156,7 +154,7 @@ pub(crate) fn moves(
     Some(moves.collect())
 }
 
-/// Returns the distance, m, of a position along the first line from one along the second; both are one line where either is unknown.
+/// Returns the distance, m, of positions along two lines, treated as one line if either is unknown.
 fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f64 {
     let on_earth = |axis: &Option<Axis>, place| axis.as_ref().and_then(|axis| axis.point(place));
     let [one, other] = lines;

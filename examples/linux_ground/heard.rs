@@ -1,4 +1,4 @@
-//! Which relays near by are heard, as far as they were spoken to: one that does not answer for a while is lost.
+//! Nearby relays that answer this station. A relay that does not answer for a while is lost.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use uav_relay_linux::log::Log;
 
 use crate::report;
 
-/// How long an answer is awaited: a handshake is lost now and then, and asked for again with the next measurement.
+/// Time that an answer may take: a lost handshake is repeated with the next measurement.
 const PATIENCE: Duration = Duration::from_millis(5_000);
 
-/// How a relay is that was heard once: that, or since when it does not answer.
+/// State of a relay that has answered before.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
     Heard,
@@ -18,12 +18,11 @@ enum State {
     Lost,
 }
 
-/// All that were.
 #[derive(Debug, Default)]
 pub(crate) struct Hearing(BTreeMap<u16, State>);
 
 impl Hearing {
-    /// Looks who answers, says what has changed, and when to come back at the latest.
+    /// Updates and logs the states of the relays; returns the time of the next check.
     pub(crate) fn look(&mut self, now: Instant, ground: &Ground, log: &Log) -> Option<Instant> {
         for (node, answers) in ground.near() {
             let before = self.0.get(&node).copied();
@@ -48,7 +47,6 @@ impl Hearing {
         ends.min()
     }
 
-    /// The relays that are heard.
     pub(crate) fn nodes(&self) -> Vec<u16> {
         let heard = self.0.iter().filter(|(_, state)| **state != State::Lost);
         heard.map(|(node, _)| *node).collect()

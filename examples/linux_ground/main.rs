@@ -1,4 +1,4 @@
-//! The ground's end of a chain, over a real tty: hands it a new mission, or stays at its post.
+//! Ground station at one end of a chain, over a tty: uploads a new mission, or keeps answering the relays.
 //!
 //! ```text
 //! cargo ground --tty /dev/ttyUSB0 --end tx --of 3 \
@@ -7,33 +7,33 @@
 //!   --key-file network7.key --epoch-file rx.epoch --stand --measurements udp:9000
 //! cargo ground --help
 //! ```
-//! It is the transmitter or the receiver of the chain: connect it where the relay next to that listens, or to the channel that
-//! all hear (`--shared`). `--of`, `--network` and the options of the mission say what the relays were loaded with, as `linux_companion`
-//! was given it, or as a file has it (`--config`): another channel than the paper's, or a field, only that can say.
-//! The options that begin with `--new-` say what is different from now on. The chain is asked what it flies, and values that none of them states stay
-//! so. Every change is shown, with the distance that each relay moves, and is to be confirmed (`--yes`, `--dry-run`). Every upload has a
-//! larger `--version` than the one before, and the epoch file is this program's own.
+//! It acts as the transmitter or the receiver of the chain: connect it to the relay next to that end, or to the channel shared by
+//! all (`--shared`). `--of`, `--network` and the mission options describe the mission loaded into the relays, as given to
+//! `linux_companion`, or in a file (`--config`); only a file can give a field or another channel than the paper's. The `--new-`
+//! options change values of the mission; all others stay as the chain flies them, which the station asks first. It shows every
+//! change, with the distance that each relay moves, and asks for confirmation (`--yes`, `--dry-run`). Every upload needs a larger
+//! `--version` than the one before. The epoch file must be this program's own.
 //!
-//! With `--stand` it does not end: it answers the relays and tells them how strong the interference is where it stands
-//! (`--measurements`). Neither a port that vanishes nor a full disk nor a reader that stops ends it or holds it up. It takes no upload
-//! while it stands: it is started again with `--version`, knows nothing that it would lose, and the relays know it again by its first frames.
+//! With `--stand` it keeps running: it answers the relays and reports the interference at its position (`--measurements`). It
+//! survives a lost port, a full disk and a blocked log. For an upload restart it with `--version`: it has no state to lose, and
+//! the relays recognise it by its first frames.
 //!
-//! Its lines on standard output are as those of `linux_companion`. It ends with status 0 once the chain flies the new mission, or where it
-//! stood at Ctrl-C or SIGTERM; 1 if that does not come about or it cannot begin, 2 when the options are wrong.
+//! Log lines have the format of `linux_companion`. Exit status: 0 once the chain flies the new mission, or after Ctrl-C or
+//! SIGTERM with `--stand`; 1 if the upload fails or it can not start; 2 if the options are wrong.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `options.rs` | the command line, checked |
-//! | `new.rs` | what is different in a new mission |
-//! | `uploading.rs` | the stages of an upload |
-//! | `change.rs` | log lines for what an upload changes |
-//! | `forecast.rs` | where the relays will fly |
-//! | `station.rs` | the loop |
-//! | `measurements.rs` | how strong the interference is, from a FIFO, a file or datagrams |
-//! | `heard.rs` | which relays are heard |
-//! | `report.rs` | the lines it says |
+//! | `options.rs` | command line, checked |
+//! | `new.rs` | options of the new mission |
+//! | `uploading.rs` | stages of an upload |
+//! | `change.rs` | log lines for an upload's changes |
+//! | `forecast.rs` | forecast of the relays' positions |
+//! | `station.rs` | main loop |
+//! | `measurements.rs` | measured interference, from a FIFO, a file or datagrams |
+//! | `heard.rs` | nearby relays that answer |
+//! | `report.rs` | log lines |
 //!
-//! What it has in common with the relay is a library, `examples/linux`.
+//! It shares a library with the relay, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]

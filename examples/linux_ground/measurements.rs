@@ -1,4 +1,4 @@
-//! How strong the interference is where the station stands, line by line from whatever measures it: a FIFO, a file, or datagrams.
+//! Interference measured at the station, read as lines from a FIFO, a file, or datagrams.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom};
@@ -14,22 +14,20 @@ use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
 
-/// Between two looks at a file: no poll(2) tells of one that has changed.
+/// Polling period of a file, because poll(2) does not report changes of a file.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// Datagrams that are read at once, at most.
 const READS: usize = 16;
 
-/// So much of the end of a file is read, bytes: a line and the one before.
+/// Length of the end of a file that is read, bytes: the last line and the one before.
 const TAIL: u64 = 1_024;
 
-/// Between two measurements that are handed on: whoever measures more often does not fill the channel.
+/// Minimum time between two forwarded measurements, so that they do not fill the channel.
 const EVERY: Duration = Duration::from_millis(500);
 
-/// After so long without a measurement that is said.
+/// Silence after which missing measurements are logged.
 const SILENCE: Duration = Duration::from_millis(60_000);
 
-/// Where lines come from.
 #[derive(Debug)]
 enum Source {
     Fifo(Fifo),
@@ -37,7 +35,7 @@ enum Source {
     File(Watched),
 }
 
-/// A file, and how it was when it was read last: its inode, its length, and when it was written, s and ns.
+/// Watched file with the state of its last read: inode, length, and modification time, s and ns.
 #[derive(Debug)]
 struct Watched {
     path: PathBuf,
@@ -45,16 +43,15 @@ struct Watched {
     look_at: Instant,
 }
 
-/// The measurements of one end.
 #[derive(Debug)]
 pub(crate) struct Measurements {
     source: Source,
     name: String,
     end: Side,
-    /// The newest that was not handed on yet, W.
+    /// Newest measurement that is not forwarded yet, W.
     newest_w: Option<f32>,
     next_at: Instant,
-    /// When the last line was a measurement, once one was.
+    /// Time of the last valid line, once there was one.
     last_at: Option<Instant>,
     is_silent: bool,
     last_w: Option<f32>,
@@ -63,10 +60,7 @@ pub(crate) struct Measurements {
 }
 
 impl Measurements {
-    /// Opens the FIFO, the file or the socket of that name.
-    ///
-    /// # Errors
-    /// One line that names it and what is wrong.
+    /// Opens the FIFO, the file or the socket `name`.
     pub(crate) fn open(name: &str, end: Side) -> Result<Self, String> {
         let named = |error: &str| format!("{OPTION} {name}: {error}");
         let path = Path::new(name);
@@ -96,7 +90,7 @@ impl Measurements {
         })
     }
 
-    /// The newest that has come since, W, if it is time to hand one on. Work: 64 KiB of lines at most, whoever writes how much.
+    /// Returns the newest measurement, W, if one may be forwarded now. Work: at most 64 KiB of lines.
     pub(crate) fn newest(&mut self, now: Instant, log: &Log) -> Option<f32> {
         self.read(now, log);
         let silent_at = self.last_at.map(|at| at + SILENCE);
@@ -130,7 +124,7 @@ impl Measurements {
                         Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                         Err(_) => break,
                     };
-                    // Its last line may go without an end.
+                    // The last line of a datagram needs no line feed.
                     let text = buffer.get(..count).unwrap_or_default();
                     let mut begun = Begun::default();
                     begun.take(text, &mut line);
@@ -182,7 +176,6 @@ impl Measurements {
         );
     }
 
-    /// When to come back at the latest.
     pub(crate) fn wake(&self) -> Option<Instant> {
         let look = match &self.source {
             Source::File(file) => Some(file.look_at),
@@ -194,7 +187,6 @@ impl Measurements {
         [look, next, silent].into_iter().flatten().min()
     }
 
-    /// What to sleep on.
     pub(crate) fn fd(&self) -> Option<BorrowedFd<'_>> {
         match &self.source {
             Source::Fifo(fifo) => Some(fifo.fd()),
@@ -203,7 +195,6 @@ impl Measurements {
         }
     }
 
-    /// What it has counted.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from": self.name,
@@ -216,13 +207,13 @@ impl Measurements {
 }
 
 impl Watched {
-    /// Its last whole line, where it was written since.
+    /// Returns the last complete line if the file has changed.
     fn last(&mut self, now: Instant) -> Option<Vec<u8>> {
         if now < self.look_at {
             return None;
         }
         self.look_at = now + LOOK;
-        // One that is away is on its way to another name, or will be made again.
+        // A missing file is being renamed, or will be created again.
         let mut file = File::open(&self.path).ok()?;
         let about = file.metadata().ok()?;
         let seen = [
@@ -239,13 +230,13 @@ impl Watched {
         let mut tail = Vec::new();
         file.take(TAIL).read_to_end(&mut tail).ok()?;
         let mut last = None;
-        // A line without its end is still being written.
+        // A line without a line feed is still being written.
         Begun::default().take(&tail, |line| last = Some(line.to_owned()));
         last
     }
 }
 
-/// A socket at a port, of this computer alone where there is no host.
+/// Binds a UDP socket, on the loopback address if no host is given.
 fn socket(address: &str) -> std::io::Result<UdpSocket> {
     let wrong =
         || std::io::Error::other("must be udp:PORT or udp:HOST:PORT, PORT within 1 to 65535");
@@ -260,7 +251,6 @@ fn socket(address: &str) -> std::io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// What an end is called.
 pub(crate) const fn name(end: Side) -> &'static str {
     match end {
         Side::Upstream => "transmitter",
@@ -268,7 +258,7 @@ pub(crate) const fn name(end: Side) -> &'static str {
     }
 }
 
-/// Returns a power, W, that stands alone or behind the name of this end, in W or in dBm.
+/// Parses a power, W or dBm, alone or behind the name of this end; returns W.
 fn level(text: &[u8], end: Side) -> Option<f32> {
     let text = std::str::from_utf8(text)
         .ok()

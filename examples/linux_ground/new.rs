@@ -1,4 +1,4 @@
-//! What is different in a new mission, as the options that begin with `--new-` give it.
+//! Options of a new mission, which begin with `--new-`.
 
 use core::fmt;
 
@@ -13,16 +13,16 @@ use uav_relay_linux::mission::{
 };
 use uav_relay_linux::site::site;
 
-/// The options of a new mission; what is not among them stays as it is flown.
+/// Options of a new mission; values that are not given stay as they are flown.
 #[derive(Args, Debug)]
 #[group(id = "new", multiple = true, requires = "version")]
 #[expect(clippy::struct_field_names, reason = "as the options are called")]
 pub(crate) struct NewOptions {
-    /// Where the transmitter is from now on; then the distance follows. Without it and --new-site-rx, relays stay on the line that they
-    /// fly along
+    /// New position of the transmitter; sets the distance, too. Without it and --new-site-rx the relays stay on their present
+    /// line
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     new_site_tx: Option<Geodetic>,
-    /// Where the receiver is from now on
+    /// New position of the receiver
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     new_site_rx: Option<Geodetic>,
     /// New distance from transmitter to receiver, m, 1 to 1e6
@@ -31,13 +31,14 @@ pub(crate) struct NewOptions {
     /// New altitude of every relay, m, 0.1 to 1e4
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
     new_altitude: Option<f32>,
-    /// New altitudes to choose from, m, 0.1 to 1e4; without it those of before, or the new altitude alone where there was one alone
+    /// New range of altitudes to choose from, m, 0.1 to 1e4; default: the present range, or the new altitude alone if the present
+    /// range is a single one
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
-    /// New room to the left of the line to the receiver, as y in m, -1e5 to 0
+    /// New left limit of the relays' positions, facing the receiver, as y in m, -1e5 to 0
     #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = left)]
     new_lateral_min: Option<f32>,
-    /// New room to its right, as y in m, 0 to 1e5
+    /// New right limit, as y in m, 0 to 1e5
     #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = right)]
     new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
@@ -46,35 +47,34 @@ pub(crate) struct NewOptions {
     /// New power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
     new_uav_power: Option<f32>,
-    /// New interferer: power (W, 1e-6 to 1e9), place along the line to the receiver and to the right of it (m, -1e7 to 1e7)
+    /// New interferer: power (W, 1e-6 to 1e9), position along the line to the receiver and to the right of it (m, -1e7 to 1e7)
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
     /// New noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = noise)]
     new_noise: Option<f32>,
-    /// New least distance between two relays, m, 0 to 1e5
+    /// New minimum distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
     new_min_separation: Option<f32>,
 }
 
-/// Distance along the line at which the order of two relays is certain, m: twice the companion's usual position error.
+/// Distance along the line at which the order of two relays is certain, m. Twice the companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// How far the ends of the new line may be from the one that is flown along, beside its own length, m.
+/// Maximum distance of the new line's ends from the present line, beyond the new line's length, m.
 const FAR_M: f64 = 100_000.0;
 
-/// The mission that the values which are not stated are taken from.
+/// Mission that supplies the values which are not given.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
     pub(crate) config: MissionConfig,
-    /// Sites of the line that is flown along, if they are known.
     pub(crate) line: Option<Sites>,
-    /// The upload that this is, if it is none that was loaded.
+    /// Upload of this mission; `None` for the loaded mission.
     pub(crate) upload: Option<Upload>,
 }
 
 impl Basis {
-    /// The mission that was loaded, flown between `sited` if any were given.
+    /// Returns the loaded mission, flown between `sited` if given.
     pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
         Self {
             config: *loaded.config(),
@@ -83,7 +83,7 @@ impl Basis {
         }
     }
 
-    /// An upload, which has no sites of its own where relays fly between `sited`.
+    /// Returns an uploaded mission; without sites of its own it is flown between `sited`.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),
@@ -94,10 +94,7 @@ impl Basis {
 }
 
 impl NewOptions {
-    /// Returns the upload that replaces `basis` at relays that were loaded with `loaded`, between the sites `sited` if any were given.
-    ///
-    /// # Errors
-    /// One line that names the option and what is wrong.
+    /// Returns the upload that replaces `basis` at relays loaded with `loaded` and, if given, `sited`.
     pub(crate) fn upload(
         &self,
         version: u16,
@@ -169,7 +166,7 @@ impl NewOptions {
 
     fn changed(&self, basis: &MissionConfig, along_m: Option<f32>) -> MissionConfig {
         let altitude_m = self.new_altitude.unwrap_or(basis.common.altitude_m);
-        // One altitude alone follows the altitude.
+        // A range of a single altitude follows the new altitude.
         let is_alone = basis.band.least_m.to_bits() == basis.band.most_m.to_bits();
         let band = if is_alone {
             Band::at(altitude_m)
@@ -198,17 +195,14 @@ impl NewOptions {
     }
 }
 
-/// Refuses a line that is far from the one that is flown along: drones fly there, and have no place along it.
-///
-/// # Errors
-/// How far it is, how far it may be, and whether latitude and longitude look swapped.
+/// Refuses a line far from the present one, because the drones there would have no position along it.
 fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
         ends[0].min(ends[1])
     };
     let far_m = away_m(sites.tx, sites.rx);
-    // Either line may be the longer one.
+    // The new or the present line may be the longer one.
     let most_m = axis.distance_m() + FAR_M;
     if far_m <= most_m {
         return Ok(());
@@ -231,8 +225,10 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     ))
 }
 
-/// Returns the largest turn of the line, degrees, after which relays that are the separation apart along it are in order along the new
-/// one, by positions that are off by 1 m: s cos t - w sin t is the lesser of 2 m and s / 2, for the separation s and the width w of the room to the side.
+/// Returns the largest turn t of the line, degrees, that keeps the order despite position errors of 1 m.
+///
+/// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
+/// For the separation s and the width w of the lateral range it solves s cos t - w sin t = min(2 m, s / 2).
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (
         config.min_separation_m,

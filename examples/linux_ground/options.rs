@@ -1,4 +1,4 @@
-//! The command line, checked.
+//! Checked command line.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::PathBuf;
@@ -18,45 +18,47 @@ use uav_relay_scenario::key;
 use crate::forecast::Loaded;
 use crate::new::{Basis, NewOptions};
 
-/// The transmitter or the receiver of a chain of relays in flight: uploads a new mission to it, or stays at its post (--stand). The options up to --min-separation say what the relays were loaded with; those
-/// that begin with --new- what is different from now on. Values that none of them states stay as the chain flies them: the chain is asked first. Every change is shown, and how far
-/// each relay moves, and nothing is uploaded before it is confirmed. The number of relays stays.
+/// Transmitter or receiver end of a chain of relays in flight: uploads a new mission, or keeps answering the relays (--stand).
+/// The options up to --min-separation describe the mission loaded into the relays; those that begin with --new- change it. All
+/// other values stay as the chain flies them: the chain is asked first. The changes, and the distance that each relay moves, are
+/// shown and must be confirmed before the upload. The number of relays can not change
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", version, disable_version_flag = true)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
 struct Options {
-    /// TOML file with the scenario that the relays were loaded with, and sections `network` and `ground`: what it says, options of the
-    /// command line say otherwise
+    /// TOML file with the loaded scenario, and the sections `network` and `ground`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Tty toward the relay next to this end of the chain
     #[arg(long, value_name = "TTY")]
     tty: PathBuf,
-    /// The tty leads to one channel that all relays hear, in place of a wire
+    /// The tty leads to a radio channel shared by all relays, not to a wire
     #[arg(long)]
     shared: bool,
-    /// Which end of the chain this is
+    /// End of the chain
     #[arg(long, value_name = "END", value_enum)]
     end: End,
-    /// Bit/s on the tty, 1200 to 4000000
+    /// Bit rate of the tty, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     baud: u32,
-    /// Number of the network
+    /// Network number
     #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
     network: u16,
     /// File with the network's key, 64 hexadecimal digits
     #[arg(long, value_name = "FILE")]
     key_file: PathBuf,
-    /// File that keeps the number of this start, made if it is missing; it must never go back, and is no relay's
+    /// File with the epoch, increased at every start; created if missing. It must never go back, and must not be shared with a
+    /// relay
     #[arg(long, value_name = "FILE")]
     epoch_file: PathBuf,
-    /// Version of the new mission, 1 to 65535: larger than that of every upload before. Without V, as the last word, that of the program
+    /// Version of the new mission, 1 to 65535: larger than that of every earlier upload. As the last word, without V, it prints
+    /// the program's version
     #[arg(long, value_name = "V", required_unless_present = "stand", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 65_535))]
     version: Option<u16>,
-    /// Prints the version of the program
+    /// Print the version of the program
     #[arg(short = 'V', action = ArgAction::Version)]
     own_version: Option<bool>,
-    /// Seconds after which it gives an upload up, 1 to 86400; with --stand it says so and goes on
+    /// Seconds until an upload is given up, 1 to 86400; with --stand the failure is logged and the program goes on
     #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 86_400))]
     timeout: u64,
     /// Number of relays, 1 to 1000
@@ -66,26 +68,27 @@ struct Options {
     loaded: MissionOptions,
     #[command(flatten)]
     sites: SiteOptions,
-    /// How the relays find their positions, for the moves that are shown: as the first relay was given it
+    /// Method of the relays for finding positions, as given to the first relay; used for the forecast of their moves
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
     #[command(flatten)]
     new: NewOptions,
-    /// Ends after it has shown what the upload changes; nothing is uploaded
+    /// Show the changes and exit; nothing is uploaded
     #[arg(long, requires = "version", conflicts_with = "stand")]
     dry_run: bool,
-    /// Uploads without asking; needed where standard input is no terminal
+    /// Upload without confirmation; required if standard input is no terminal
     #[arg(long, requires = "version")]
     yes: bool,
-    /// Uploads also what leaves the geofence of --altitude, --band, --lateral-min-m, --lateral-max-m and --distance: for relays without a drone,
-    /// which have no geofence. Relays that fly one refuse it
+    /// Also upload missions outside the geofence, for relays without a drone, which have none. It is that of --altitude, --band,
+    /// --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
     no_fence: bool,
-    /// Takes values that are not stated from what the relays were loaded with, and not from what they fly
+    /// Take values that are not given from the loaded mission instead of the flown one
     #[arg(long, requires = "version")]
     from_loaded: bool,
-    /// How strong the interference is here, line by line: a FIFO, a file whose last line counts, or `udp:PORT` or `udp:HOST:PORT` to be
-    /// told there. A line is the mean power that is received here, W, 1e-30 to 1e6, or dBm with that unit behind it, as -95 dBm. The relays near by are told of it, those that --listen
+    /// Source of interference measurements at this end: a FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or
+    /// `udp:HOST:PORT`. Each line is the mean received power, W, 1e-30 to 1e6, or dBm with that unit, as -95 dBm. It is reported
+    /// to nearby relays that --listen
     #[arg(
         long,
         value_name = "FIFO|FILE|udp:[HOST:]PORT",
@@ -93,15 +96,15 @@ struct Options {
         help_heading = "Standing"
     )]
     measurements: Option<String>,
-    /// Stays at its post until a signal ends it: it answers the relays, tells them what is measured here, and says what it hears. With --version
-    /// it uploads that mission first
+    /// Keep running until a signal: answer the relays, report measurements, and log which relays answer. With --version upload
+    /// that mission first
     #[arg(long, help_heading = "Standing")]
     stand: bool,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     status_socket: Option<PathBuf>,
-    /// Write every frame that comes or goes at the tty to a pcapng capture, for `cargo decode` and Wireshark. Where FILE exists it is kept, and
-    /// FILE-2, FILE-3 and so on is written. It grows as long as the program runs
+    /// Write every frame of the tty to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2, FILE-3 and so
+    /// on is written instead. It grows as long as the program runs
     #[arg(long, value_name = "FILE", help_heading = "Log")]
     capture: Option<PathBuf>,
     #[command(flatten)]
@@ -110,9 +113,9 @@ struct Options {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum End {
-    /// The transmitter, before relay 1
+    /// Transmitter, before relay 1
     Tx,
-    /// The receiver, behind relay N
+    /// Receiver, behind relay N
     Rx,
 }
 
@@ -123,7 +126,6 @@ enum Method {
     Adjust,
 }
 
-/// An upload, as far as the command line states it.
 #[derive(Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
 pub(crate) struct Change {
@@ -131,23 +133,18 @@ pub(crate) struct Change {
     new: NewOptions,
     pub(crate) sited: Option<Sites>,
     pub(crate) dry_run: bool,
-    /// True if nobody has to confirm it.
     pub(crate) yes: bool,
     pub(crate) no_fence: bool,
     pub(crate) from_loaded: bool,
 }
 
 impl Change {
-    /// Returns the upload in place of `basis`.
-    ///
-    /// # Errors
-    /// One line that names the option and what is wrong.
+    /// Returns the upload that replaces `basis`.
     pub(crate) fn upload(&self, loaded: &Mission, basis: &Basis) -> Result<Upload, String> {
         self.new.upload(self.version, loaded, self.sited, basis)
     }
 }
 
-/// What to upload, and where.
 pub(crate) struct Plan {
     pub(crate) tty: PathBuf,
     pub(crate) baud: u32,
@@ -167,13 +164,13 @@ pub(crate) struct Plan {
     pub(crate) overrides: Vec<Override>,
 }
 
-/// Reads the command line; where there is nothing to run, help or the mistake has been printed.
+/// Reads the command line; otherwise returns the exit status after help or a mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     if std::env::args_os()
         .next_back()
         .is_some_and(|word| word == "--version")
     {
-        // Nobody may be left to read it.
+        // A closed standard output is ignored.
         let _ = write!(std::io::stdout(), "{}", Options::command().render_version());
         return Err(ExitCode::SUCCESS);
     }
@@ -181,7 +178,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, &beyond).map_err(|line| command::refuse(&line))
 }
 
-/// What a file says to the ground.
+/// Adds the `[network]` and `[ground]` sections of the file.
 fn section(deployment: &Deployment, given: &mut Given) {
     config::network(deployment, given);
     let own = &deployment.ground;

@@ -1,4 +1,4 @@
-//! What the station says, one line each.
+//! Log lines of the station.
 
 use serde_json::json;
 use uav_relay::{
@@ -12,7 +12,7 @@ use uav_relay_linux::site::Between;
 use crate::measurements::name;
 use crate::options::Plan;
 
-/// Who listens where.
+/// Logs the end of the chain, the port and the signing epoch.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     let (end, relays, network) = (name(plan.end), plan.loaded.mission.relays(), plan.network);
     let (base, baud) = (plan.loaded.mission.digest(), plan.baud);
@@ -36,7 +36,6 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     );
 }
 
-/// How far the upload is.
 pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progress) {
     let (version, all) = (upload.version(), upload.config().relays);
     match progress {
@@ -72,12 +71,12 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
                 view.number()
             ),
         ),
-        // The others are said elsewhere.
+        // Other stages are logged elsewhere.
         _ => {}
     }
 }
 
-/// That the relays hold a newer mission.
+/// Returns the error for a version that is not newer than the relays' one.
 pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
@@ -91,7 +90,7 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
     }
 }
 
-/// The mission that the chain flies, as a relay says.
+/// Logs the mission that the chain flies, as reported by a relay.
 pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     let FlownMission {
         by, version, flies, ..
@@ -105,7 +104,7 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     log.say(now, "current", fields, format_args!("{what}"));
 }
 
-/// That a relay refuses it, and by which number most likely.
+/// Returns the error for an upload refused by a relay, with the value that most likely causes it.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("--version {version}: relay {by}, or one beyond it, refuses it");
@@ -115,8 +114,8 @@ pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     }
 }
 
-/// Returns which value of `upload` leaves the geofence, with its range. Relays that were loaded with the mission that this station was told of have the
-/// geofence of that, unless a firmware set another one.
+/// Returns the value of `upload` that leaves the geofence, with its range. Assumes that the relays have the geofence of the
+/// loaded mission, the default.
 pub(crate) fn outside(plan: &Plan, upload: &Upload) -> Option<String> {
     let (loaded, new) = (plan.loaded.mission.config(), upload.config());
     let fence = |config: &MissionConfig| {
@@ -155,7 +154,7 @@ pub(crate) fn outside(plan: &Plan, upload: &Upload) -> Option<String> {
     }
 }
 
-/// That the chain does not fly it in time, and why most likely.
+/// Returns the error for an upload that exceeds its time, with the most likely cause.
 pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.timeout.as_micros() / 1_000_000;
     let state = match progress {
@@ -174,7 +173,7 @@ pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Groun
     format!("--timeout {seconds}: {state}; {refused} frames refused")
 }
 
-/// What most likely is wrong, by what was heard.
+/// Returns the most likely fault according to the counters.
 fn why(plan: &Plan, stats: &Stats) -> String {
     let faults = [
         (
@@ -221,7 +220,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
     match faults.into_iter().find(|(count, _)| *count > 0) {
         Some((count, fault)) => format!("{count} {fault}"),
         None if stats.received > 0 => "one answers, and does not take it yet".to_owned(),
-        // A relay that flies another mission says no more than that it is there.
+        // A relay with another mission sends only handshakes.
         None if stats.handshakes > 0 => format!(
             "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
             plan.loaded.mission.digest()
@@ -235,7 +234,6 @@ fn why(plan: &Plan, stats: &Stats) -> String {
     }
 }
 
-/// That a relay is heard, or not any more.
 pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let fields = json!({ "node": node });
     if is_heard {
@@ -247,7 +245,7 @@ pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
     }
 }
 
-/// The last line of a station that stood.
+/// Logs the counters at the end of a station that ran with `--stand`.
 pub(crate) fn stopped(log: &Log, now: Instant, end: Side, ground: &Ground) {
     let stats = ground.stats();
     log.say(

@@ -1,4 +1,4 @@
-//! The loop: move bytes, hand on what is measured, say how far the upload is, sleep.
+//! Main loop: exchange bytes, forward measurements, log the upload's progress, sleep.
 
 use std::os::fd::{AsFd as _, BorrowedFd};
 
@@ -21,29 +21,27 @@ use crate::options::Plan;
 use crate::report;
 use crate::uploading::{Fault, Over, Uploading};
 
-/// Buffers that are read at once, at most.
 const READS: usize = 64;
 
-/// An end of the chain, and all that it is connected to.
 struct Station<'a> {
     plan: &'a Plan,
     service: Service,
     ground: Ground,
     tty: Replug,
-    /// What that has not taken yet.
+    /// Bytes that the port has not accepted yet.
     outgoing: Vec<u8>,
     measurements: Option<Measurements>,
     hearing: Hearing,
     refusals: Refusals,
     uploading: Option<Uploading>,
-    /// True once standard input has bytes, while the operator is asked.
+    /// True once standard input has bytes while a confirmation is awaited.
     is_answered: bool,
 }
 
-/// Stays at its post until it is told to stop, or only until the chain flies the new mission.
+/// Runs until the chain flies the new mission; with `--stand` until SIGINT or SIGTERM.
 ///
 /// # Errors
-/// One line that says why it could not begin, or why the chain does not fly it.
+/// One line that says why it could not start, or why the chain does not fly the mission.
 pub(crate) fn stand(plan: &Plan) -> Result<(), Fault> {
     let mut station = Station::begin(plan)?;
     station.service.ready();
@@ -101,7 +99,6 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// One turn of the loop.
     fn turn(&mut self) -> Over {
         let time = self.service.now();
         let log = &self.service.log;
@@ -116,7 +113,7 @@ impl<'a> Station<'a> {
         if over.is_some() {
             return over;
         }
-        // The next stage of an upload begins with a frame.
+        // An upload's next stage begins with a frame.
         self.send();
         let alive = self.tell(time);
         let measured = self.measurements.as_ref().and_then(Measurements::wake);
@@ -129,12 +126,11 @@ impl<'a> Station<'a> {
         self.sleep(wake.min())
     }
 
-    /// Moves what can be moved, and hands on what was measured.
     fn exchange(&mut self, time: Instant) {
         let Self { ground, tty, .. } = self;
         let mut bytes = [0; 256];
         for _ in 0..READS {
-            // What is wrong with the tty is said when it is tended.
+            // Errors of the tty are logged by `tend`.
             let Ok(count @ 1..) = tty.read(&mut bytes) else {
                 break;
             };
@@ -149,7 +145,6 @@ impl<'a> Station<'a> {
         self.send();
     }
 
-    /// Writes what the port takes.
     fn send(&mut self) {
         let Self { ground, tty, .. } = self;
         loop {
@@ -157,7 +152,7 @@ impl<'a> Station<'a> {
                 let sent = tty.write(&self.outgoing).unwrap_or(0);
                 self.outgoing.drain(..sent);
             }
-            // A frame is made when it can go: a slow tty is told the newest.
+            // A frame is made only when it can be sent, so that a slow tty gets the newest.
             let mut frame = [0; MAX_FRAME];
             if !self.outgoing.is_empty() {
                 return;
@@ -169,7 +164,7 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Does the next step of the upload; returns how it ended where that ends the program.
+    /// Advances the upload; returns its result if that ends the program.
     fn uploading(&mut self, time: Instant) -> Over {
         let Self {
             plan,
@@ -196,7 +191,7 @@ impl<'a> Station<'a> {
         None
     }
 
-    /// Does what signals and the socket ask for, and says when to come back at the latest.
+    /// Handles signals and status requests; returns the time of the next call.
     fn tell(&mut self, time: Instant) -> Option<Instant> {
         let Self {
             service,
@@ -233,7 +228,7 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// Sleeps until there may be something to do.
+    /// Sleeps until there may be something to do; returns the result after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> Over {
         let span = self.service.until(wake);
         let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
@@ -266,7 +261,7 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer, which is there: a line, or nothing at the end of standard input.
+/// Reads the operator's answer, which is available. The text is empty at the end of standard input.
 fn answered() -> String {
     let mut line = String::new();
     match std::io::stdin().read_line(&mut line) {
@@ -275,7 +270,6 @@ fn answered() -> String {
     }
 }
 
-/// What is uploaded, and how far that is.
 fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
     let Some(upload) = upload else {
         return Value::Null;

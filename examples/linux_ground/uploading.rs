@@ -1,13 +1,13 @@
-//! The upload, from the question what is flown to the answer that the new mission is.
+//! Stages of an upload, from the request for the flown mission to its replacement.
 //!
 //! | stage | event | next stage |
 //! | --- | --- | --- |
-//! | asking | a relay has said what it holds, and the upload fits | confirming, or uploading with `--yes`; over with `--dry-run` |
-//! | asking | the upload is out of range, outside of the geofence or older than what is held | over |
+//! | asking | a relay has reported its mission, and the upload fits | confirming, or uploading with `--yes`; over with `--dry-run` |
+//! | asking | the upload is out of range, outside the geofence or not newer than the relays' | over |
 //! | confirming | the operator answers `y` | uploading |
 //! | confirming | any other answer | over |
 //! | uploading | the chain flies it, refuses it, or has a newer one | over |
-//! | any but confirming | `--timeout` | over |
+//! | asking or uploading | `--timeout` expired | over |
 
 use std::io::Write as _;
 
@@ -20,10 +20,9 @@ use crate::new::Basis;
 use crate::options::{Change, Plan};
 use crate::report;
 
-/// Time that a relay has to send the values of the mission that it holds.
+/// Time that a relay has to send the values of its mission.
 const VALUES: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
 
-/// Why there is no upload: one line, and the status to end with.
 #[derive(Debug)]
 pub(crate) struct Fault {
     pub(crate) line: String,
@@ -36,29 +35,28 @@ impl From<String> for Fault {
     }
 }
 
-/// How it went on, if it is over.
+/// Result of the upload; `None` while it goes on.
 pub(crate) type Over = Option<Result<(), Fault>>;
 
 #[derive(Debug)]
 enum Stage {
-    /// Since when a relay is known to hold an upload whose values are not known.
+    /// Time since when a relay is known to hold an upload with unknown values.
     Asking(Option<Instant>),
     Confirming(Box<Upload>),
     Uploading(Box<Upload>),
     Over(Option<Box<Upload>>),
 }
 
-/// An upload on its way.
 #[derive(Debug)]
 pub(crate) struct Uploading {
     stage: Stage,
     progress: Progress,
-    /// End of the stage; `None` while the operator is asked, and once it is over.
+    /// End of the stage; `None` while a confirmation is awaited, and at the end.
     late_at: Option<Instant>,
 }
 
 impl Uploading {
-    /// Begins to ask the chain what it flies.
+    /// Starts by asking the chain for the mission that it flies.
     pub(crate) fn begin(now: Instant, plan: &Plan, ground: &mut Ground) -> Self {
         ground.ask_flown(now);
         Self {
@@ -68,7 +66,6 @@ impl Uploading {
         }
     }
 
-    /// Returns the time of the next turn at the latest.
     pub(crate) fn wake(&self) -> Option<Instant> {
         let values = match self.stage {
             Stage::Asking(since) => since.map(|since| since + VALUES),
@@ -77,7 +74,6 @@ impl Uploading {
         self.late_at.into_iter().chain(values).min()
     }
 
-    /// Returns true while the operator is asked.
     pub(crate) const fn is_confirming(&self) -> bool {
         matches!(self.stage, Stage::Confirming(_))
     }
@@ -91,7 +87,7 @@ impl Uploading {
         }
     }
 
-    /// Takes the operator's answer: a line, empty at the end of standard input.
+    /// Handles the operator's answer: a line, empty at the end of standard input.
     pub(crate) fn answer(
         &mut self,
         now: Instant,
@@ -114,7 +110,7 @@ impl Uploading {
         .into()))
     }
 
-    /// One turn: what has become of it, if it is over now.
+    /// Advances the upload; returns its result at the end.
     pub(crate) fn turn(
         &mut self,
         now: Instant,
@@ -179,7 +175,7 @@ impl Uploading {
         is_late.then(|| Err(report::late(plan, version, Progress::Offering, ground).into()))
     }
 
-    /// The flown mission is known: makes the upload, and shows what it changes.
+    /// Builds the upload from the flown mission and shows its changes.
     fn decide(
         &mut self,
         now: Instant,
@@ -227,7 +223,7 @@ impl Uploading {
         }
         self.stage = Stage::Confirming(Box::new(upload));
         self.late_at = None;
-        // The lines before are to stand before the question. Nobody may be left to read it.
+        // Earlier log lines must be printed before the question. A closed standard error is ignored.
         log.flush(std::time::Duration::from_millis(500));
         let mut out = std::io::stderr();
         let _ = write!(out, "Upload version {version}? [y/N] ");
@@ -244,7 +240,7 @@ impl Uploading {
         None
     }
 
-    /// Says how far the upload is.
+    /// Logs the progress; returns the result of the upload at its end.
     fn follow(
         &mut self,
         now: Instant,

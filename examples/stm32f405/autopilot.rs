@@ -1,6 +1,6 @@
-//! The drone's autopilot, a PX4 or ArduCopter, at USART1: TX PA9, RX PA10, 115 200 baud, MAVLink 2.
+//! Link to the drone's autopilot, a PX4 or ArduCopter, at USART1: TX PA9, RX PA10, 115 200 baud, MAVLink 2.
 //!
-//! It is told where to fly by a drone whose block has sites; without them the port is never opened.
+//! It flies drones whose block has sites; without them the port is never opened.
 
 use core::cell::RefCell;
 
@@ -26,45 +26,42 @@ use super::config::{self, Sites};
 use super::port::{self, OUTGOING, Port, Queues, Slot};
 use super::{board, chip, log};
 
-/// Received bytes that can wait for the main loop: 44 ms of them. An autopilot sends bursts, and the main loop may be in a sweep.
+/// Capacity of the receive queue, bytes: 44 ms. An autopilot sends bursts, and the main loop may be busy with a sweep.
 const RECEIVED: usize = 512;
 
-/// How far off its place a hovering drone may be reported, m.
+/// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// The longest frame that is sent.
+/// Length of the longest frame to send, bytes.
 const LONGEST: usize = size_of::<FrameBytes>();
 
-/// So long a full port is left alone; 115 bytes leave meanwhile.
+/// Pause before the next attempt on a full port; 115 bytes leave meanwhile.
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
 
-/// The port that nobody serves yet.
 pub(crate) type Uart = Serial<USART1>;
 
-/// Sets the port up.
 pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, apb2_hz: u32, rcc: &mut Rcc) -> Option<Uart> {
     Serial::new(usart, (tx, rx), port::config(apb2_hz), rcc).ok()
 }
 
-/// The link, and what it goes over.
 pub(crate) struct Autopilot {
     link: Link,
-    /// The sites of the block, and those between which it flies.
+    /// Sites of the block, and sites of the line that is flown.
     #[cfg(feature = "upload")]
     loaded: uav_relay::Sites,
     #[cfg(feature = "upload")]
     between: uav_relay::Sites,
     port: Port,
-    /// What the relay was told last of whether its setpoint is flown.
+    /// Control state last reported to the relay: true if its setpoint is flown.
     flown: Option<bool>,
-    /// The SIR that the hop to this relay is to reach, as a factor and in decibels.
+    /// Target SIR of the hop to this relay, as a factor and in decibels.
     target: Option<(f32, f32)>,
 }
 
 impl Autopilot {
-    /// Returns the rest of a guard: how far off its place a hovering drone may be reported, m, and how long it takes to stop.
+    /// Returns `of` with the drone's position error, m, and stopping time.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"
@@ -77,8 +74,8 @@ impl Autopilot {
         })
     }
 
-    /// The link along the line between `sites`, in a place of its own in RAM; `None` where the mission is not flown there.
-    #[inline(never)] // its stack is given back
+    /// Creates the link along the line between `sites`, in static RAM. `None` if the mission can not be flown there.
+    #[inline(never)] // its stack frame is released
     pub(crate) fn begin(
         uart: Uart,
         sites: &Sites,
@@ -91,7 +88,7 @@ impl Autopilot {
         Self::along(&course, uart, sites, now)
     }
 
-    /// The link along that course: apart, so that what it is made on is not on the stack while the course is computed.
+    /// Creates the link along a course. A separate function keeps its stack frame out of the computation of the course.
     #[inline(never)]
     fn along(
         course: &Course,
@@ -119,34 +116,34 @@ impl Autopilot {
         autopilot.link.set_seed(board::seed());
         sign(&mut autopilot.link, now).ok()?;
         if chip::was_hung() {
-            // There is room for the first line.
+            // The empty queue has room for the line.
             let _ = autopilot.link.say("relay: restarted by its watchdog");
         }
         Some(autopilot)
     }
 
-    /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
+    /// Switches to the sites of a newly adopted mission before any position along its line is sent.
     #[cfg(feature = "upload")]
-    #[inline(never)] // its stack is given back
+    #[inline(never)] // its stack frame is released
     fn follow(&mut self, now: Instant, relay: &Relay) {
         let sites = relay.sites().unwrap_or(self.loaded);
         if sites == self.between {
             return;
         }
         self.between = sites;
-        // The relay has found that they make a line.
+        // The relay has checked that these sites form a valid line.
         if let Ok(axis) = Axis::between(sites) {
             self.link.fly_along(now, axis);
         }
     }
 
-    /// Takes what has come, and hands the relay what follows from it.
-    #[inline(never)] // its stack is given back
+    /// Processes received bytes, and passes their results to the relay.
+    #[inline(never)] // its stack frame is released
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         #[cfg(feature = "upload")]
         self.follow(now, relay);
         let mut bytes = [0; 64];
-        // What comes meanwhile wakes the main loop again.
+        // Bytes that arrive meanwhile wake the main loop again.
         for _ in 0..RECEIVED / bytes.len() {
             match self.port.read(&mut bytes) {
                 Ok(0) => break,
@@ -154,7 +151,7 @@ impl Autopilot {
                     let bytes = bytes.get(..count).unwrap_or_default();
                     self.link.handle_bytes(now, bytes);
                 }
-                // The checksum tells of a byte that is lost.
+                // A lost byte fails the frame's checksum.
                 Err(_) => {}
             }
         }
@@ -175,12 +172,12 @@ impl Autopilot {
         }
     }
 
-    /// Has the operator's ground station show what happened.
+    /// Shows an event of the relay on the operator's ground station.
     pub(crate) fn tell(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 
-    /// Sends what the relay wants and says when to be called again, at the latest; `now` is that of [`listen`](Self::listen).
+    /// Sends frames for the relay's state; returns the time of the next call. `now` must be that of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &Relay) -> Instant {
         #[cfg(feature = "upload")]
         self.follow(now, relay);
@@ -201,12 +198,12 @@ impl Autopilot {
             let Some(frame) = self.link.poll_transmit(now) else {
                 return self.link.poll_timeout(now);
             };
-            // There is room for it.
+            // The port has room for a whole frame.
             let _ = self.port.write(&frame);
         }
     }
 
-    /// The SIR in decibels, computed anew where it has changed.
+    /// Returns the SIR in decibels, recomputed only after a change.
     fn decibels(&mut self, target: f32) -> f32 {
         match self.target {
             Some((of, db)) if of.to_bits() == target.to_bits() => db,
@@ -219,7 +216,7 @@ impl Autopilot {
     }
 }
 
-/// Has its interrupt serve the port. On their way to their place the queues are on the stack, which is given back.
+/// Hands the port to its interrupt. A separate function, because the queues pass over the stack on their way to RAM.
 #[inline(never)]
 fn open(uart: Uart) -> Option<Port> {
     Some(port::open(
@@ -230,10 +227,10 @@ fn open(uart: Uart) -> Option<Port> {
     ))
 }
 
-/// It is to sign, and cannot.
+/// Error: a signing key is configured, but this image can not sign.
 struct CannotSign;
 
-/// Has the link sign, where the block has a key. Without a clock it takes the time from what it hears.
+/// Enables signing if the block has a key. Without a clock the link takes the time from received stamps.
 #[cfg(feature = "mavlink-signing")]
 #[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
 fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
@@ -244,7 +241,7 @@ fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
     Ok(())
 }
 
-/// An image built without that does not fly where it is to sign.
+/// Refuses to fly with a signing key, because this image was built without signing.
 #[cfg(not(feature = "mavlink-signing"))]
 fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
     if config::autopilot_key(board::block()).is_none() {

@@ -1,4 +1,4 @@
-//! All the unsafe of the board but the writing of flash: what the compiler cannot see about RAM, interrupts and the linker.
+//! Unsafe code of the board, except flash writes: RAM, interrupts and the linker.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -9,30 +9,30 @@ use stm32f4xx_hal::pac::Interrupt;
 use super::chip;
 use super::config::{self, Block};
 
-/// The configuration block, where it stands in the flash.
+/// Returns the configuration block in the flash.
 pub(crate) fn block() -> &'static Block {
-    // SAFETY: a part of the flash, which is always readable, and which nothing writes while the program runs; bytes need
-    // no alignment.
+    // SAFETY: a part of the flash, always readable, and not written while the program runs; bytes need no alignment.
     unsafe { &*(config::ADDRESS as *const Block) }
 }
 
-/// Lets an interrupt through. Called once its driver is in place.
+/// Enables an interrupt, once its driver is in place.
 pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: no critical section of this program relies on a single interrupt being masked.
     unsafe { NVIC::unmask(interrupt) };
 }
 
-/// Returns a number that differs from board to board and from one start to the next: after power-up the RAM holds noise, which is the
-/// chip's own and not copied with an image; after a reset it holds what this function left there. The chip's unique number would do as well, but
-/// the emulator has none at its address.
+/// Returns a seed that differs between boards and between starts.
+///
+/// After power-up it hashes the noise in the RAM, which is specific to the chip; after a reset, the value left there by the last
+/// call. It does not use the chip's unique number, because the emulator has none at its address.
 pub(crate) fn seed() -> u32 {
     const WORDS: usize = 64;
     #[unsafe(link_section = ".uninit.leftover")]
     static mut LEFTOVER: [u32; WORDS] = [0; WORDS];
     let first = (&raw mut LEFTOVER).cast::<u32>();
-    // FNV-1a, by words.
+    // FNV-1a over words.
     let seed = (0..WORDS).fold(0x811C_9DC5, |hash: u32, word| {
-        // SAFETY: within the array, which only this function uses, from the main loop alone.
+        // SAFETY: within the array, which only this function uses, from the main loop.
         (hash ^ unsafe { read_volatile(first.add(word)) }).wrapping_mul(0x0100_0193)
     });
     // SAFETY: as above.
@@ -40,7 +40,8 @@ pub(crate) fn seed() -> u32 {
     seed
 }
 
-/// For a drone that cannot take part: sleeps for good, once it has a clock to wake by. Without one the watchdog restarts it.
+/// Sleeps for good and feeds the watchdog: end of a drone that can not take part. Without a clock to wake by the watchdog
+/// restarts it.
 pub(crate) fn stop() -> ! {
     loop {
         chip::feed();
@@ -48,7 +49,7 @@ pub(crate) fn stop() -> ! {
     }
 }
 
-/// No panic is reachable; `cargo cost` proves it by this handler, which cannot be linked.
+/// Panic handler that can not be linked, so that `cargo cost` proves that no panic is reachable.
 #[cfg(prove_no_panic)]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -62,13 +63,13 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 #[cfg(not(prove_no_panic))]
 use panic_halt as _;
 
-// The linker script that comes with defmt sorts the strings of the log, and is wanted only where there is a log: named like
-// a library, it is found where defmt's build put it.
+// defmt's linker script sorts the strings of the log, so it is linked only with a log. As a library name it is found in defmt's
+// build directory.
 #[cfg(feature = "defmt")]
 #[link(name = "defmt.x", kind = "dylib", modifiers = "+verbatim")]
 unsafe extern "C" {}
 
-/// The frames of the log, where they are this program's.
+/// Logger of this program, without RTT.
 #[cfg(all(feature = "defmt", not(feature = "rtt")))]
 mod defmt_frames {
     use core::sync::atomic::{AtomicBool, Ordering};
@@ -81,11 +82,11 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// Whether interrupts are to be let through when the frame is done.
+    /// True if interrupts must be enabled at the end of the frame.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-    // SAFETY: interrupts are off from `acquire` to `release`, so no two frames are written at a time; a frame inside a
-    // frame, which no `Format` of this program makes, would spoil the text of both and nothing else. No method logs.
+    // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame, which no
+    // `Format` of this program makes, would garble only the text of both. No method logs.
     unsafe impl defmt::Logger for Logger {
         fn acquire() {
             let on = primask::read().is_active();
@@ -99,7 +100,7 @@ mod defmt_frames {
         unsafe fn release() {
             log::end();
             if INTERRUPTED.load(Ordering::Relaxed) {
-                // SAFETY: they were on when this frame began, so this is inside no critical section.
+                // SAFETY: interrupts were enabled when this frame began, so this is not inside a critical section.
                 unsafe { interrupt::enable() };
             }
         }

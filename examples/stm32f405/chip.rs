@@ -1,4 +1,4 @@
-//! The clocks, the watchdog and the cause of the last reset: the crate `uav-relay-chip`, on this chip.
+//! Clocks, watchdog and reset cause of this chip, by the crate `uav-relay-chip`.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,23 +8,20 @@ use uav_relay_chip::registers::Chip;
 use uav_relay_chip::reset::Reset;
 use uav_relay_chip::watchdog;
 
-/// Longest sleep of the main loop.
 const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
 const LATE: Duration = Duration::from_millis(watchdog::LATE_MS);
 
-/// True if the watchdog has restarted the chip.
 static WAS_HUNG: AtomicBool = AtomicBool::new(false);
 
-/// What the chip begins with.
 pub(crate) struct Begun {
     pub(crate) clocks: Clocks,
     #[cfg_attr(not(feature = "defmt"), expect(dead_code, reason = "it is logged"))]
     pub(crate) reset: Reset,
 }
 
-/// Starts the watchdog, and then the clocks; the watchdog ends a start that hangs, too. To be called once after a reset, before anything that
-/// depends on a clock.
+/// Starts the watchdog and then the clocks, so that the watchdog ends a hanging start, too. Call it once after a reset, before
+/// anything that depends on a clock.
 pub(crate) fn begin() -> Begun {
     let reset = Reset::take(&mut Chip);
     WAS_HUNG.store(reset == Reset::Watchdog, Ordering::Relaxed);
@@ -39,19 +36,18 @@ pub(crate) fn was_hung() -> bool {
     WAS_HUNG.load(Ordering::Relaxed)
 }
 
-/// Feeds the watchdog.
 pub(crate) fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// Ends a turn of the main loop at `now`, its ports served: feeds the watchdog if `relay`'s timers were, too.
+/// Ends a turn of the main loop at `now`: feeds the watchdog unless a timer of `relay` is overdue.
 pub(crate) fn end_turn(relay: &Relay, now: Instant) {
     if relay.poll_timeout().is_none_or(|due| now < due + LATE) {
         feed();
     }
 }
 
-/// Returns the time until which the main loop may sleep that wants to wake at `wake`.
+/// Returns the time until which the main loop may sleep: `wake`, but at most [`TURN`] from `now`.
 pub(crate) fn latest(now: Instant, wake: Option<Instant>) -> Instant {
     let turn = now + TURN;
     wake.map_or(turn, |wake| wake.min(turn))

@@ -1,4 +1,4 @@
-//! Time since the start, and sleep until it is time or something has come in.
+//! Time since the start, and sleep until a time or an input.
 
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -10,15 +10,14 @@ use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::exception;
 use uav_relay::Instant;
 
-/// `SysTick` cycles in a microsecond; a thousand times as many are its period.
+/// `SysTick` cycles in a microsecond; its period is a thousand times as long.
 static MICRO: AtomicU32 = AtomicU32::new(1);
 
-/// Milliseconds since the start: 64 bits, so they do not overflow.
+/// Milliseconds since the start, in 64 bits, which do not overflow.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
-/// Whether something has come in since the main loop slept last.
+/// True if bytes have arrived since the main loop's last sleep.
 static INPUT: AtomicBool = AtomicBool::new(false);
 
-/// Time since the start.
 pub(crate) struct Clock {
     last: Instant,
 }
@@ -38,16 +37,16 @@ impl Clock {
         }
     }
 
-    /// Microseconds since the start; never less than before.
+    /// Returns the time since the start; it never decreases.
     pub(crate) fn now(&mut self) -> Instant {
         self.last = self.last.max(Instant::from_micros(micros()));
         self.last
     }
 
-    /// Sleeps until `wake`, or until something comes in.
+    /// Sleeps until `wake`, or until an input.
     pub(crate) fn sleep(&mut self, wake: Option<Instant>) {
         while wake.is_none_or(|wake| self.now() < wake) {
-            // An interrupt that comes after the look at INPUT stays pending, and `wfi` returns for it.
+            // An interrupt after this check of INPUT stays pending, and `wfi` returns for it.
             let input = free(|_| {
                 let input = INPUT.swap(false, Ordering::Relaxed);
                 if !input {
@@ -62,18 +61,16 @@ impl Clock {
     }
 }
 
-/// Has the main loop look at its ports.
 pub(crate) fn wake() {
     INPUT.store(true, Ordering::Relaxed);
 }
 
-/// Microseconds since the start.
 pub(crate) fn micros() -> u64 {
     let (ticks, count) = free(|cs| {
         let ticks = TICKS.borrow(cs).get();
         let count = SYST::get_current();
         if SCB::is_pendst_pending() {
-            // The period has ended, and its interrupt waits for this section to do so.
+            // The period has ended, and its interrupt is pending until this section ends.
             (ticks.wrapping_add(1), SYST::get_current())
         } else {
             (ticks, count)

@@ -1,4 +1,4 @@
-//! The drone, whatever its links are: what it is by its configuration.
+//! Drone as defined by its configuration block, for either wiring.
 
 use uav_relay::Auth;
 use uav_relay::GuardConfig;
@@ -13,17 +13,16 @@ use super::autopilot::{Autopilot, Uart};
 use super::flash;
 use super::{board, config, kept, log};
 
-/// The relay, what it has said, and the autopilot, if it is told where to fly; in places of their own in RAM, since the stack would
-/// have to hold them.
+/// Relay, its votes, and the autopilot of a drone with sites; in static RAM, to save stack.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut kept::Views,
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
-/// The drone by its configuration; `None` where there is none to fly by.
+/// Creates the drone of the configuration block; `None` if it can not fly.
 ///
-/// This and [`switch_on`] are functions of their own so that the stack they need is given back.
+/// [`switch_on`] and this function are not inlined, so that their stack frames are released.
 #[inline(never)]
 pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     let field = cortex_m::singleton!(FIELD: config::Room = config::EMPTY)?;
@@ -56,8 +55,7 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     }
 }
 
-/// The relay, unless this image was built without what it is asked for. It is made in a place of its own in RAM: the stack would have to
-/// hold it.
+/// Creates the relay in static RAM, to save stack. `None` if this image lacks a feature that the configuration needs.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -69,7 +67,7 @@ fn switch_on(
     let [probe_after, dead_after] = config.silence();
     let settings = Settings {
         auth,
-        // What it has in common with the others may change with an upload.
+        // A profile equal to the common one may change with an upload.
         profile: Some(config.profile)
             .filter(|own| !cfg!(feature = "upload") || config.hold_altitude || *own != common),
         hold_altitude: config.hold_altitude,
@@ -85,7 +83,7 @@ fn switch_on(
         dead_after,
         ..Settings::default()
     };
-    // All else has been checked with the configuration.
+    // Other errors were ruled out by the check of the configuration.
     let slot = cortex_m::singleton!(RELAY: Option<Relay> = None)?;
     let seed = board::seed();
     Relay::new_in(slot, &config.mission, config.identity, &settings, seed, now)
@@ -93,13 +91,13 @@ fn switch_on(
         .ok()
 }
 
-/// Frames are to be signed, and cannot be.
+/// Error: a key is configured, but frames can not be signed.
 struct CannotSign;
 
-/// What frames are signed with in this start, if they are.
+/// Returns the signing settings of this start, if the block has a key.
 ///
-/// Where the flash cannot be written, as in an emulator, the epoch is still above all that stand there, and at least the configuration's:
-/// but it may not rise from this start to the next.
+/// If the flash can not be written, as in an emulator, the epoch is still larger than all stored ones, and at least that of the
+/// block, but it may not increase from this start to the next.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {
@@ -126,7 +124,7 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     }))
 }
 
-/// An image built without the feature `auth` does not fly where frames are to be signed.
+/// Refuses to fly with a signing key, because this image was built without the feature `auth`.
 #[cfg(not(feature = "auth"))]
 fn sign() -> Result<Option<Auth>, CannotSign> {
     if config::secret(board::block()) == Ok(None) {

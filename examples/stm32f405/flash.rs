@@ -1,4 +1,4 @@
-//! The sectors of flash that this program writes, and everything unsafe about them.
+//! Flash sectors that this program writes, with all the unsafe code for them.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -11,28 +11,23 @@ use uav_relay_kept::views;
 #[cfg(feature = "upload")]
 use super::uploads;
 
-/// Where a sector begins that no image reaches (`memory.x`).
+/// Address of a sector that no image reaches (`memory.x`).
 #[derive(Clone, Copy)]
 struct Sector(u32);
 
-/// Two sectors that keep a log.
 #[derive(Clone, Copy)]
 pub(crate) struct Sectors([Sector; 2]);
 
-/// Those of what was said in the votes on views.
 pub(crate) const VIEWS: Sectors = Sectors::at(views::SECTORS);
 
-/// Those of the epoch.
 #[cfg(feature = "auth")]
 pub(crate) const EPOCHS: Sectors = Sectors::at(epoch::SECTORS);
 
-/// Those of uploads.
 #[cfg(feature = "upload")]
 pub(crate) const UPLOADS: Sectors = Sectors::at(uploads::SECTORS);
 
 const KIB: u32 = 1024;
 
-/// Where the flash begins, and the first of its large sectors.
 const FLASH_START: u32 = 0x0800_0000;
 const LARGE: u32 = FLASH_START + 128 * KIB;
 
@@ -45,8 +40,7 @@ impl Sectors {
         self.0.get(sector).copied()
     }
 
-    /// What stands in a sector.
-    #[inline(never)] // it is small, and often wanted
+    #[inline(never)] // small, and called often
     fn all(&self, sector: usize) -> &[u32] {
         self.get(sector).map_or(&[], Sector::words)
     }
@@ -80,20 +74,19 @@ impl Flash for Sectors {
 }
 
 impl Sector {
-    /// Words in it. Of the sectors below the large ones, only those of 16 KiB are in use.
+    /// Returns its length in words. Of the sectors below the large ones, only those of 16 KiB are in use.
     const fn len(self) -> usize {
         let bytes = if self.0 < LARGE { 16 * KIB } else { 128 * KIB };
         bytes as usize / 4
     }
 
-    /// What stands there.
     const fn words<'a>(self) -> &'a [u32] {
         // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors` that is
-        // borrowed for as long as this is looked at.
+        // borrowed while the slice lives.
         unsafe { core::slice::from_raw_parts(self.0 as *const u32, self.len()) }
     }
 
-    /// The number that the flash's registers know it by: the large sectors begin with number 5.
+    /// Returns the sector number for the flash registers: the large sectors begin with number 5.
     const fn number(self) -> u8 {
         let number = if self.0 < LARGE {
             (self.0 - FLASH_START) / (16 * KIB)
@@ -103,7 +96,7 @@ impl Sector {
         number.to_le_bytes()[0]
     }
 
-    /// Makes it blank. That stops the CPU: see the files of the logs for how long.
+    /// Erases the sector. This stops the CPU; the modules of the journals state for how long.
     #[inline(never)]
     fn erase(self) {
         let flash = unlocked();
@@ -119,15 +112,14 @@ impl Sector {
         flash.cr().modify(|_, w| w.strt().set_bit());
         wait(&flash);
         flash.cr().write(|w| w.lock().set_bit());
-        // The cache of data does not notice.
+        // The data cache must be reset by hand.
         flash.acr().modify(|_, w| w.dcen().clear_bit());
         flash.acr().modify(|_, w| w.dcrst().set_bit());
         flash.acr().modify(|_, w| w.dcrst().clear_bit());
         flash.acr().modify(|_, w| w.dcen().set_bit());
     }
 
-    /// Writes words from number `first` of it on, and reads them back; whether they stand there. That stops the CPU for some 16
-    /// microseconds a word.
+    /// Writes words from `first` on; returns true if they are read back correctly. Stops the CPU for some 16 microseconds a word.
     #[inline(never)]
     fn write(self, first: usize, words: &[u32]) -> bool {
         let end = first.checked_add(words.len());
@@ -136,7 +128,7 @@ impl Sector {
         }
         let first = (self.0 as *mut u32).wrapping_add(first);
         let flash = unlocked();
-        // SAFETY: a size that the register knows.
+        // SAFETY: a valid size for this register.
         flash
             .cr()
             .write(|w| unsafe { w.psize().bits(BY_WORD).pg().set_bit() });
@@ -152,23 +144,23 @@ impl Sector {
     }
 }
 
-/// Words at a time, as the 3.3 V of this board allow.
+/// Parallelism of 32 bits, as the board's 3.3 V permit.
 const BY_WORD: u8 = 2;
 
-/// The flash's registers, ready to write.
+/// Unlocks the flash registers for writing.
 fn unlocked() -> FLASH {
     const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-    // SAFETY: no other access to these registers is under way: nothing else in this program has them.
+    // SAFETY: nothing else in this program accesses these registers.
     let flash = unsafe { FLASH::steal() };
     wait(&flash);
     for key in KEYS {
-        // SAFETY: any word may be written there; these two unlock.
+        // SAFETY: the register accepts any word; these two unlock.
         flash.keyr().write(|w| unsafe { w.bits(key) });
     }
     flash
 }
 
-/// Reading waits by itself until the flash is free; this is for what is asked of it next.
+/// Waits until the flash is idle, before the next command. Reads wait by themselves.
 fn wait(flash: &FLASH) {
     while flash.sr().read().bsy().bit_is_set() {}
 }

@@ -1,4 +1,4 @@
-//! What `autopilot.rs` is without the feature `flight`: nothing. A drone whose block has sites does not fly with such an image.
+//! Replacement of `autopilot.rs` without the feature `flight`: a drone whose block has sites does not fly with such an image.
 
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::USART1;
@@ -9,7 +9,6 @@ use uav_relay::{Event, Instant, Mission, Relay};
 use super::config::Sites;
 use super::log;
 
-/// No port.
 pub(crate) struct Uart;
 
 #[expect(
@@ -20,11 +19,11 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// There is none.
+/// Uninhabited type: there is no autopilot.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {
-    /// Returns none: this image does not fly.
+    /// Returns `None`: this image does not fly.
     pub(crate) const fn guard(_: &Sites, _: GuardConfig) -> Option<GuardConfig> {
         None
     }

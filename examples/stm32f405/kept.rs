@@ -1,5 +1,4 @@
-//! What is in the flash before it is needed again: with the feature `upload` what was uploaded, and what the relay has said in the votes
-//! on views.
+//! Persistent state: the relay's votes on views and, with the feature `upload`, the uploaded mission.
 
 use uav_relay::{Instant, Relay};
 #[cfg(feature = "upload")]
@@ -12,7 +11,7 @@ use super::flash::Sectors;
 use super::uploads;
 use super::{board, flash, log};
 
-/// Has `relay`, which was just made, fly what it held when this drone was switched off.
+/// Restores the uploaded mission into a newly created `relay`.
 #[cfg(feature = "upload")]
 #[inline(never)]
 pub(crate) fn resume_upload(relay: &mut Relay) {
@@ -26,7 +25,6 @@ pub(crate) fn resume_upload(relay: &mut Relay) {
     }
 }
 
-/// Writes down what `relay` holds since just now.
 #[cfg(feature = "upload")]
 #[inline(never)]
 pub(crate) fn keep_upload(relay: &Relay) {
@@ -40,18 +38,17 @@ fn uploads() -> Journal<Sectors> {
     Journal::new(flash::UPLOADS, uploads::WORDS, block())
 }
 
-/// What the relay has said.
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Has `relay`, which was handed nothing but an upload yet, stand by what it said before this drone was switched off.
+    /// Restores the votes from before the reboot into a `relay` that has got at most an upload so far.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
         Self(views::Views::resume(relay, now, log, log::stands_by))
     }
 
-    /// Writes down what `relay` has said, if that has changed. Called before anything is sent.
+    /// Stores the votes of `relay` if they have changed. Call it before each send.
     pub(crate) fn keep(&mut self, relay: &Relay) {
         let log = || views::log(flash::VIEWS, block());
         if let Some(kept) = self.0.keep(relay, log) {
@@ -60,7 +57,7 @@ impl Views {
     }
 }
 
-/// The check sequence of the configuration block: its last four bytes.
+/// Returns the CRC of the configuration block, its last four bytes.
 fn block() -> u32 {
     let bytes = board::block().last_chunk();
     bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes))

@@ -1,5 +1,4 @@
-//! What is logged, with `--features defmt`. Where it goes is the business of `sink_uart.rs`, or of `sink_rtt.rs` with
-//! `--features rtt`.
+//! Log lines, with `--features defmt`. Their output is `sink_uart.rs`, or `sink_rtt.rs` with `--features rtt`.
 
 use uav_relay::SetupError;
 #[cfg(feature = "flight")]
@@ -37,7 +36,6 @@ pub(crate) fn begins(config: &Config) {
     );
 }
 
-/// The cause of the last reset, and the clocks that were reached.
 pub(crate) fn started(begun: &Begun) {
     match begun.reset {
         Reset::Watchdog => {
@@ -59,7 +57,7 @@ pub(crate) fn unguarded() {
     );
 }
 
-/// Where the autopilot is told to fly.
+/// Logs the line and the speed limit of the autopilot.
 #[cfg(feature = "flight")]
 pub(crate) fn flies(course: &Course) {
     defmt::info!(
@@ -98,7 +96,6 @@ pub(crate) fn cannot_sign_to_autopilot() {
     );
 }
 
-/// What the link to the autopilot says.
 #[cfg(feature = "flight")]
 pub(crate) fn autopilot(event: AutopilotEvent) {
     match event {
@@ -202,7 +199,7 @@ pub(crate) fn refused(error: ConfigError) {
     }
 }
 
-/// What frames are signed with; `kept` tells whether the epoch stands in the flash.
+/// Logs the signing epoch; `kept` is true if it was stored.
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, kept: bool) {
     if kept {
@@ -225,13 +222,13 @@ pub(crate) fn no_epoch() {
     defmt::error!("no epoch is left to sign with");
 }
 
-/// The mission of this version was uploaded before this start.
+/// Logs that a mission uploaded before this start was restored.
 #[cfg(feature = "upload")]
 pub(crate) fn resumes(version: u16) {
     defmt::info!("mission version {=u16} was uploaded before", version);
 }
 
-/// The mission of this version has been uploaded; `kept` tells whether it stands in the flash.
+/// Logs an uploaded mission; `kept` is true if it was stored.
 #[cfg(feature = "upload")]
 pub(crate) fn uploaded(version: u16, kept: bool) {
     if kept {
@@ -244,7 +241,7 @@ pub(crate) fn uploaded(version: u16, kept: bool) {
     }
 }
 
-/// What was said in the votes on views was kept before this start; `taken` tells whether the relay stands by it.
+/// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
 pub(crate) fn stands_by(taken: bool) {
     if taken {
         defmt::info!("what was said in the votes on views before holds");
@@ -253,7 +250,7 @@ pub(crate) fn stands_by(taken: bool) {
     }
 }
 
-/// What was said in the votes on views `kept` again, or not any more.
+/// Logs that storing the votes works again (`kept`) or fails.
 pub(crate) fn votes(kept: bool) {
     if kept {
         defmt::info!("what is said in the votes on views is kept again");
@@ -269,7 +266,7 @@ pub(crate) fn cannot_sign() {
     defmt::error!("configuration refused: it has a key, and this image was built without auth");
 }
 
-/// This image was built without the feature for the method, or for measuring.
+/// Logs that this image was built without the feature for the method, or for measuring.
 pub(crate) fn cannot_fly(error: SetupError) {
     defmt::error!("configuration refused: this image cannot do it, {}", error);
 }

@@ -1,33 +1,33 @@
-//! What is flashed: a relay on an STM32F405 with a serial port to each neighbour.
+//! Firmware of a relay on an STM32F405 with a serial port to each neighbour.
 //!
 //! ```text
 //! cargo build --profile firmware --target thumbv7em-none-eabihf --example stm32f405
 //! cargo run   --profile firmware --target thumbv7em-none-eabihf --example stm32f405     # flashes, with probe-rs
 //! ```
-//! Every drone gets the same image. Which relay it is and what it flies stands in a sector of its own, written once and kept
-//! by updates (relay 3 of 5, for instance):
+//! Every drone gets the same image. The index and the mission are in a configuration block with a flash sector of its own,
+//! written once and preserved by updates (relay 3 of 5, for instance):
 //! ```text
 //! cargo provision --uavs 5 --index 3 --network 7 --out relay3.bin
 //! probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x080E0000 relay3.bin
 //! ```
-//! A drone without that takes no part. With `--features defmt` the log says so, and whatever else happens.
+//! A drone without a block takes no part. With `--features defmt` it logs this and all events.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `main.rs` | this variant, put together |
-//! | `wires.rs` | its pins and interrupts |
-//! | `drone.rs` | what a drone is by its configuration, whatever its links are |
-//! | `turns.rs` | its main loop |
-//! | `autopilot.rs`, `grounded.rs` | the autopilot with the feature `flight`, and without |
-//! | `uploads.rs` | with the feature `upload`, the missions that were uploaded in flight |
-//! | `kept.rs` | when they, and what the relay has said in votes, are written and read |
-//! | `flash.rs` | the sectors of the logs of the crate `uav-relay-kept`, and everything unsafe about them |
-//! | `port.rs` | a serial port that an interrupt serves |
+//! | `main.rs` | entry point of this variant |
+//! | `wires.rs` | pins and interrupts |
+//! | `drone.rs` | drone as defined by its configuration block, for either wiring |
+//! | `turns.rs` | main loop |
+//! | `autopilot.rs`, `grounded.rs` | autopilot link with the feature `flight`, and its replacement |
+//! | `uploads.rs` | journal of uploaded missions, with the feature `upload` |
+//! | `kept.rs` | storing and restoring of uploads and votes |
+//! | `flash.rs` | flash sectors of the journals, with their unsafe code |
+//! | `port.rs` | interrupt-driven serial port |
 //! | `chip.rs` | clocks, watchdog, cause of the last reset |
 //! | `clock.rs` | time and sleep |
-//! | `log.rs`, `silent.rs` | the log with `--features defmt`, and without |
-//! | `sink_uart.rs`, `sink_rtt.rs` | where it goes: a spare UART, or the debug probe with `--features rtt` |
-//! | `board.rs` | everything else unsafe |
+//! | `log.rs`, `silent.rs` | log with `--features defmt`, and its replacement |
+//! | `sink_uart.rs`, `sink_rtt.rs` | log output: a spare UART, or the debug probe with `--features rtt` |
+//! | `board.rs` | all other unsafe code |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -69,14 +69,14 @@ fn main() -> ! {
     let Some((mut clock, links, uart)) = connect() else {
         board::stop()
     };
-    // Without a configuration to fly by a drone sleeps for good.
+    // A drone without a valid configuration sleeps for good.
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
     turns::fly(clock, links, drone)
 }
 
-/// The links, in a place of their own in RAM; a function of its own, so that the stack it needs is given back.
+/// Creates the links in static RAM; not inlined, so that its stack frame is released.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
@@ -91,7 +91,6 @@ fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
     Some((clock, links, uart))
 }
 
-/// A port to each neighbour.
 #[cfg(target_os = "none")]
 type Links = uav_relay::serial::Pair<port::Port, port::Port>;
 

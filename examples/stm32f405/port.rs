@@ -1,4 +1,4 @@
-//! A serial port that an interrupt serves, by the library's [`ByteQueues`]: the main loop hands bytes over and never waits.
+//! Interrupt-driven serial port, by the library's [`ByteQueues`]: the main loop never waits for it.
 
 use core::cell::RefCell;
 
@@ -13,23 +13,20 @@ use uav_relay_chip::baud::believed;
 
 use super::{board, clock};
 
-/// Bits a second on every port, 8N1.
+/// Bit rate of every port, bit/s, 8N1.
 pub(crate) use uav_relay_block::BAUD;
 
-/// Received bytes that can wait for the main loop: 11 ms of them at full speed.
+/// Capacity of the receive queue, bytes: 11 ms at full speed.
 pub(crate) const RECEIVED: usize = 128;
 
-/// Bytes that can wait to leave: the longest frame, so that the main loop can sleep meanwhile.
+/// Capacity of the send queue, bytes. It exceeds the longest frame, so that the main loop can sleep meanwhile.
 pub(crate) const OUTGOING: usize = 256;
 
-/// Bytes between the interrupt and the main loop.
 pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> =
     ByteQueues<IN, OUT>;
 
-/// The main loop's end of a port.
 pub(crate) type Port = QueuedPort<'static, Serves>;
 
-/// The interrupt that serves a port.
 pub(crate) struct Serves(Interrupt);
 
 impl Pend for Serves {
@@ -38,13 +35,11 @@ impl Pend for Serves {
     }
 }
 
-/// What the interrupt of a port has: its UART, and its end of the queues.
 pub(crate) struct Served<U: Instance> {
     uart: Serial<U>,
     end: InterruptEnd<'static>,
 }
 
-/// Where the interrupt finds that.
 pub(crate) type Slot<U> = Mutex<RefCell<Option<Served<U>>>>;
 
 impl<U: Instance> Served<U> {
@@ -67,12 +62,12 @@ impl<U: Instance> Served<U> {
     }
 }
 
-/// What a port is set to whose UART has a clock of `apb_hz`. The HAL did not set the clocks up and takes them for those of the reset.
+/// Returns the settings of a UART with a clock of `apb_hz`. They correct for the HAL, which assumes the clocks of the reset.
 pub(crate) fn config(apb_hz: u32) -> Config {
     Config::default().baudrate(believed(BAUD, apb_hz).bps())
 }
 
-/// Gives the UART to its interrupt, and the other end of the queues to the caller.
+/// Hands the UART to its interrupt, and returns the main loop's end of the queues.
 pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     mut uart: Serial<U>,
     interrupt: Interrupt,
@@ -90,7 +85,6 @@ pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     port
 }
 
-/// What the interrupt of a port does.
 pub(crate) fn serve<U: Instance>(slot: &Slot<U>) {
     free(|cs| {
         if let Ok(mut served) = slot.borrow(cs).try_borrow_mut()

@@ -1,4 +1,4 @@
-//! What `log.rs` is without `--features defmt`: nothing.
+//! Replacement of `log.rs` without `--features defmt`: it logs nothing.
 
 use uav_relay::SetupError;
 #[cfg(feature = "flight")]

@@ -1,14 +1,14 @@
-//! The log over the debug probe, with `--features rtt`: `probe-rs run` prints it. It is written to RAM and waits for nobody;
-//! the probe has no way to ask for the counters.
+//! Log output through the debug probe, with `--features rtt`: `probe-rs run` prints it. It is written to RAM without blocking;
+//! the probe can not request the counters.
 
 use defmt_rtt as _;
 
-/// Whether somebody has asked for the counters.
+/// Returns true if the counters are requested: never.
 pub(crate) const fn asked() -> bool {
     false
 }
 
-/// Frames that were dropped. What finds no room until the probe has fetched the rest is lost as well, and not counted.
+/// Returns the number of dropped frames. Frames lost because the probe reads too slowly are not counted.
 pub(crate) const fn lost() -> u32 {
     0
 }

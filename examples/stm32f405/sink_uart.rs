@@ -1,6 +1,6 @@
-//! The log over UART4 (TX PC10, RX PC11), in frames for `defmt-print`. An `s` sent to it asks for the counters.
+//! Log output over UART4 (TX PC10, RX PC11), in frames for `defmt-print`. A received `s` requests the counters.
 //!
-//! A frame goes into the queue of its port whole or not at all: logging never waits, and what did not fit is counted.
+//! A frame is queued whole or not at all: logging never blocks, and dropped frames are counted.
 
 use core::cell::RefCell;
 
@@ -13,19 +13,18 @@ use uav_relay::serial::SerialPort;
 
 use crate::port::{self, Port, Queues, RECEIVED, Slot};
 
-/// Room for the longest frame, the relay's counters.
+/// Buffer of a frame; the longest has the relay's counters.
 type Frame = Vec<u8, 160>;
 
-/// Bytes of the log that can wait to leave: 89 ms of them.
+/// Capacity of the send queue, bytes: 89 ms.
 const ROOM: usize = 1024;
 
 struct Log {
     port: Option<Port>,
     encoder: defmt::Encoder,
     frame: Frame,
-    /// Whether the frame is longer than there is room for.
+    /// True if the frame exceeds its buffer.
     cut: bool,
-    /// Frames that were dropped.
     lost: u32,
 }
 
@@ -38,7 +37,6 @@ static LOG: Mutex<RefCell<Log>> = Mutex::new(RefCell::new(Log {
     lost: 0,
 }));
 
-/// Opens the port of the log.
 pub(crate) fn start(uart: Serial<UART4>) {
     let Some(queues) = singleton!(QUEUES: Queues<ROOM, RECEIVED> = Queues::new()) else {
         return;
@@ -47,7 +45,7 @@ pub(crate) fn start(uart: Serial<UART4>) {
     with(|log| log.port = Some(port));
 }
 
-/// Whether somebody has asked for the counters.
+/// Returns true if the counters are requested.
 pub(crate) fn asked() -> bool {
     let mut asked = false;
     with(|log| {
@@ -61,14 +59,13 @@ pub(crate) fn asked() -> bool {
     asked
 }
 
-/// Frames that were dropped.
 pub(crate) fn lost() -> u32 {
     let mut lost = 0;
     with(|log| lost = log.lost);
     lost
 }
 
-/// A frame begins; interrupts are off until its end.
+/// Begins a frame; interrupts are off until its end.
 pub(crate) fn begin() {
     with(|log| {
         log.frame.clear();
@@ -83,7 +80,6 @@ pub(crate) fn begin() {
     });
 }
 
-/// More of the frame.
 pub(crate) fn write(bytes: &[u8]) {
     with(|log| {
         let Log {
@@ -98,7 +94,7 @@ pub(crate) fn write(bytes: &[u8]) {
     });
 }
 
-/// The frame is complete: off with it, if there is room.
+/// Ends the frame, and queues it if there is room.
 pub(crate) fn end() {
     with(|log| {
         let Log {

@@ -1,4 +1,4 @@
-//! The main loop on polled ports: the relay, its ports and the autopilot in turn, then sleep.
+//! Main loop on polled ports: serves the relay, its ports and the autopilot, then sleeps.
 
 use embedded_hal::digital::OutputPin;
 #[cfg(feature = "upload")]
@@ -13,13 +13,11 @@ use super::drone::Drone;
 use super::kept;
 use super::log;
 
-/// What the links of both variants have in common.
 pub(crate) trait Links {
-    /// Moves bytes between the ports and the relay, and says when to be called again. What the relay has said is kept between what
-    /// comes in and what is sent.
+    /// Exchanges bytes between the ports and the relay, and stores its votes between receiving and sending. Returns the time of
+    /// the next call.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
-    /// Logs the counters of each link.
     fn log_counters(&self);
 }
 
@@ -46,7 +44,6 @@ impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     }
 }
 
-/// Flies for good.
 pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -> ! {
     loop {
         let now = clock.now();
@@ -61,7 +58,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
         let relay = &mut *drone.relay;
         while let Some(event) = relay.poll_event() {
             log::event(event, relay);
-            // The control of the proof that no panic is reachable: with this one the image must not link.
+            // Control of the no-panic proof: with this panic the image must not link.
             #[cfg(panic_on_purpose)]
             assert!(
                 relay.setpoint().is_none_or(|place| place.x_m < 1e6),
@@ -79,7 +76,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
             log::counters(relay);
             links.log_counters();
         }
-        // With what the neighbours have just changed.
+        // After the links, so that it uses the newest state of the neighbours.
         let soon = drone.autopilot.as_mut();
         let soon = soon.map(|autopilot| autopilot.fly(now, relay));
         let now = clock.now();
@@ -89,8 +86,9 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Replace this by what your receiver has measured since it was asked last, if the configuration has the relay measure, or listen: then with
-/// where the drone was. Of a field, once that says enough, `Relay::restart` at the leader has the chain agree again.
+/// Returns no measurement. Replace it by your receiver's newest one if the configuration has the relay measure or listen; to
+/// listen it needs the drone's position, too. After enough samples of a field `Relay::restart` at the leader lets the chain agree
+/// again.
 const fn measured() -> Option<Sample> {
     None
 }

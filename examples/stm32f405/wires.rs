@@ -1,10 +1,10 @@
-//! The board with a serial port to each neighbour.
+//! Board with a serial port to each neighbour.
 //!
-//! | what | where |
+//! | function | pins |
 //! | --- | --- |
-//! | toward the transmitter | USART2: TX PA2, RX PA3 |
-//! | toward the receiver | USART3: TX PB10, RX PB11 |
-//! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
+//! | neighbour toward the transmitter | USART2: TX PA2, RX PA3 |
+//! | neighbour toward the receiver | USART3: TX PB10, RX PB11 |
+//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI; `SysTick` every millisecond |
 
@@ -23,7 +23,7 @@ use super::port::{self, Port, Queues, Slot};
 static UPSTREAM: Slot<USART2> = Mutex::new(RefCell::new(None));
 static DOWNSTREAM: Slot<USART3> = Mutex::new(RefCell::new(None));
 
-/// Sets the board up, once only: its clock, the ports toward transmitter and receiver, and the one of the autopilot.
+/// Sets up the board, once: clock, the ports of both neighbours, and the UART of the autopilot.
 pub(crate) fn start() -> Option<(Clock, Port, Port, Uart)> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;

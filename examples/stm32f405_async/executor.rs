@@ -1,4 +1,4 @@
-//! One task, the time, and sleep: all that `uav_relay::asynch` wants of an executor. All its unsafe is here.
+//! Minimal executor for `uav_relay::asynch`: one task, time and sleep, with all its unsafe code.
 
 use core::cell::{Cell, RefCell};
 use core::future::{Future, poll_fn};
@@ -10,7 +10,7 @@ use uav_relay::Instant;
 use super::chip;
 use super::clock::{self, Clock};
 
-/// The board's clock, and when the task wants to be polled at the latest.
+/// Clock of the board, and the earliest wake-up time of the task.
 pub(crate) struct Time {
     clock: RefCell<Clock>,
     next: Cell<Option<Instant>>,
@@ -45,13 +45,13 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Polls `task` whenever an interrupt has brought something, it has woken itself, or its time has come; then calls `also`.
+/// Polls `task` after an interrupt, a wake-up or at its time, and calls `also` after each poll.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
     let waker = waker();
     let mut cx = Context::from_waker(&waker);
     loop {
         time.next.set(None);
-        // It goes on for good.
+        // The task never completes.
         let _ = task.as_mut().poll(&mut cx);
         also();
         if let Ok(mut clock) = time.clock.try_borrow_mut() {
@@ -61,7 +61,6 @@ pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl 
     }
 }
 
-/// Has the only task there is polled again.
 fn waker() -> Waker {
     const WAKES: RawWakerVTable = RawWakerVTable::new(
         |_| RawWaker::new(core::ptr::null(), &WAKES),
@@ -69,6 +68,6 @@ fn waker() -> Waker {
         |_| clock::wake(),
         |_| {},
     );
-    // SAFETY: its functions touch no more than a static that is atomic.
+    // SAFETY: its functions access only an atomic static.
     unsafe { Waker::from_raw(RawWaker::new(core::ptr::null(), &WAKES)) }
 }

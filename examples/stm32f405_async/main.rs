@@ -1,14 +1,15 @@
-//! The relay of `stm32f405` on asynchronous ports: the same wires, drone and log, run by `uav_relay::asynch` on an executor of 30 lines.
+//! The relay of `stm32f405` on asynchronous ports: same wiring, drone and log, but run by `uav_relay::asynch` on an executor of
+//! 30 lines.
 //!
-//! It is here to be compared with the polled one (`cargo cost`), and to be flown in the emulator (`cargo test --test qemu`), where
-//! Embassy's start-up waits for good for a clock that QEMU does not have. For a board of your own begin with `examples/embassy`. It has
-//! no autopilot, as those there have: a drone whose block has sites takes no part.
+//! It serves for comparison with the polled one (`cargo cost`), and for the emulator (`cargo test --test qemu`), where Embassy
+//! would wait for good for a clock that QEMU lacks. For a board of your own begin with `examples/embassy`. It has no autopilot
+//! link: a drone whose block has sites takes no part.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `main.rs` | this variant, put together |
-//! | `executor.rs` | one task, the time, and sleep; all its unsafe |
-//! | `ports.rs` | the halves of a port that an interrupt serves |
+//! | `main.rs` | entry point of this variant |
+//! | `executor.rs` | executor of one task, with its unsafe code |
+//! | `ports.rs` | asynchronous halves of an interrupt-driven port |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -64,14 +65,13 @@ fn main() -> ! {
     let Some((mut clock, upstream, downstream, uart)) = wires::start() else {
         board::stop()
     };
-    // Without a configuration to fly by a drone sleeps for good.
+    // A drone without a valid configuration sleeps for good.
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
     fly(clock, upstream, downstream, drone)
 }
 
-/// Flies for good.
 #[cfg(target_os = "none")]
 fn fly(
     clock: clock::Clock,
@@ -116,7 +116,7 @@ fn fly(
     })
 }
 
-/// Logs what happens, and keeps what was uploaded.
+/// Logs events and stores uploads.
 #[cfg(target_os = "none")]
 async fn tell(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infallible {
     loop {

@@ -1,4 +1,5 @@
-//! The halves of a port that an interrupt serves, as asynchronous ports. The executor polls its one task after every byte that comes in.
+//! Asynchronous halves of an interrupt-driven port. They need no waker, because the executor polls its task after every received
+//! byte.
 
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -12,19 +13,16 @@ use uav_relay::serial::SerialPort as _;
 use super::executor::Time;
 use super::port::Port;
 
-/// So long a full port is left alone; 11 bytes leave meanwhile.
+/// Pause before the next attempt on a full port; 11 bytes leave meanwhile.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// What reads.
 pub(crate) struct Rx<'p>(&'p RefCell<Port>);
 
-/// What writes.
 pub(crate) struct Tx<'p> {
     port: &'p RefCell<Port>,
     time: &'p Time,
 }
 
-/// Both halves of a port.
 pub(crate) const fn halves<'p>(port: &'p RefCell<Port>, time: &'p Time) -> (Rx<'p>, Tx<'p>) {
     (Rx(port), Tx { port, time })
 }

@@ -1,9 +1,10 @@
-//! What is flashed where the relays share one radio channel: the relay of `stm32f405`, with one serial port to the radio.
+//! Firmware of a relay on an STM32F405 that shares one radio channel with all relays: `stm32f405` with one serial port to the
+//! radio.
 //!
 //! ```text
 //! cargo run --profile firmware --target thumbv7em-none-eabihf --example stm32f405_radio     # flashes, with probe-rs
 //! ```
-//! `radio.rs` has its pins; everything else, and how to configure a drone, is that of `examples/stm32f405`.
+//! `radio.rs` has the pins; everything else, and the configuration of a drone, is that of `examples/stm32f405`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -56,14 +57,14 @@ fn main() -> ! {
     let Some((mut clock, channel, uart)) = connect() else {
         board::stop()
     };
-    // Without a configuration to fly by a drone sleeps for good.
+    // A drone without a valid configuration sleeps for good.
     let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
     turns::fly(clock, channel, drone)
 }
 
-/// The link, in a place of its own in RAM; a function of its own, so that the stack it needs is given back.
+/// Creates the link in static RAM; not inlined, so that its stack frame is released.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
@@ -77,7 +78,6 @@ fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
     Some((clock, channel, uart))
 }
 
-/// One port to a radio, with its driver-enable pin.
 #[cfg(target_os = "none")]
 type Channel = uav_relay::serial::Shared<port::Port, radio::DriverEnable>;
 

@@ -1,10 +1,10 @@
-//! The board with one serial port, to a radio that every relay in range hears.
+//! Board with one serial port, to a radio channel shared by all relays in range.
 //!
-//! | what | where |
+//! | function | pins |
 //! | --- | --- |
 //! | radio, or transceiver of a bus | USART2: TX PA2, RX PA3 |
-//! | its driver-enable pin, if it has one | PA1: high while this relay sends |
-//! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
+//! | driver enable, if the radio has one | PA1: high while this relay sends |
+//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI; `SysTick` every millisecond |
 
@@ -23,10 +23,9 @@ use super::port::{self, Port, Queues, Slot};
 
 static RADIO: Slot<USART2> = Mutex::new(RefCell::new(None));
 
-/// High while this relay sends.
 pub(crate) type DriverEnable = PA1<Output>;
 
-/// Sets the board up, once only: its clock, the port to the radio, the pin that is high while it sends, and the port of the autopilot.
+/// Sets up the board, once: clock, radio port, driver-enable pin, and the UART of the autopilot.
 pub(crate) fn start() -> Option<(Clock, Port, DriverEnable, Uart)> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;

@@ -1,4 +1,4 @@
-//! What many tests begin with: the paper's chain, and one relay of a chain.
+//! Common fixtures of tests: the paper's chain, and one relay of a chain.
 
 use uav_relay::{Identity, Instant, Mission, MissionConfig, Relay, Settings, ViewRecord};
 use uav_relay_oracle::mission::of_link;
@@ -6,30 +6,30 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
 
-/// The network of [`relay`].
+/// Network number of [`relay`].
 pub const NETWORK: u16 = 7;
 
-/// The paper's chain of `relays` as the judges know it: with their path losses, and no least separation.
+/// Returns the paper's chain of `relays`, with the reference model's path losses and no minimum separation.
 ///
 /// # Panics
-/// For a number of relays that no mission has.
+/// No mission has this number of relays.
 pub fn mission(relays: u16) -> Mission {
     of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
 }
 
-/// The paper's chain of `relays` as a scenario file has it: neighbours are 4 m apart at least.
+/// Returns the paper's chain of `relays` as a scenario file has it, with a minimum separation of 4 m.
 ///
 /// # Panics
-/// For a number of relays that no mission has.
+/// No mission has this number of relays.
 pub fn paper(relays: u16) -> MissionConfig {
     let (mission, _) = mission::mission(&Scenario::default(), relays, 1e-4).unwrap();
     *mission.config()
 }
 
-/// Relay `index` of `mission`, switched on at time 0.
+/// Returns relay `index` of `mission`, started at time 0.
 ///
 /// # Panics
-/// Where the mission has no such relay, or it refuses the settings.
+/// The mission has no such relay, or it refuses the settings.
 pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     let identity = Identity {
         network: NETWORK,
@@ -38,15 +38,16 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
 }
 
-/// What a relay that was loaded with the mission of digest `base` has said when all know that view `number` is agreed on, of `relays`
-/// relays and proposed by relay 1; `member` tells whether it is one of them.
+/// Returns the record of a relay that has agreed on view `number` of `relays` relays, proposed by relay 1.
+///
+/// `base` is the digest of the loaded mission; `member` is true if the relay is in the view.
 ///
 /// # Panics
-/// For what no relay can have said.
+/// No relay can have such a record.
 pub fn voted(base: u16, relays: u16, number: u32, member: bool) -> ViewRecord {
     let id = (number << 10 | 1).to_le_bytes();
     let relays = relays.to_le_bytes();
-    // Promised, and nothing accepted since: as the format has it, no proposal, and the view agreed on.
+    // Promised and nothing accepted since: in the format no proposal, and the agreed view.
     let mut bytes = [&[1][..], &base.to_le_bytes(), &id, &relays].concat();
     bytes.push(u8::from(member));
     bytes.extend([&id[..], &[0], &[0; 4], &id, &relays].concat());

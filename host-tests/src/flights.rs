@@ -1,4 +1,4 @@
-//! What several tests fly: eight drones in a row, the faults of a bad day, and how a run is told to go on.
+//! Common flights of tests: eight drones in a row, heavy faults, and settings for the end of a run.
 
 use rand::RngExt;
 use uav_relay::{Band, Duration, Instant, Mission, MissionConfig, Profile};
@@ -11,14 +11,14 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 use crate::fixtures::mission;
 
-/// So many seconds after the start.
+/// Returns the time `seconds` after the start.
 pub const fn seconds(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Has the run go on until `at`, whatever has come of it before.
+/// Makes a run continue until `at`, even after it has settled.
 pub fn go_on_until(setup: &mut Setup, at: Instant) {
-    // Nobody is beyond the last relay, so nobody is parted.
+    // A partition behind the last relay separates no relays, but keeps the run going.
     setup.partitions.push(Partition {
         after: setup.mission.relays(),
         from: at,
@@ -26,16 +26,16 @@ pub fn go_on_until(setup: &mut Setup, at: Instant) {
     });
 }
 
-/// Has the run end at `at`, whatever has come of it before.
+/// Makes a run end at `at`, even after it has settled.
 pub fn end_at(setup: &mut Setup, at: Instant) {
     go_on_until(setup, at);
     setup.deadline = at;
 }
 
-/// Runs to the end: all relays hold their places, and none was ever told to leave its limits.
+/// Runs `setup` to the end, where all relays hold their positions and no setpoint has left its limits.
 ///
 /// # Panics
-/// Where that is not so.
+/// This is not so.
 pub fn settle(setup: Setup) -> Outcome {
     let outcome = run(setup).unwrap();
     assert_eq!(outcome.ending, Ending::Settled);
@@ -43,10 +43,10 @@ pub fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// The paper's eight relays, which keep `separation_m` from each other.
+/// Returns the paper's mission of eight relays with a minimum separation.
 ///
 /// # Panics
-/// For a separation that no mission has.
+/// No mission has this separation.
 pub fn eight_apart(separation_m: f32) -> Mission {
     let config = MissionConfig {
         min_separation_m: separation_m,
@@ -55,7 +55,7 @@ pub fn eight_apart(separation_m: f32) -> Mission {
     Mission::try_new(config).unwrap()
 }
 
-/// Where eight drones begin, in order along x and at least `gap_m` apart.
+/// Returns start positions of eight drones, in order along x and at least `gap_m` apart.
 pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     let mut x_m = 0.0;
     let start = (0..8).map(|_| {
@@ -65,14 +65,14 @@ pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     start.collect()
 }
 
-/// Eight drones in a row, each with a speed of its own, that know where they are.
+/// Returns eight drones in a row, each with its own speed and an exact position.
 pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
     FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
 }
 
-/// Of eight relays: three times in ten each has a power and an altitude of its own, otherwise they are alike.
+/// Returns own powers and altitudes of all eight relays three times in ten, otherwise none.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();
@@ -89,7 +89,7 @@ pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     own.collect()
 }
 
-/// Loss up to 50 %; corruption, duplicates and reordering up to 20 % each.
+/// Returns random faults: loss up to 50 %; corruption, duplicates and reordering up to 20 % each.
 pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     Faults {
         loss: rng.random_range(0.0..=0.5),
@@ -99,7 +99,7 @@ pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     }
 }
 
-/// `config` with the room of `corridor` for altitudes and sides; `None` where a relay would refuse the numbers.
+/// Returns a mission with the altitudes and lateral positions of `corridor`. `None` if its numbers are refused.
 pub fn with_room(config: &MissionConfig, corridor: Corridor) -> Option<Mission> {
     let config = MissionConfig {
         band: Band {

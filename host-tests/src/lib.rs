@@ -1,6 +1,6 @@
-//! What the tests of uav-relay share.
+//! Shared code of the tests of uav-relay.
 
-// On a microcontroller there is nothing to run tests: `cargo check --target thumbv7em-none-eabihf` leaves this package empty.
+// Empty on a microcontroller, where no tests run, for `cargo check --target thumbv7em-none-eabihf`.
 #![cfg_attr(target_os = "none", no_std)]
 
 #[cfg(not(target_os = "none"))]

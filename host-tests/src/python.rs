@@ -1,4 +1,4 @@
-//! Python, for the peers that nobody here wrote.
+//! Python interpreter for tests against independent peers.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -6,18 +6,18 @@ use std::process::{Command, Stdio};
 
 use rustix::fs::{FlockOperation, flock};
 
-/// What is installed, and in which version.
 const PACKAGES: &str = include_str!("../python.txt");
 
-/// The interpreter of a virtual environment under `target/` that has what `python.txt` names. The first call installs it.
+/// Returns the interpreter of a virtual environment under `target/` with the packages of `python.txt`. The first call installs
+/// it.
 ///
 /// # Panics
-/// Where there is no Python, or no package index.
+/// There is no Python, or no package index.
 pub fn interpreter() -> PathBuf {
     let target = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target");
     std::fs::create_dir_all(&target).unwrap();
     let home = target.join("python");
-    // Tests are processes of their own, and one installs for all.
+    // Tests run in several processes; one installs for all.
     let lock = std::fs::File::create(target.join("python.lock")).unwrap();
     flock(&lock, FlockOperation::LockExclusive).unwrap();
     let (python, done) = (home.join("bin/python"), home.join("installed.txt"));
@@ -47,10 +47,10 @@ fn run(command: &mut Command) {
     );
 }
 
-/// What a script says, handed `input`.
+/// Runs a script with `input`; returns its output.
 ///
 /// # Panics
-/// Where it fails.
+/// The script fails.
 pub fn output(script: &Path, arguments: &[&str], input: &str) -> String {
     let mut child = Command::new(interpreter())
         .arg(script)

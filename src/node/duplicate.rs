@@ -15,7 +15,7 @@
 //! | active | other frame under its own number, no key | send a claim, and 8 more every four `hop_time`; an echo of its own was received within `probe_after`: none | active |
 //! | active | smaller claim, or one that does not name its own | send a claim, and 32 more every four `hop_time` while the other node is not known to be passive | active |
 //! | active | claim of a passive node | send a claim | active |
-//! | active | larger claim of the same epoch, it holds a lease and a place, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
+//! | active | larger claim of the same epoch, it has held a place since before it first received the other node, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
 //! | active | larger claim otherwise | discard its agreed place | passive |
 //! | active | 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after`, on links, no key | send a claim | active |
 //! | passive | every quarter of `probe_after`, no key | send a claim with the flag passive | passive |
@@ -30,8 +30,9 @@
 //! # Safety
 //!
 //! A relay becomes passive as soon as it receives a larger claim, and the order of claims is total. Of two active nodes that exchange claims
-//! the one with the smaller claim thus becomes passive, unless it holds a lease and raises its claim number; since it does so once, the
-//! exchange ends after three claims. A relay that holds a lease therefore keeps its place when a copy of it is switched on later.
+//! the one with the smaller claim thus becomes passive, unless it raises its claim number; since it does so once, the exchange ends after
+//! three claims. Only a relay that had a place before it first received the other node raises it, so it keeps its place when a copy of it
+//! is switched on later, although that copy may have been placed in a new view meanwhile.
 //!
 //! With a key, only a handshake with the right tag counts as a claim, and nothing else that bears this relay's number is answered. A recorded
 //! handshake has no effect: those of this relay have an older epoch or its own claim number, and those of another node are true or have been
@@ -109,6 +110,8 @@ pub(crate) struct DuplicateIndex {
     rival: u32,
     /// The one received last.
     heard: u32,
+    /// Time when another node with this number was received last, and whether this relay had a place when it was received first.
+    contest: Option<(Instant, bool)>,
     /// Times when a duplicate of its own index, and of a neighbour's, was last observed.
     observed: [Option<Instant>; 2],
     /// Time when this relay last received a frame of its own.
@@ -143,6 +146,7 @@ impl DuplicateIndex {
             number,
             rival: 0,
             heard: 0,
+            contest: None,
             observed: [None; 2],
             echoed: None,
             passive_until: None,
@@ -197,6 +201,15 @@ impl DuplicateIndex {
         self.heard
     }
 
+    /// Returns true if this relay had a place before it received the other node, which it receives now.
+    fn held_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
+        let known = self.contest;
+        let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
+        let held = known.map_or(has_lease, |(_, held)| held);
+        self.contest = Some((now, held));
+        held && has_lease
+    }
+
     /// Handles a frame under this relay's number; returns true if the relay becomes passive.
     pub(crate) fn hear(
         &mut self,
@@ -215,6 +228,7 @@ impl DuplicateIndex {
                 let echoes = self.echoed;
                 let echoes = echoes.is_some_and(|at| now.since(at) < settings.probe_after);
                 if settings.auth.is_none() && !echoes {
+                    self.held_before(now, has_lease, settings);
                     self.defences = self.defences.max(QUESTIONS);
                     self.announce(now, settings);
                     self.claim(now, settings);
@@ -233,6 +247,7 @@ impl DuplicateIndex {
         has_lease: bool,
         settings: &Settings,
     ) -> bool {
+        let held = self.held_before(now, has_lease, settings);
         if !rival.newer_epoch {
             self.rival = self.rival.max(rival.number);
             self.heard = rival.number;
@@ -249,7 +264,7 @@ impl DuplicateIndex {
             return false;
         }
         let raised = self.number | RAISED;
-        if !rival.newer_epoch && has_lease && raised > rival.number {
+        if !rival.newer_epoch && held && raised > rival.number {
             self.number = raised;
             self.sessions_due = true;
             self.defend(now, rival, settings);
@@ -465,6 +480,20 @@ mod tests {
     }
 
     /// Two relays that hold a lease, whichever has the larger claim, come to one that is active within three claims.
+    #[test]
+    fn a_relay_that_was_placed_after_it_received_the_other_one_does_not_raise_its_claim() {
+        let settings = Settings::default();
+        for (had_place, later_s, raises) in [(false, 1, false), (true, 1, true), (false, 40, true)]
+        {
+            let mut duplicate = duplicate();
+            let smaller = Sender::Rival(rival(duplicate.number() - 1));
+            assert!(!duplicate.hear(at(1), smaller, had_place, &settings));
+            let larger = Sender::Rival(rival(duplicate.number() + 1));
+            let becomes = duplicate.hear(at(1 + later_s), larger, true, &settings);
+            assert_eq!(becomes, !raises, "{had_place} {later_s}");
+        }
+    }
+
     #[test]
     fn two_that_hold_a_lease_come_to_one_within_three_claims() {
         let settings = Settings::default();

@@ -1,69 +1,70 @@
-//! What is written into a drone once, apart from the image: which relay it is, and what it flies.
+//! Configuration block of a drone, written once and separately from the image: index, mission and keys.
 //!
-//! One block in a sector of the flash of its own, which no image reaches and no update touches: of an STM32F405 at [`ADDRESS`].
-//! `cargo provision` writes it from a scenario. All numbers are little-endian, floats as in IEEE 754:
+//! The block has a flash sector of its own, which firmware updates do not touch: [`ADDRESS`] on an STM32F405. `cargo provision`
+//! writes it from a scenario. All numbers are little-endian, floats IEEE 754:
 //!
-//! | byte | type | what |
+//! | byte | type | content |
 //! | --- | --- | --- |
 //! | 0 | 4 bytes | [`MAGIC`], "UAVR" |
 //! | 4 | u16 | [`VERSION`] of this table |
-//! | 6 | u16 | bytes of the block, [`LEN`] |
-//! | 8 | u16 | index: which relay this is, 1 (next to the transmitter) to N |
-//! | 10 | u16 | network: frames of any other are ignored |
+//! | 6 | u16 | length of the block, [`LEN`], bytes |
+//! | 8 | u16 | index of this relay, 1 (next to the transmitter) to N |
+//! | 10 | u16 | network number: frames of other networks are ignored |
 //! | 12 | u16 | relays N |
 //! | 14 | u8 | method: 0 align, 1 joint, 2 adjust |
-//! | 15 | u8 | 1 if this relay keeps to its altitude when altitudes are chosen, else 0 |
+//! | 15 | u8 | 1 if this relay keeps its altitude when altitudes are chosen, else 0 |
 //! | 16 | f32 | distance, m |
-//! | 20 | f32 | least separation, m |
+//! | 20 | f32 | minimum separation, m |
 //! | 24 | f32 | power of the transmitter, W |
-//! | 28 | f32 | altitude that the relays have in common, m |
-//! | 32 | f32 | power that the relays have in common, W |
+//! | 28 | f32 | common altitude of the relays, m |
+//! | 32 | f32 | common power of the relays, W |
 //! | 36 | f32 | altitude of this relay, m |
 //! | 40 | f32 | power of this relay, W |
-//! | 44 | f32 | power of the interferer, W; 0 in a field, and where the relays listen and are told of none |
-//! | 48 | f32 | x of the interferer, m; 0 then |
-//! | 52 | f32 | y of the interferer, m; 0 then |
+//! | 44 | f32 | power of the interferer, W; 0 with a field, and for relays that listen without an initial guess |
+//! | 48 | f32 | x of the interferer, m; 0 likewise |
+//! | 52 | f32 | y of the interferer, m; 0 likewise |
 //! | 56 | f32 | tolerance |
 //! | 60 | f64 | carrier, Hz |
 //! | 68 | f64 | excess loss with line of sight, as a factor |
-//! | 76 | f64 | excess loss without, as a factor |
+//! | 76 | f64 | excess loss without line of sight, as a factor |
 //! | 84 | f64 | weight of line of sight between drone and ground, 0 to 1 |
 //! | 92 | f32 | lowest altitude of the band, m |
 //! | 96 | f32 | highest altitude of the band, m |
-//! | 100 | f32 | y of the left edge of the room beside the line, m: 0 or less |
-//! | 104 | f32 | y of its right edge, m: 0 or more |
-//! | 108 | f32 | adjust: how far a relay may go up or down in one turn, m; 0 with another method |
-//! | 112 | u16 | adjust: rounds at most, 1 to 65535; 0 with another method |
-//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 where there is none |
-//! | 116 | f32 | the most interference that may be measured, W; 0 without samples |
-//! | 120 | u32 | samples to take at a place; 0 where nothing is measured |
+//! | 100 | f32 | left limit of the lateral range, y in m: 0 or less |
+//! | 104 | f32 | right limit of the lateral range, y in m: 0 or more |
+//! | 108 | f32 | adjust: largest altitude change of a relay in one turn, m; 0 with another method |
+//! | 112 | u16 | adjust: maximum number of rounds, 1 to 65535; 0 with another method |
+//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 without a field |
+//! | 116 | f32 | largest measurable interference, W; 0 without samples |
+//! | 120 | u32 | samples at each position; 0 without measurement |
 //! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
 //! | 128 + 8 k | f32 | Upsilon of point k, 1/W; 0 behind the last one |
-//! | 252 | u32 | the least epoch that this relay signs with, 1 to 4294967294; 0 without a key |
-//! | 256 | 32 bytes | the network's key, by which frames carry a tag; all 0 where there is none |
-//! | 288 | i32 | latitude of the transmitter, 1e-7 degrees; this and the next five are 0 where the drone has no autopilot to tell |
-//! | 292 | i32 | its longitude, 1e-7 degrees |
-//! | 296 | i32 | height of the ground there above the mean sea level, mm |
+//! | 252 | u32 | smallest epoch for signing, 1 to 4294967294; 0 without a key |
+//! | 256 | 32 bytes | the network's signing key; all 0 without one |
+//! | 288 | i32 | latitude of the transmitter, 1e-7 degrees; this and the next five are 0 without an autopilot |
+//! | 292 | i32 | longitude of the transmitter, 1e-7 degrees |
+//! | 296 | i32 | height of the ground at the transmitter above the mean sea level, mm |
 //! | 300 | i32 | latitude of the receiver, 1e-7 degrees |
-//! | 304 | i32 | its longitude, 1e-7 degrees |
-//! | 308 | i32 | height of the ground there above the mean sea level, mm |
-//! | 312 | f32 | the drone's greatest speed, m/s: 0.1 to 20; 0 is 5 m/s, and is what stands here without sites |
-//! | 316 | 32 bytes | the key that the autopilot signs with; all 0 where it does not, or there are no sites |
+//! | 304 | i32 | longitude of the receiver, 1e-7 degrees |
+//! | 308 | i32 | height of the ground at the receiver above the mean sea level, mm |
+//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20; 0 means 5 m/s, and is required without sites |
+//! | 316 | 32 bytes | the autopilot's MAVLink signing key; all 0 without one, and without sites |
 //! | 348 | f32 | noise power at every receiver, W: 0 to 1 |
-//! | 352 | u64 | how long after an agreement the leader asks what is heard, us; this and the next two are 0 where the relays do not listen |
-//! | 360 | u64 | half-life of what was heard, us |
+//! | 352 | u64 | sensing period of the leader after an agreement, us; this and the next two are 0 if the relays do not listen |
+//! | 360 | u64 | half-life of a measurement's weight, us |
 //! | 368 | f32 | relative error of one measurement, 1e-3 to 1 |
-//! | 372 | u32 | milliseconds of silence after which a neighbour is asked for a sign of life, to 1200000; three times as many and it counts as lost. 0: 5000 |
+//! | 372 | u32 | silence until a neighbour is probed, ms, at most 1200000; it is lost after three times as long. 0 means 5000 |
 //! | 376 | u32 | CRC-32C of bytes 0 to 375 |
 //!
-//! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by `course.rs`, `Axis`.
+//! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by
+//! `course.rs`, `Axis`.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `lib.rs` | the table, and how it is read |
-//! | `types.rs` | what a block says, and what may be wrong with it |
-//! | `reader.rs` | numbers out of bytes |
-//! | `write.rs` | the block of what it is to say, on the ground alone |
+//! | `lib.rs` | table, and the check of a block |
+//! | `types.rs` | content of a block, and its errors |
+//! | `reader.rs` | numbers from bytes |
+//! | `write.rs` | writer of a block, on the ground only |
 
 #![cfg_attr(target_os = "none", no_std)]
 #![forbid(unsafe_code)]
@@ -81,70 +82,70 @@ pub use types::{ChannelNumbers, Config, ConfigError, Secret, Sites};
 #[cfg(not(target_os = "none"))]
 pub use write::write;
 
-/// Where the block begins: the last sector of the flash of an STM32F405.
+/// Address of the block: the last sector of the flash of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
 
-/// Bit/s on every port of the firmware, which no block changes.
+/// Bit rate of every port of the firmware, bit/s, independent of the block.
 pub const BAUD: u32 = 115_200;
 
-/// The first bytes of a block.
+/// First bytes of a block.
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
-/// The version of the table above.
+/// Version of the table above.
 pub const VERSION: u16 = 9;
 
-/// Bytes of a block.
+/// Length of a block, bytes.
 pub const LEN: usize = 380;
 
-/// Points of a field that a block has room for.
+/// Maximum number of points of a field in a block.
 pub const MAX_POINTS: usize = 16;
 
-/// Bytes that the check sequence covers.
+/// Number of bytes covered by the CRC.
 const CHECKED: usize = LEN - 4;
 
-/// Where epoch and key begin.
+/// Offset of the epoch and the key.
 const SECRET: usize = 252;
 
-/// Where the sites begin.
+/// Offset of the sites.
 const SITES: usize = SECRET + 36;
 
-/// Where the autopilot's key begins.
+/// Offset of the autopilot's key.
 const AUTOPILOT_KEY: usize = SITES + 28;
 
-/// Where the noise is.
+/// Offset of the noise power.
 const NOISE: usize = AUTOPILOT_KEY + 32;
 
-/// Where what is said of listening begins.
+/// Offset of the sensing settings.
 const LISTEN: usize = NOISE + 4;
 
-/// Where the silence is.
+/// Offset of the silence.
 const SILENCE: usize = LISTEN + 20;
 
-/// The longest silence before a question, ms.
+/// Longest silence until a neighbour is probed, ms.
 pub const MOST_PROBE_AFTER_MS: u32 = 1_200_000;
 
-/// [`LEN`] as the block states it.
+/// Value of [`LEN`] in the block.
 const LEN_FIELD: u16 = 380;
 
-/// A block as it is stored.
+/// Block as stored.
 pub type Block = [u8; LEN];
 
-/// Where the field of a mission is kept.
+/// Storage for the points of a mission's field.
 pub type Room = [FieldPoint; MAX_POINTS];
 
-/// Room for a field that is not known yet.
+/// Storage before a field is read.
 pub const EMPTY: Room = [FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 0.0,
 }; MAX_POINTS];
 
-/// Reads a block; whatever its bytes, it is a configuration or an error. A field goes into `room`.
+/// Reads and checks a block of arbitrary bytes. The points of a field are stored in `room`.
 ///
-/// What it gives a relay takes: nothing is left to be refused.
+/// A relay accepts every configuration that this function returns.
 ///
 /// # Errors
-/// [`ConfigError`] says what is wrong, and of a number which one.
-#[inline(never)] // its stack is given back before the relay needs some
+/// [`ConfigError`] names the fault, and for a number out of range which one.
+#[inline(never)] // its stack frame is released before the relay needs the space
 pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigError> {
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);
@@ -244,10 +245,10 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     })
 }
 
-/// What the frames of a relay are signed with, by a block that [`read`] has taken.
+/// Returns the signing key and epoch of a block that [`read`] has accepted.
 ///
 /// # Errors
-/// [`ConfigError::Secret`] if there is a key without an epoch, or the other way round.
+/// [`ConfigError::Secret`] for a key without an epoch, or an epoch without a key.
 pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
     let (_, rest) = block.split_at(SECRET);
     let mut rest = Reader(rest);
@@ -260,7 +261,7 @@ pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
     }
 }
 
-/// What the autopilot signs with, by a block that [`read`] has taken.
+/// Returns the autopilot's signing key in a block that [`read`] has accepted.
 pub fn autopilot_key(block: &Block) -> Option<[u8; 32]> {
     let (_, rest) = block.split_at(AUTOPILOT_KEY);
     let key = Reader(rest).take();

@@ -1,4 +1,4 @@
-//! Numbers out of bytes.
+//! Numbers from bytes.
 
 use uav_relay::{
     Adjust, Band, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local, Measure,
@@ -7,7 +7,7 @@ use uav_relay::{
 
 use super::{ConfigError, Room, Sites};
 
-/// What has not been read yet. Past the end there are zeros, which the table never asks for.
+/// Bytes not read yet. Reads past the end return zeros; the table never causes any.
 pub(super) struct Reader<'a>(pub(super) &'a [u8]);
 
 impl Reader<'_> {
@@ -53,7 +53,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The method of this number; what adjust needs is 0 for the others.
+    /// Reads the parameters of method `number`; those of adjust must be 0 for the others.
     pub(super) fn method(&mut self, number: u8) -> Result<Method, ConfigError> {
         let explore_m = self.f32();
         let rounds = self.u16();
@@ -82,7 +82,7 @@ impl Reader<'_> {
         }
     }
 
-    /// How the relays listen, if they do; else all is 0.
+    /// Reads the sensing settings; `None` if all are 0.
     pub(super) fn listen(&mut self) -> Result<Option<Listen>, ConfigError> {
         let listen = Listen {
             every: Duration::from_micros(self.u64()),
@@ -96,7 +96,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The sites of a drone that has an autopilot to tell; else all is 0.
+    /// Reads the sites and the speed; `None` if all are 0, without an autopilot.
     pub(super) fn sites(&mut self) -> Result<Option<Sites>, ConfigError> {
         let mut site = || core::array::from_fn(|_| i32::from_le_bytes(self.take()));
         let ends: [[i32; 3]; 2] = [site(), site()];
@@ -112,7 +112,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The field of `count` points, or `interferer` if there are none; if that is all 0, too, it is unknown to relays that listen.
+    /// Reads a field of `count` points. Without points it returns `interferer`, which if all 0 is unknown to relays that listen.
     pub(super) fn interference(
         &mut self,
         count: u16,

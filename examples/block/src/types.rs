@@ -1,35 +1,35 @@
-//! What a block says, and what may be wrong with it.
+//! Content of a block, and its errors.
 
 use uav_relay::channel::{AirGround, Channel, ChannelError};
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
 use uav_relay::{Duration, Geodetic, Identity, Listen, Measure, Method, Mission, Profile};
 
-/// What the block says, checked.
+/// Checked content of a block.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
-    /// Who this relay is.
+    /// Network and index of this relay.
     pub identity: Identity,
-    /// What all relays agree on.
+    /// Mission shared by all relays.
     pub mission: Mission,
-    /// What this relay brings along.
+    /// Altitude and power of this relay.
     pub profile: Profile,
-    /// Whether it keeps to that altitude when altitudes are chosen.
+    /// True if the relay keeps that altitude when altitudes are chosen.
     pub hold_altitude: bool,
-    /// What the leader has the chain do.
+    /// Method used by the leader.
     pub method: Method,
-    /// Whether and how the interference is measured.
+    /// Measurement of the interference, if enabled.
     pub measure: Option<Measure>,
-    /// Whether and how the chain finds its interferer.
+    /// Sensing of the interferer, if enabled.
     pub listen: Option<Listen>,
-    /// Where the ends of the line are on earth. `uav_relay::flight::course` checks whether they make one.
+    /// Ends of the line on earth. `uav_relay::flight::course` checks that they form a valid line.
     pub sites: Option<Sites>,
-    /// Milliseconds of silence after which a neighbour is asked for a sign of life; 0 for the usual ones.
+    /// Silence until a neighbour is probed, ms; 0 for the default.
     pub probe_after_ms: u32,
 }
 
 impl Config {
-    /// After which silence a neighbour is asked for a sign of life, and after which it counts as lost.
+    /// Returns the silence until a neighbour is probed, and until it counts as lost.
     pub const fn silence(&self) -> [Duration; 2] {
         let ms = match self.probe_after_ms {
             0 => 5_000,
@@ -39,17 +39,17 @@ impl Config {
     }
 }
 
-/// Where a drone with an autopilot flies.
+/// Line and speed of a drone with an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sites {
     /// Latitude and longitude of transmitter and receiver, 1e-7 degrees, and the ground's height there, mm.
     pub ends: [[i32; 3]; 2],
-    /// The drone's greatest speed, m/s: 0.1 to 20, or 0 for that of an autopilot that is told none.
+    /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default.
     pub speed_m_s: f32,
 }
 
 impl Sites {
-    /// Where they are.
+    /// Returns the sites as geodetic positions.
     pub fn on_earth(&self) -> uav_relay::Sites {
         let [tx, rx] = self.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
             lat_e7,
@@ -60,37 +60,37 @@ impl Sites {
     }
 }
 
-/// What frames are signed with.
+/// Signing key and epoch.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Secret {
-    /// The network's key, not all 0.
+    /// Key of the network, not all 0.
     pub key: [u8; 32],
-    /// The least epoch, 1 to 4294967294.
+    /// Smallest epoch, 1 to 4294967294.
     pub epoch: u32,
 }
 
 impl core::fmt::Debug for Secret {
-    /// Without the key, which does not belong into logs.
+    /// Hides the key, which does not belong in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Secret(..)")
     }
 }
 
-/// The channel as the block has it; a [`Channel`] does not keep these numbers.
+/// Channel parameters as stored; a [`Channel`] does not keep these numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChannelNumbers {
     /// Carrier, Hz.
     pub carrier_hz: f64,
     /// Excess loss with line of sight, as a factor.
     pub excess_los: f64,
-    /// Excess loss without, as a factor.
+    /// Excess loss without line of sight, as a factor.
     pub excess_nlos: f64,
     /// Weight of line of sight between drone and ground.
     pub los_weight: f64,
 }
 
 impl ChannelNumbers {
-    /// The channel of these numbers. A weight of exactly 1 or 0 gives [`AirGround::Los`] or [`AirGround::Nlos`] to the bit.
+    /// Returns the channel. A weight of exactly 1 or 0 gives bit-identical [`AirGround::Los`] or [`AirGround::Nlos`].
     ///
     /// # Errors
     /// [`ChannelError`] names the number that is out of range.
@@ -104,49 +104,49 @@ impl ChannelNumbers {
     }
 }
 
-/// What is wrong with a block.
+/// Fault of a block.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfigError {
-    /// Nothing has been written: all ones as erased, or all zeros.
+    /// Blank block: all ones as erased, or all zeros.
     Blank,
-    /// It does not begin with [`MAGIC`](super::MAGIC).
+    /// Wrong first bytes, not [`MAGIC`](super::MAGIC).
     Magic,
-    /// It is of another version, or of another length than that version has.
+    /// Wrong version, or wrong length for that version.
     Version,
-    /// The CRC does not match: it was cut short or damaged.
+    /// Wrong CRC: the block was cut short or damaged.
     Crc,
-    /// The index is not within 1 to N.
+    /// Index not within 1 to N.
     Index,
-    /// The altitude or the power of this relay is out of range.
+    /// Altitude or power of this relay out of range.
     Profile,
-    /// What says whether the altitude is kept is neither 0 nor 1.
+    /// Altitude flag neither 0 nor 1.
     Hold,
-    /// The method is unknown, or chooses altitudes in a field.
+    /// Unknown method, or one other than align with a field.
     Method,
-    /// Rounds or altitudes of adjust are out of range, or not 0 with another method.
+    /// Parameters of adjust out of range, or not 0 with another method.
     Adjust,
-    /// What is said of measuring is out of range, or not 0 without samples.
+    /// Measurement settings out of range, or not 0 without samples.
     Measure,
-    /// What is said of listening is out of range, or there is a field.
+    /// Sensing settings out of range, or together with a field.
     Listen,
-    /// There is a field, and the interferer is not 0.
+    /// Interferer not 0 although there is a field.
     Interferer,
-    /// There are more points than a block has room for.
+    /// More points than a block has room for.
     Points,
-    /// What is behind the last point is not 0.
+    /// Non-zero bytes behind the last point.
     Unused,
-    /// There is a key without an epoch, or the other way round, or the epoch has none after it.
+    /// Key without an epoch, epoch without a key, or the last possible epoch.
     Secret,
-    /// The greatest speed is out of range, or there is one without sites.
+    /// Maximum speed out of range, or given without sites.
     Speed,
-    /// There is a key for an autopilot, and no sites.
+    /// Autopilot key without sites.
     AutopilotKey,
-    /// The silence after which a neighbour is asked is out of range.
+    /// Silence until a neighbour is probed out of range.
     Silence,
-    /// This number of the field is out of range.
+    /// Parameter of the field out of range.
     Field(FieldError),
-    /// This number of the channel is out of range.
+    /// Parameter of the channel out of range.
     Channel(ChannelError),
-    /// This number of the mission is out of range.
+    /// Parameter of the mission out of range.
     Mission(MissionError),
 }

@@ -1,4 +1,4 @@
-//! The block of what it is to say.
+//! Writer of a block.
 
 use uav_relay::{Interference, Interferer, Method};
 
@@ -7,9 +7,9 @@ use super::{
     Secret, Sites, VERSION, crc,
 };
 
-/// Writes the block that says `config`, `secret` and the autopilot's key; `numbers` are those its channel was made of.
+/// Returns the block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of its channel.
 ///
-/// There is no place in it for a grid in adjust, or for points that are too many: what is read of it is something else then.
+/// A block can not hold adjust's grid search or more than `MAX_POINTS` points; such a configuration is read back differently.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

@@ -1,6 +1,6 @@
-//! The clock tree: the PLL from the crystal, or from the HSI; the HSI alone where neither comes up.
+//! Clock tree: PLL from the crystal, else PLL from the HSI, else the HSI alone.
 //!
-//! | tried in this order | core | APB1 | APB2 |
+//! | order of attempts | core | APB1 | APB2 |
 //! | --- | --- | --- | --- |
 //! | PLL from the crystal, over-drive (STM32F446 alone) | 180 MHz | 45 MHz | 90 MHz |
 //! | PLL from the crystal | 168 MHz | 42 MHz | 84 MHz |
@@ -8,22 +8,22 @@
 //! | PLL from the HSI | 168 MHz | 42 MHz | 84 MHz |
 //! | HSI | 16 MHz | 16 MHz | 16 MHz |
 //!
-//! Every wait is bounded. What was begun for an attempt that fails is taken back before the next one. The PLL's input is 2 MHz, as RM0090 6.3.2
-//! recommends; both cores have five wait states of flash above 150 MHz at 2.7 to 3.6 V (RM0090 table 10, RM0390 table 5).
+//! Every wait is bounded. A failed attempt is undone before the next one. The PLL's input is 2 MHz, as RM0090 6.3.2 recommends;
+//! both cores need five flash wait states above 150 MHz at 2.7 to 3.6 V (RM0090 table 10, RM0390 table 5).
 
 use crate::crystal::{self, Crystal, HSI_HZ};
 use crate::registers::{Register, Registers};
 
-/// What a board has.
+/// Clock hardware of a board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Plan {
-    /// Its crystal, if it has one.
+    /// Crystal, if there is one.
     pub crystal: Option<Crystal>,
     /// True for a chip with over-drive, the STM32F446.
     pub over_drive: bool,
 }
 
-/// An STM32F405 with a crystal of 8 MHz; with another one, or none, it runs from the HSI.
+/// STM32F405 with a crystal of 8 MHz; with another one, or none, it runs from the HSI.
 pub const STM32F405: Plan = Plan {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -32,7 +32,7 @@ pub const STM32F405: Plan = Plan {
     over_drive: false,
 };
 
-/// The NUCLEO-F446RE: the ST-LINK's 8 MHz come in at OSC_IN.
+/// NUCLEO-F446RE: the ST-LINK supplies 8 MHz at OSC_IN.
 pub const NUCLEO_F446RE: Plan = Plan {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -41,30 +41,30 @@ pub const NUCLEO_F446RE: Plan = Plan {
     over_drive: true,
 };
 
-/// Where the PLL's input comes from.
+/// Source of the PLL's input.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
-    /// The crystal.
+    /// Crystal oscillator.
     Crystal,
-    /// The HSI.
+    /// Internal oscillator (HSI).
     Internal,
 }
 
-/// The clocks that were reached.
+/// Clock frequencies reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Clocks {
-    /// Of the core and `SysTick`, Hz.
+    /// Core and `SysTick`, Hz.
     pub core_hz: u32,
-    /// Of USART2, USART3, UART4 and so on, Hz.
+    /// APB1, for USART2, USART3, UART4 and others, Hz.
     pub apb1_hz: u32,
-    /// Of USART1 and USART6, Hz.
+    /// APB2, for USART1 and USART6, Hz.
     pub apb2_hz: u32,
-    /// The PLL's source; `None` for the HSI alone.
+    /// Source of the PLL; `None` for the HSI alone.
     pub pll: Option<Source>,
 }
 
 impl Clocks {
-    /// Those of the HSI alone.
+    /// Clock frequencies of the HSI alone.
     pub const HSI: Self = Self {
         core_hz: HSI_HZ,
         apb1_hz: HSI_HZ,
@@ -83,16 +83,15 @@ impl Clocks {
     }
 }
 
-/// The PLL's input, Hz.
 const PLL_INPUT_HZ: u32 = 2_000_000;
 
-/// How fast the core is to run.
+/// PLL settings for a core frequency.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Speed {
     over_drive: bool,
-    /// PLLN.
+    /// Multiplier, PLLN.
     factor: u32,
-    /// PLLQ, for 48 MHz or less.
+    /// Divisor PLLQ, for 48 MHz or less.
     usb: u32,
 }
 
@@ -123,13 +122,13 @@ const SWITCH_PLL: u32 = 0b10;
 const SWITCHED: u32 = 0b11 << 2;
 const SWITCHED_PLL: u32 = 0b10 << 2;
 const PRESCALERS: u32 = 0xF << 4 | 0b111 << 10 | 0b111 << 13;
-/// APB1 by 4, APB2 by 2.
+/// Prescalers: APB1 by 4, APB2 by 2.
 const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
 
 /// RCC_APB1ENR, PWREN.
 const POWER_ON: u32 = 1 << 28;
 
-/// PWR_CR: the voltage scale 1 (one bit on the STM32F405, two on the STM32F446), ODEN and ODSWEN; their states in PWR_CSR.
+/// PWR_CR: voltage scale 1 (one bit on the STM32F405, two on the STM32F446), ODEN and ODSWEN. PWR_CSR has their states.
 const SCALE_1: u32 = 1 << 14;
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
 const SCALE_READY: u32 = 1 << 14;
@@ -142,13 +141,15 @@ const WAIT_STATES: u32 = 5;
 const PREFETCH: u32 = 1 << 8;
 const CACHES: u32 = 0b11 << 9;
 
-/// The STM32F405 whose prefetch is broken: revision A (ES0182).
+/// ID of the STM32F405 with a defective prefetch: revision A (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Reads of a register until a PLL, a voltage or a switch is ready: some 10 ms at 16 MHz, where 0.3 ms are the most of the data sheets.
+/// Maximum reads of a register while a PLL, a voltage or a switch settles: some 10 ms at 16 MHz. The data sheets allow at most
+/// 0.3 ms.
 const POLLS: u32 = 20_000;
 
-/// Sets the clock tree up; returns what was reached. To be called once after a reset, with interrupts off. Bounded work: 0.2 s at most.
+/// Sets up the clock tree; returns the frequencies reached. Call it once after a reset, with interrupts off. Bounded work: at
+/// most 0.2 s.
 pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     if !back_to_hsi(chip) {
         // An emulator without a clock tree.
@@ -181,7 +182,7 @@ pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     Clocks::HSI
 }
 
-/// Finds out what [`start`] reaches, and goes back to the HSI: for a HAL that sets the clock tree up by itself and waits for good.
+/// Finds out what [`start`] reaches, and returns to the HSI. For a HAL whose own clock set-up has unbounded waits.
 pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     let clocks = start(chip, plan);
     if clocks.pll.is_some() && back_to_hsi(chip) {
@@ -191,7 +192,7 @@ pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     clocks
 }
 
-/// Has the flash answer after `wait_states`, from its caches where it can; returns true once it does.
+/// Sets the wait states and caches of the flash; returns true once the wait states are in effect.
 fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     let prefetch = if chip.read(Register::ChipId) & 0xFFFF_0FFF == NO_PREFETCH {
         0
@@ -206,13 +207,13 @@ fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     chip.wait(Register::FlashAccess, LATENCY, wait_states, POLLS)
 }
 
-/// Switches the flash's caches on, which a HAL has left off; the wait states stay.
+/// Enables the flash caches, which a HAL has left off; the wait states stay.
 pub fn cache_flash(chip: &mut impl Registers) {
     let wait_states = chip.read(Register::FlashAccess) & LATENCY;
     cache(chip, wait_states);
 }
 
-/// The core runs from the HSI, undivided; false where that cannot be had.
+/// Runs the core from the HSI, undivided; returns false if that fails.
 fn back_to_hsi(chip: &mut impl Registers) -> bool {
     chip.modify(Register::ClockControl, 0, HSI_ON);
     if !chip.wait(Register::ClockControl, HSI_READY, HSI_READY, POLLS) {
@@ -226,7 +227,7 @@ fn back_to_hsi(chip: &mut impl Registers) -> bool {
     switched
 }
 
-/// Over-drive and PLL are off; false where the PLL is not.
+/// Turns over-drive and PLL off; returns false if the PLL stays on.
 fn off(chip: &mut impl Registers) -> bool {
     chip.modify(Register::Apb1Enable, 0, POWER_ON);
     if chip.read(Register::PowerControl) & (OVER_DRIVE | OVER_DRIVE_SWITCH) != 0 {
@@ -238,7 +239,7 @@ fn off(chip: &mut impl Registers) -> bool {
     chip.wait(Register::ClockControl, PLL_READY, 0, POLLS)
 }
 
-/// Has the PLL, which is off, and the voltage ready for `speed`; false where that does not come about.
+/// Prepares the PLL, which must be off, and the voltage for `speed`; returns false if that fails.
 fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Speed, scale: u32) -> bool {
     chip.modify(Register::PowerControl, scale, scale);
     let from = match source {
@@ -260,7 +261,7 @@ fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Speed, sc
         })
 }
 
-/// Switches the core to the PLL; false where it does not.
+/// Switches the core to the PLL; returns false if that fails.
 fn switch(chip: &mut impl Registers) -> bool {
     if !cache(chip, WAIT_STATES) {
         return false;
@@ -279,13 +280,12 @@ mod tests {
     use super::{Clocks, NUCLEO_F446RE, Plan, STM32F405, Source, probe, start};
     use crate::mock::{Block, Faults};
 
-    /// Every combination of what can fail.
     fn all() -> impl Iterator<Item = Faults> {
         (0..1_u32 << Faults::BITS)
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
     }
 
-    /// What the chip can reach, by what fails.
+    /// Returns the clocks that a chip with these faults can reach.
     fn expected(plan: &Plan, faults: Faults) -> Clocks {
         let is_crystal =
             !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;
@@ -312,7 +312,7 @@ mod tests {
         }
     }
 
-    /// The block of registers panics at a write that the reference manuals forbid.
+    /// The mock panics at a write that the reference manuals forbid.
     #[test]
     fn whatever_fails_the_clocks_are_those_that_the_chip_has() {
         let none = Plan {
@@ -341,7 +341,6 @@ mod tests {
         assert_eq!(start(&mut block, &none).pll, Some(Source::Internal));
     }
 
-    /// A HAL finds the HSI, and the PLL off.
     #[test]
     fn a_probe_leaves_the_hsi() {
         for plan in [STM32F405, NUCLEO_F446RE] {
@@ -358,12 +357,12 @@ mod tests {
         }
     }
 
-    /// Every port runs at 115 200 baud, within 0.2 % of the clock that was reached.
+    /// The baud rate is 115 200 within 0.2 % at every clock.
     #[test]
     fn the_baud_rate_is_that_of_the_clock_reached() {
         for hz in [16, 42, 45, 84, 90].map(|mhz| mhz * 1_000_000) {
             let asked = crate::baud::believed(115_200, hz);
-            // As stm32f4xx-hal 0.23 computes it, with the clock of the reset.
+            // Computed as stm32f4xx-hal 0.23 does, with the clock of the reset.
             let divisor = (16_000_000 + asked / 2) / asked;
             let baud = f64::from(hz) / f64::from(divisor);
             assert!((baud / 115_200.0 - 1.0).abs() < 2e-3, "{hz}: {baud}");

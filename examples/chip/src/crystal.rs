@@ -1,19 +1,19 @@
-//! The crystal's frequency, measured by the HSI: another crystal than the board's would have the PLL run the core too fast.
+//! Check of the crystal's frequency against the HSI, because a wrong crystal would make the PLL overclock the core.
 //!
-//! TIM11 captures every eighth edge of HSE / 31, which RM0090 and RM0390 (TIM11_OR) lead to its input for measurements.
+//! TIM11 captures every eighth edge of HSE / 31, its measurement input by RM0090 and RM0390 (TIM11_OR).
 
 use crate::registers::{Register, Registers};
 
-/// A crystal, or the clock of another chip.
+/// Crystal, or external clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Crystal {
-    /// Its frequency, Hz: a multiple of 2 MHz.
+    /// Frequency, Hz: a multiple of 2 MHz.
     pub hz: u32,
-    /// True for a clock that comes in at OSC_IN.
+    /// True for an external clock at OSC_IN.
     pub bypass: bool,
 }
 
-/// The frequency of the HSI, Hz: within 8 % over all temperatures.
+/// Frequency of the HSI, Hz: within 8 % over all temperatures.
 pub const HSI_HZ: u32 = 16_000_000;
 
 /// Bits of RCC_CR.
@@ -21,24 +21,23 @@ const HSE_ON: u32 = 1 << 16;
 const HSE_READY: u32 = 1 << 17;
 const HSE_BYPASS: u32 = 1 << 18;
 
-/// Reads of RCC_CR until a crystal swings: some 100 ms at 16 MHz, where it takes 2 ms.
+/// Maximum reads of RCC_CR while a crystal starts: some 100 ms at 16 MHz; it usually takes 2 ms.
 const START_POLLS: u32 = 200_000;
 
 /// RCC_CFGR, RTCPRE: HSE / 31.
 const DIVISOR: u32 = 31;
 const DIVIDED: u32 = DIVISOR << 16;
 
-/// Edges between two captures.
 const EDGES: u32 = 8;
 
 /// RCC_APB2ENR, TIM11EN.
 const TIMER_ON: u32 = 1 << 18;
 
-/// Reads of the timer's status until an edge comes.
+/// Maximum reads of the timer's status while waiting for an edge.
 const EDGE_POLLS: u32 = 1_000;
 
-/// Switches the crystal on; returns true if it swings at its frequency, within 10 %. Otherwise it is off again. The core runs from the HSI. Bounded
-/// work, 100 ms at most.
+/// Starts the crystal; returns true if its frequency is right within 10 %, else turns it off again. The core must run from the
+/// HSI. Bounded work: at most 100 ms.
 pub fn start(chip: &mut impl Registers, crystal: Crystal) -> bool {
     chip.modify(Register::ClockControl, HSE_ON, 0);
     let bypass = if crystal.bypass { HSE_BYPASS } else { 0 };
@@ -54,12 +53,12 @@ pub fn start(chip: &mut impl Registers, crystal: Crystal) -> bool {
     good
 }
 
-/// Switches it off.
+/// Turns the crystal off.
 pub fn stop(chip: &mut impl Registers) {
     chip.modify(Register::ClockControl, HSE_ON, 0);
 }
 
-/// Periods of the HSI between two captures.
+/// Returns the HSI periods between two captures.
 fn period(chip: &mut impl Registers) -> Option<u32> {
     chip.modify(Register::ClockConfig, 0x1F << 16, DIVIDED);
     chip.modify(Register::Apb2Enable, 0, TIMER_ON);
@@ -70,10 +69,10 @@ fn period(chip: &mut impl Registers) -> Option<u32> {
     chip.write(Register::Timer11Control, 1);
     let mut captured = || {
         let come = chip.wait(Register::Timer11Status, 0b10, 0b10, EDGE_POLLS);
-        // Reading it takes the flag back.
+        // Reading the capture clears the flag.
         come.then(|| chip.read(Register::Timer11Capture))
     };
-    // The first edges may have come while the timer was set up.
+    // The first capture may date from the set-up of the timer.
     let [_, from, to] = [captured(), captured(), captured()];
     chip.write(Register::Timer11Control, 0);
     chip.write(Register::Timer11Enable, 0);

@@ -1,4 +1,4 @@
-//! Tests: a block of registers in RAM that does what the chip does, and panics at what the reference manuals forbid.
+//! Mock of the registers in RAM, for tests. It behaves as the chip and panics at what the reference manuals forbid.
 
 extern crate std;
 
@@ -7,11 +7,11 @@ use std::vec::Vec;
 
 use crate::registers::{Register, Registers};
 
-/// What fails, and the frequency of the crystal.
+/// Injected faults, and the frequency of the crystal.
 #[expect(clippy::struct_excessive_bools, reason = "each fails by itself")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Faults {
-    /// As in the emulator: registers read 0.
+    /// Makes all registers read 0, as in the emulator.
     pub(crate) hsi_hidden: bool,
     pub(crate) crystal_dead: bool,
     pub(crate) timer_dead: bool,
@@ -52,7 +52,6 @@ impl Faults {
     }
 }
 
-/// The block.
 #[derive(Default)]
 pub(crate) struct Block {
     values: BTreeMap<Register, u32>,
@@ -64,7 +63,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// After a reset.
+    /// Creates the block in its state after a reset.
     pub(crate) fn with(faults: Faults, over_drive: bool) -> Self {
         let mut block = Self {
             faults,
@@ -113,7 +112,7 @@ impl Block {
         self.is_pll_on() && !dead
     }
 
-    /// The PLL's output, Hz, checked against the ranges of the data sheets.
+    /// Returns the PLL's output, Hz, checked against the ranges of the data sheets.
     fn pll_hz(&self) -> u32 {
         let config = self.value(Register::PllConfig);
         let source = if self.is_from_crystal() {
@@ -138,7 +137,7 @@ impl Block {
         self.value(Register::ClockConfig) & 0b11 == 0b10 && !self.faults.switch_stuck
     }
 
-    /// Of the core, APB1 and APB2, Hz.
+    /// Returns the frequencies of the core, APB1 and APB2, Hz.
     pub(crate) fn clocks(&self) -> [u32; 3] {
         let config = self.value(Register::ClockConfig);
         let core = if self.is_on_pll() {
@@ -160,7 +159,7 @@ impl Block {
             && !self.faults.over_drive_switch_dead
     }
 
-    /// Panics where the core runs at what its surroundings do not stand.
+    /// Panics if the core's frequency exceeds the limits of flash, voltage or buses.
     fn check(&self) {
         if self.faults.hsi_hidden || !self.is_on_pll() {
             return;
@@ -215,7 +214,7 @@ impl Registers for Block {
                     && self.value(Register::Timer11Option) == 0b10
                     && self.value(Register::ClockConfig) >> 16 & 0x1F == 31
                     && self.value(Register::Apb2Enable) >> 18 & 1 != 0;
-                // Every third look.
+                // An edge arrives at every third read.
                 bit(
                     1,
                     runs && !faults.timer_dead && self.reads.is_multiple_of(3),
@@ -236,7 +235,7 @@ impl Registers for Block {
         }
     }
 
-    /// But for the timer, nothing changes from one read to the next.
+    /// Reads once where the chip's state can not change; only the timer changes between reads.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

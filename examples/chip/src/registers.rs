@@ -1,6 +1,6 @@
-//! The registers that are read and written, by their names in RM0090 and RM0390, and the chip that has them.
+//! Registers by their names in RM0090 and RM0390, and their access on the chip.
 
-/// A register of the STM32F405 and the STM32F446; its value is its address.
+/// Register of the STM32F405 and the STM32F446; its value is its address.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[repr(u32)]
 pub enum Register {
@@ -10,25 +10,25 @@ pub enum Register {
     WatchdogPrescaler = 0x4000_3004,
     /// IWDG_RLR: reload value.
     WatchdogReload = 0x4000_3008,
-    /// IWDG_SR: updates that have not reached the watchdog's clock yet.
+    /// IWDG_SR: pending updates of prescaler and reload value.
     WatchdogStatus = 0x4000_300C,
     /// PWR_CR: voltage scale and over-drive.
     PowerControl = 0x4000_7000,
-    /// PWR_CSR: their states.
+    /// PWR_CSR: states of voltage scale and over-drive.
     PowerStatus = 0x4000_7004,
     /// TIM11_CR1.
     Timer11Control = 0x4001_4800,
     /// TIM11_SR.
     Timer11Status = 0x4001_4810,
-    /// TIM11_CCMR1: the input that is captured.
+    /// TIM11_CCMR1: selection of the captured input.
     Timer11Mode = 0x4001_4818,
-    /// TIM11_CCER: whether it is.
+    /// TIM11_CCER: capture enable.
     Timer11Enable = 0x4001_4820,
     /// TIM11_ARR: the largest count.
     Timer11Reload = 0x4001_482C,
     /// TIM11_CCR1: the count at the last edge of the input.
     Timer11Capture = 0x4001_4834,
-    /// TIM11_OR: what is at the input.
+    /// TIM11_OR: source of the input.
     Timer11Option = 0x4001_4850,
     /// RCC_CR: oscillators and PLL, on and ready.
     ClockControl = 0x4002_3800,
@@ -44,13 +44,13 @@ pub enum Register {
     ResetStatus = 0x4002_3874,
     /// FLASH_ACR: wait states and caches.
     FlashAccess = 0x4002_3C00,
-    /// DBGMCU_IDCODE: which chip, and which revision of it.
+    /// DBGMCU_IDCODE: chip and revision.
     ChipId = 0xE004_2000,
-    /// DBGMCU_APB1_FZ: what stands still while a debugger has stopped the core.
+    /// DBGMCU_APB1_FZ: peripherals stopped while a debugger halts the core.
     DebugFreeze = 0xE004_2008,
 }
 
-/// A block of registers: a chip's, or one in RAM for tests.
+/// Access to registers: of a chip, or of a mock in RAM.
 pub trait Registers {
     /// Returns the value of `register`.
     fn read(&mut self, register: Register) -> u32;
@@ -58,7 +58,7 @@ pub trait Registers {
     /// Writes the value of `register`.
     fn write(&mut self, register: Register, value: u32);
 
-    /// Clears `clear` and sets `set`.
+    /// Clears the bits of `clear`, then sets those of `set`.
     fn modify(&mut self, register: Register, clear: u32, set: u32) {
         let value = self.read(register);
         self.write(register, value & !clear | set);
@@ -70,7 +70,7 @@ pub trait Registers {
     }
 }
 
-/// The chip's own registers.
+/// Registers of the real chip.
 #[cfg(target_arch = "arm")]
 #[derive(Clone, Copy, Debug)]
 pub struct Chip;
@@ -78,13 +78,13 @@ pub struct Chip;
 #[cfg(target_arch = "arm")]
 impl Registers for Chip {
     fn read(&mut self, register: Register) -> u32 {
-        // SAFETY: an aligned register that every STM32F405 and STM32F446 has, and that is read without a side effect.
+        // SAFETY: an aligned register of every STM32F405 and STM32F446, whose read has no side effect that matters to memory.
         unsafe { core::ptr::read_volatile(register as u32 as *const u32) }
     }
 
     fn write(&mut self, register: Register, value: u32) {
-        // SAFETY: as above. None of these registers moves memory or lets a peripheral write to it, and nobody else writes them: the functions of
-        // this crate run before interrupts are let through, but for the key of the watchdog, which is one write.
+        // SAFETY: as above. None of these registers moves memory or lets a peripheral write to it. There is no other writer: this
+        // crate's functions run before interrupts are enabled, except for the watchdog's key, which is a single write.
         unsafe { core::ptr::write_volatile(register as u32 as *mut u32, value) }
     }
 }

@@ -2,40 +2,40 @@
 
 use crate::registers::{Register, Registers};
 
-/// The bit that forgets all causes: RMVF.
+/// Bit that clears all causes: RMVF.
 const FORGET: u32 = 1 << 24;
 
 /// The cause of the last reset.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Reset {
-    /// Power came on.
+    /// Power-up.
     Power,
-    /// The supply voltage was too low.
+    /// Supply voltage too low.
     Brownout,
-    /// The reset pin: a button, or a debug probe.
+    /// Reset pin: a button, or a debug probe.
     Pin,
-    /// The program or a debug probe asked for it.
+    /// Request of the program or a debug probe.
     Software,
-    /// The watchdog was not fed: the relay's loop hung, or its clock stopped.
+    /// Watchdog not fed: the relay's loop hung, or its clock stopped.
     Watchdog,
-    /// The chip does not tell, or it is emulated.
+    /// Unknown cause, or an emulator.
     #[default]
     Unknown,
 }
 
 impl Reset {
-    /// Returns the cause of the last reset, and has the chip forget it. Constant work.
+    /// Returns the cause of the last reset, and clears it on the chip. Constant work.
     pub fn take(chip: &mut impl Registers) -> Self {
         let status = chip.read(Register::ResetStatus);
         chip.modify(Register::ResetStatus, 0, FORGET);
         Self::of(status)
     }
 
-    /// Every reset drives the pin, and power that comes on is a brownout, too: the most telling bit counts.
+    /// Selects the most specific cause: every reset sets the pin's bit, and power-up the brownout's.
     fn of(status: u32) -> Self {
         let is = |bit: u32| status >> bit & 1 != 0;
         match status {
-            // Independent and window watchdog.
+            // Independent or window watchdog.
             _ if is(29) || is(30) => Self::Watchdog,
             _ if is(28) => Self::Software,
             _ if is(27) => Self::Power,
@@ -45,7 +45,7 @@ impl Reset {
         }
     }
 
-    /// Returns the words for it.
+    /// Returns the cause in words.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Power => "power came on",
@@ -64,7 +64,7 @@ mod tests {
     use crate::mock::Block;
     use crate::registers::{Register, Registers as _};
 
-    /// RCC_CSR as the reference manuals have it after each reset.
+    /// Values of RCC_CSR after each kind of reset, by the reference manuals.
     #[test]
     fn the_cause_is_read_once_and_forgotten() {
         for (status, cause) in [

@@ -1,45 +1,46 @@
-//! The independent watchdog: it has an oscillator of its own, and resets the chip unless it is fed.
+//! Independent watchdog: it has an oscillator of its own, and resets the chip unless it is fed.
 //!
-//! It is fed once a turn of the relay's loop, after ports and timers were served, and never by an interrupt. So a loop that hangs, a panic, a hard
+//! The relay's loop feeds it once a turn, after serving ports and timers; no interrupt does. So a hanging loop, a panic, a hard
+//! fault or a stopped clock restarts the chip. A sleep takes [`TURN_MS`] at most.
 //! fault, and a clock that stops have the chip restart. A sleep is ended after [`TURN_MS`] at the latest.
 
 use crate::registers::{Register, Registers};
 
-/// The LSI divided by 64: 500 counts a second at its typical 32 kHz.
+/// Prescaler: LSI / 64, 500 counts a second at its typical 32 kHz.
 const PRESCALER: u32 = 0b100;
 const RELOAD: u32 = 2_999;
 
-/// Time from the last feeding to the reset: typical, and at the fastest and slowest LSI of the data sheets, 47 and 17 kHz. An erase of a flash sector
-/// of 128 KiB stops the core for 2 s at most.
+/// Time from the last feeding to the reset, ms: typical, fastest and slowest (LSI of 32, 47 and 17 kHz). An erase of a flash
+/// sector of 128 KiB stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
-/// Longest sleep of a relay's loop.
+/// Longest sleep of a relay's loop, ms.
 pub const TURN_MS: u64 = 500;
 
-/// A timer of the relay may be overdue for so long in a loop that is fed.
+/// Longest delay of a relay's timer in a loop that may feed, ms.
 pub const LATE_MS: u64 = 1_000;
 
-/// Words of the key register.
+/// Values of the key register.
 const START: u32 = 0xCCCC;
 const UNLOCK: u32 = 0x5555;
 const FEED: u32 = 0xAAAA;
 
-/// Reads of the status until the prescaler and the reload value have reached the watchdog's clock: five periods of the LSI, 0.3 ms at most.
+/// Maximum reads of the status until the set-up takes effect: five periods of the LSI, at most 0.3 ms.
 const POLLS: u32 = 10_000;
 
-/// Starts the watchdog, for good. It stands still while a debugger has stopped the core. Bounded work.
+/// Starts the watchdog for good. It pauses while a debugger halts the core. Bounded work.
 pub fn start(chip: &mut impl Registers) {
     chip.modify(Register::DebugFreeze, 0, 1 << 12);
     chip.write(Register::WatchdogKey, START);
     chip.write(Register::WatchdogKey, UNLOCK);
     chip.write(Register::WatchdogPrescaler, PRESCALER);
     chip.write(Register::WatchdogReload, RELOAD);
-    // Not ready in time, it counts with what it had at its reset: 0.5 s, and the feeding below starts with the new value.
+    // If not ready in time it first counts from its reset value, 0.5 s, and uses the new value from this feeding on.
     let _ = chip.wait(Register::WatchdogStatus, 0b11, 0, POLLS);
     feed(chip);
 }
 
-/// Feeds it: one write.
+/// Feeds the watchdog: one write.
 pub fn feed(chip: &mut impl Registers) {
     chip.write(Register::WatchdogKey, FEED);
 }

@@ -1,26 +1,26 @@
-//! Which epoch comes next: a number that rises at every start and never falls.
+//! Epoch: a number that increases at every start and never falls.
 //!
-//! It is in a [`Journal`] of its own, which each start adds an entry to, so that a loss of power at any moment leaves the largest epoch
-//! that was ever used where it is. An entry that a loss of power has cut short is no epoch, and its epoch has not been used: it counts
-//! only once it has been read back. 10 922 starts fill a sector of 128 KiB.
+//! Each start appends an entry to a [`Journal`] of its own, so that a loss of power at any moment preserves the largest epoch
+//! ever used. An entry cut short by a loss of power is invalid, and its epoch has not been used, because an epoch is used only
+//! after its entry has been read back. A sector of 128 KiB holds 10 922 starts.
 //!
-//! An entry that cannot be written is tried at the next places. If all of them fail, the epoch is used all the same: it is above all that
-//! were kept, so the neighbours believe it, whereas with an older one they would refuse this drone for as long as they fly. What is lost is
-//! the start after: it may come to the same epoch, and be refused until the neighbours are switched off and on. So that is logged as
-//! an error, and the drone is not to fly again before its block has a larger epoch and its flash is sound.
+//! An entry that can not be written is tried at the next places. If all fail, the epoch is used all the same: it is larger than
+//! all stored ones, so the neighbours accept it, whereas they would reject an older one throughout the flight. But the next start
+//! may get the same epoch and be rejected until the neighbours are restarted. So the failure is logged as an error, and the drone
+//! must not fly again before its block has a larger epoch and its flash is sound.
 
 use crate::journal::{Flash, Journal, WhenFull};
 
-/// Where the two sectors begin: sectors 9 and 10 of an STM32F405.
+/// Addresses of the two sectors: sectors 9 and 10 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
 
-/// Words of an entry that are kept.
+/// Payload of an entry, words.
 pub const WORDS: usize = 1;
 
-/// The same for every configuration block: no block lets the epoch fall.
+/// Journal key, the same for every configuration block, because no block may lower the epoch.
 pub const KEY: u32 = 0;
 
-/// The epoch of this start, at least `floor`, and whether it stands in the flash; `None` after the last one there is, 4294967294.
+/// Returns the epoch of this start, at least `floor`, and true if it was stored. `None` after the last epoch, 4294967294.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {
     log.tidy();
     let [newest] = log.newest::<WORDS>().unwrap_or([0]);

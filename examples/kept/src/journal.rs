@@ -1,43 +1,43 @@
-//! A log of records in two sectors of flash, of which the newest counts: it survives a loss of power at any moment.
+//! Journal of records in two flash sectors. The newest record counts; it survives a loss of power at any moment.
 //!
-//! | word of a record | what |
+//! | word of a record | content |
 //! | --- | --- |
-//! | first | its number, one more than that of the record before it |
-//! | between | what is kept |
-//! | last | CRC-32C of these words and of the log's key |
+//! | first | number, one more than that of the previous record |
+//! | between | payload |
+//! | last | CRC-32C of these words and of the journal's key |
 //!
-//! Records are appended, to the sector with the newest until that is full, then to the other one. So what was kept last stays where it
-//! is until a newer record has been read back. A record that was cut short, or whose place is worn, has no such CRC and counts for
-//! nothing. Records with another key count for nothing either.
+//! Records are appended to the sector with the newest one until it is full, then to the other one. The previous record therefore
+//! stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has another key fails
+//! its CRC and is ignored.
 //!
-//! An erase stops the CPU. [`Journal::tidy`] does it at a start; in flight [`Journal::keep`] does it only where it is told that it may.
+//! An erase stops the CPU. [`Journal::tidy`] erases at a start; in flight [`Journal::keep`] erases only with [`WhenFull::Erase`].
 
 use uav_relay::CRC_32C;
 
-/// A word in which nothing is written.
+/// Value of an erased word.
 pub const BLANK: u32 = u32::MAX;
 
-/// Words of a record beside what is kept.
+/// Words of a record besides its payload.
 pub const AROUND: usize = 2;
 
-/// Places that are tried for one record: some may be worn.
+/// Number of places tried for one record, because some may be worn.
 const TRIES: usize = 4;
 
-/// Two sectors of flash, 0 and 1. They need not be of one length.
+/// Two flash sectors, 0 and 1, possibly of different lengths.
 pub trait Flash {
-    /// Words in a sector; 0 where there is none.
+    /// Returns the number of words in a sector; 0 if there is none.
     fn words(&self, sector: usize) -> usize;
 
-    /// Words of a sector up to the last that is not [`BLANK`]: a flash knows best how to look through all of it.
+    /// Returns the number of words up to the last that is not [`BLANK`].
     fn used(&mut self, sector: usize) -> usize;
 
-    /// What stands in that word of a sector; [`BLANK`] behind its end.
+    /// Returns a word of a sector; [`BLANK`] behind its end.
     fn read(&mut self, sector: usize, word: usize) -> u32;
 
-    /// Makes a sector blank.
+    /// Erases a sector.
     fn erase(&mut self, sector: usize);
 
-    /// Writes words from that one of a sector on, and reads them back; whether they stand there.
+    /// Writes words of a sector from `first` on; returns true if they are read back correctly.
     fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool;
 }
 
@@ -63,34 +63,32 @@ impl<F: Flash> Flash for &mut F {
     }
 }
 
-/// What [`Journal::keep`] does when both sectors are full.
+/// Action of [`Journal::keep`] when both sectors are full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WhenFull {
-    /// Keeps nothing.
+    /// Stores nothing.
     Refuse,
-    /// Erases the sector that does not have the newest record, and goes on there.
+    /// Erases the sector without the newest record, and continues there.
     Erase,
 }
 
-/// A log.
+/// Journal in two flash sectors.
 #[derive(Debug)]
 pub struct Journal<F> {
     flash: F,
-    /// Of a record.
     words: usize,
     key: u32,
 }
 
-/// What stands in a sector.
 #[derive(Clone, Copy)]
 struct Found {
     newest: Option<Newest>,
-    /// Records up to the last that is not blank.
+    /// Number of records up to the last that is not blank.
     used: usize,
     room: usize,
 }
 
-/// Compared by number.
+/// Newest record of a sector, compared by number.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Newest {
     number: u32,
@@ -98,7 +96,7 @@ struct Newest {
 }
 
 impl<F: Flash> Journal<F> {
-    /// The log in `flash` of records that keep `kept` words each.
+    /// Creates the journal of records with `kept` words of payload each.
     pub const fn new(flash: F, kept: usize, key: u32) -> Self {
         Self {
             flash,
@@ -107,15 +105,16 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// What was kept last, `KEPT` being as many words as this log keeps. Linear in the words of the sectors; a CRC for each record behind
-    /// the newest, and for that one.
+    /// Returns the payload of the newest record; `KEPT` must be the journal's payload length.
+    ///
+    /// Work: linear in the words of the sectors, and a CRC for the newest record and each one behind it.
     pub fn newest<const KEPT: usize>(&mut self) -> Option<[u32; KEPT]> {
         let mut kept = [BLANK; KEPT];
         self.read_newest(&mut kept)?;
         Some(kept)
     }
 
-    #[inline(never)] // one for all lengths
+    #[inline(never)] // one copy for all lengths
     fn read_newest(&mut self, kept: &mut [u32]) -> Option<()> {
         let found = self.found();
         let sector = current(found);
@@ -126,8 +125,7 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// At a start: makes each sector blank that is not, and does not have the newest record. Then the log has room for all records of
-    /// a sector before anything has to be erased.
+    /// Erases, at a start, each used sector without the newest record. Then a full sector of records fits before the next erase.
     pub fn tidy(&mut self) {
         let found = self.found();
         let any = found.iter().any(|found| found.newest.is_some());
@@ -138,7 +136,7 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Keeps these words; whether they stand in the flash.
+    /// Stores a payload; returns true if it was read back correctly.
     pub fn keep(&mut self, kept: &[u32], when_full: WhenFull) -> bool {
         let found = self.found();
         let [first, second] = found.map(|found| found.newest);
@@ -160,7 +158,7 @@ impl<F: Flash> Journal<F> {
             return places.any(|record| {
                 let first = record * self.words;
                 let behind = first + 1 + kept.len();
-                // The CRC is last: what has one is whole.
+                // The CRC is written last, so that a record with a valid CRC is complete.
                 let stands = self.flash.write(sector, first, &[number])
                     && self.flash.write(sector, first + 1, kept);
                 let sum = self.sum(sector, first);
@@ -183,7 +181,7 @@ impl<F: Flash> Journal<F> {
         })
     }
 
-    /// The number of a record that is whole and has this log's key.
+    /// Returns the number of a record with a valid CRC.
     fn number(&mut self, sector: usize, record: usize) -> Option<u32> {
         let first = record * self.words;
         let sum = self.sum(sector, first);
@@ -191,8 +189,8 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// The CRC of the record that begins at that word, but for its last word, and of this log's key.
-    #[inline(never)] // there are two who want it
+    /// Returns the CRC of the record at word `first`, without its last word but with the journal's key.
+    #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();
         let last = first + self.words - 1;
@@ -208,13 +206,13 @@ impl<F: Flash> Journal<F> {
     }
 }
 
-/// The sector with the newest record, 0 where there is none.
+/// Returns the sector with the newest record, 0 if there is none.
 fn current(found: [Found; 2]) -> usize {
     let [first, second] = found.map(|found| found.newest);
     usize::from(second > first)
 }
 
-/// Bytes as words, with zeros behind them.
+/// Packs bytes into words, padded with zeros.
 pub fn pack<const WORDS: usize>(bytes: &[u8]) -> [u32; WORDS] {
     let mut words = [0; WORDS];
     for (word, bytes) in words.iter_mut().zip(bytes.chunks(4)) {
@@ -227,7 +225,7 @@ pub fn pack<const WORDS: usize>(bytes: &[u8]) -> [u32; WORDS] {
     words
 }
 
-/// The first bytes of words.
+/// Unpacks the first bytes of words.
 pub fn unpack<const BYTES: usize>(words: &[u32]) -> [u8; BYTES] {
     let mut bytes = [0; BYTES];
     let all = words.iter().flat_map(|word| word.to_le_bytes());

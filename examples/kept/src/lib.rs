@@ -1,11 +1,11 @@
-//! What a flashed relay keeps over a reboot, for any board: two sectors of flash for each.
+//! State of a flashed relay that survives a reboot, for any board: two sectors of flash for each kind.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`journal`] | the log in two sectors of flash that each of the others is in |
-//! | [`epoch`] | the number that rises at every start |
-//! | [`views`] | what the relay has said in the votes on views |
-//! | [`nor`] | those sectors, by the traits of `embedded-storage` |
+//! | [`journal`] | journal in two sectors of flash, used by the others |
+//! | [`epoch`] | epoch, a number that increases at every start |
+//! | [`views`] | the relay's votes on views |
+//! | [`nor`] | flash sectors through the traits of `embedded-storage` |
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Two sectors of a flash that has the traits of `embedded-storage`, as the drivers of Embassy and of many HALs do.
+//! Two sectors of a flash with the traits of `embedded-storage`, which drivers of Embassy and many HALs have.
 
 use core::ops::Range;
 
@@ -6,23 +6,22 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::journal::{BLANK, Flash};
 
-/// Bytes of a word.
 const WORD: usize = 4;
 
-/// Words that are read or written at once: a call of a driver costs more than a word, and some flashes write a page each time.
+/// Words per read or write. A driver call costs more than a word, and some flashes write a whole page each time.
 const PIECE: usize = 16;
 
-/// Two sectors of a flash, each of one erase unit or several, as offsets into it. Whole words have to be what it reads and writes.
+/// Two sectors of a flash, each of one or more erase units, as offsets into it. The flash must read and write whole words.
 #[derive(Debug)]
 pub struct Nor<F> {
     flash: F,
     sectors: [Range<u32>; 2],
-    /// What was read last: the sector, the number of the first word, and the words.
+    /// Last read piece: sector, number of its first word, and its words.
     last: Option<(usize, usize, [[u8; WORD]; PIECE])>,
 }
 
 impl<F: NorFlash> Nor<F> {
-    /// These sectors of `flash`, which may be a `&mut` of it.
+    /// Creates the sectors of `flash`, which may be a `&mut` reference.
     pub const fn new(flash: F, sectors: [Range<u32>; 2]) -> Self {
         const {
             assert!(WORD.is_multiple_of(F::READ_SIZE) && WORD.is_multiple_of(F::WRITE_SIZE));
@@ -34,7 +33,7 @@ impl<F: NorFlash> Nor<F> {
         }
     }
 
-    /// Where so many words from that one of a sector on begin; `None` where they are not all in it.
+    /// Returns the offset of `words` words from `first` on; `None` if they exceed the sector.
     fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
         let start = self.sectors.get(sector)?.start;
         let end = first.checked_add(words)?;
@@ -43,7 +42,7 @@ impl<F: NorFlash> Nor<F> {
         start.checked_add(bytes).filter(|_| is_in)
     }
 
-    /// The word, out of the piece that it is in.
+    /// Returns a word, through the cached piece.
     fn word(&mut self, sector: usize, word: usize) -> Option<u32> {
         let (first, at) = (word - word % PIECE, word % PIECE);
         if self
@@ -97,7 +96,7 @@ impl<F: NorFlash> Flash for Nor<F> {
     fn erase(&mut self, sector: usize) {
         self.last = None;
         if let Some(range) = self.sectors.get(sector) {
-            // What does not stand there afterwards is noticed where it is read back.
+            // A failed erase is noticed when a write is read back.
             let _ = self.flash.erase(range.start, range.end);
         }
     }

@@ -1,50 +1,51 @@
-//! What the relay has said in the votes on views, kept across a reboot in flight: a promise that is forgotten is none, and two parts of a
-//! chain could fly one view each.
+//! The relay's votes on views, persisted across a reboot in flight. A relay that forgets a promise could split the chain into two
+//! views.
 //!
-//! It is in a [`Journal`] of its own, whose key is the check sequence of the configuration block: with another
-//! block a drone has forgotten what it said. It is written before anything is sent that follows from it.
+//! The votes are in a [`Journal`] of their own, whose key is the CRC of the configuration block: with another block they are
+//! ignored. They are stored before any frame that follows from them is sent.
 //!
-//! A view change takes three or four records, and a sector of 16 KiB has room for 240 of them. The second sector is blank at a start, so
-//! the 240 records after it, some 60 view changes, erase nothing. When both sectors are full the older one is erased in flight, since a
-//! relay that cannot keep what it says is no voice to count on; the newest record stands in the other sector meanwhile. The sectors
-//! are small for that reason: an erase of 16 KiB stops the CPU for 0.25 s, for 0.5 s at most, where one of 128 KiB takes up to 2 s.
+//! A view change takes three or four records, and a sector of 16 KiB holds 240. The second sector is blank at a start, so the
+//! next 240 records, some 60 view changes, need no erase. When both sectors are full the older one is erased in flight, because a
+//! relay must not vote without storing its votes; the newest record stays in the other sector meanwhile. The sectors are small
+//! because an erase of 16 KiB stops the CPU for 0.25 s, at most 0.5 s, but one of 128 KiB for up to 2 s.
 
 use uav_relay::{Instant, Relay, ViewRecord};
 
 use crate::journal::{Flash, Journal, WhenFull, pack, unpack};
 
-/// Where the two sectors begin: sectors 1 and 2 of an STM32F405.
+/// Addresses of the two sectors: sectors 1 and 2 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
-/// Words of a record that are kept.
+/// Payload of a record, words.
 pub const WORDS: usize = ViewRecord::LENGTH.div_ceil(4);
 
-/// As it is kept.
+/// Packs a view record into words.
 pub fn kept(record: &ViewRecord) -> [u32; WORDS] {
     pack(&record.to_bytes())
 }
 
-/// What was kept, if it is of this format.
+/// Unpacks a stored view record, if it has this format.
 pub fn record(kept: &[u32]) -> Option<ViewRecord> {
     ViewRecord::from_bytes(&unpack::<{ ViewRecord::LENGTH }>(kept))
 }
 
-/// The log, under the check sequence of the drone's block.
+/// Creates the journal; `block` is the CRC of the drone's block.
 pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
     Journal::new(flash, WORDS, block)
 }
 
-/// What the relay has said, as it was when that was looked at last.
+/// Last known view record of the relay.
 #[derive(Debug)]
 pub struct Views {
     said: ViewRecord,
-    /// Whether it stands in the flash.
+    /// True if the record is in the flash.
     kept: bool,
 }
 
 impl Views {
-    /// Has `relay`, which was handed nothing but an upload yet, stand by what it said before this drone was switched off. Where anything was
-    /// kept, `stands_by` is told whether it does: what is of another firmware it may not be able to.
+    /// Restores the votes from before the reboot into a `relay` that has got at most an upload so far.
+    ///
+    /// If a record exists, `stands_by` gets true if the relay accepts it; a record of another firmware may be refused.
     pub fn resume<F: Flash>(
         relay: &mut Relay,
         now: Instant,
@@ -64,8 +65,9 @@ impl Views {
         }
     }
 
-    /// Writes down what `relay` has said, if that has changed: to be called before anything is sent. Where it cannot be written, the relay
-    /// flies on: a drone in the air is not to be switched off for it. Whether it stands in the flash, where that is not as it was.
+    /// Stores the record of `relay` if it has changed; call it before each send. Returns the storage state if that has changed.
+    ///
+    /// If the write fails the relay flies on, because a drone in the air must not be stopped for it.
     pub fn keep<F: Flash>(
         &mut self,
         relay: &Relay,
@@ -79,7 +81,7 @@ impl Views {
         self.write(log)
     }
 
-    #[inline(never)] // seldom
+    #[inline(never)] // rarely called
     fn write<F: Flash>(&mut self, log: impl FnOnce() -> Journal<F>) -> Option<bool> {
         let before = self.kept;
         self.kept = log().keep(&kept(&self.said), WhenFull::Erase);

@@ -1,4 +1,4 @@
-//! A chain of relays on a virtual clock, of nothing but `uav-relay`: whatever features that was built with.
+//! Chain of relays on a virtual clock, which needs only `uav-relay` with any set of features.
 #![cfg(not(target_os = "none"))]
 
 use std::collections::VecDeque;
@@ -12,7 +12,7 @@ use uav_relay::{
     Port, Profile, Relay, Settings, Wiring,
 };
 
-/// The paper's multi-hop scenario: 1 km, an interferer of 80 W beside its middle.
+/// Returns the paper's multi-hop scenario: 1 km, and an interferer of 80 W beside its middle.
 ///
 /// # Panics
 /// Never: its numbers are in range.
@@ -41,13 +41,11 @@ pub fn paper(relays: u16) -> Mission {
     .expect("in range")
 }
 
-/// How long a frame is under way.
 const FLIGHT: Duration = Duration::from_millis(2);
 
-/// How far a shared channel reaches, in relays.
+/// Range of a shared channel, relays.
 const RANGE: usize = 4;
 
-/// Bytes under way: when they arrive, at which relay, through which port.
 struct Arrival {
     at: Instant,
     relay: usize,
@@ -55,7 +53,7 @@ struct Arrival {
     bytes: Vec<u8>,
 }
 
-/// Relays, and what they say to each other.
+/// Relays and the frames between them.
 #[derive(Debug)]
 pub struct Chain {
     relays: Vec<Relay>,
@@ -72,10 +70,10 @@ impl core::fmt::Debug for Arrival {
 }
 
 impl Chain {
-    /// The relays of `mission`, switched on with `settings` each.
+    /// Creates and starts the relays of `mission`, all with `settings`.
     ///
     /// # Errors
-    /// What the first of them refuses.
+    /// The error of the first relay that refuses them.
     pub fn new(mission: Mission, settings: Settings) -> Result<Self, SetupError> {
         let relay = |index| {
             let identity = Identity { network: 7, index };
@@ -94,34 +92,34 @@ impl Chain {
         })
     }
 
-    /// Its relays.
+    /// Returns the relays.
     pub fn relays(&self) -> &[Relay] {
         &self.relays
     }
 
-    /// The relays, for a firmware's inputs.
+    /// Returns the relays, for inputs of their firmware.
     pub fn relays_mut(&mut self) -> &mut [Relay] {
         &mut self.relays
     }
 
-    /// What time it is.
+    /// Returns the virtual time.
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Relay `index`, from 1, neither hears nor says anything from now on.
+    /// Disconnects relay `index`, from 1: it neither sends nor receives any more.
     pub fn silence(&mut self, index: usize) {
         if let Some(silent) = self.silent.get_mut(index.wrapping_sub(1)) {
             *silent = true;
         }
     }
 
-    /// The check sequence of every byte that has been said, in the order that it was said.
+    /// Returns the CRC-32C of all bytes sent so far, in order.
     pub fn said(&self) -> u32 {
         CRC_32C.checksum(&self.said)
     }
 
-    /// Lets so much time go by.
+    /// Advances the virtual time by `span`.
     pub fn fly(&mut self, span: Duration) {
         let end = self.now + span;
         loop {
@@ -143,7 +141,6 @@ impl Chain {
         self.now = end;
     }
 
-    /// Puts everything that is to be said under way.
     fn drain(&mut self) {
         let mut frame = [0; MAX_FRAME];
         let count = self.relays.len();
@@ -167,7 +164,6 @@ impl Chain {
         }
     }
 
-    /// Hands over what has arrived.
     fn deliver(&mut self) {
         let has_come = |arrival: &Arrival| arrival.at <= self.now;
         while self.under_way.front().is_some_and(has_come) {
@@ -184,7 +180,7 @@ impl Chain {
     }
 }
 
-/// Who hears what relay `index`, from 0, of `count` says through `port`, and where.
+/// Returns the receivers and their ports for a frame from relay `index` (from 0) of `count`.
 fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     let next = |at: usize, port| (at < count).then_some((at, port));
     match port {
@@ -201,7 +197,7 @@ fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     }
 }
 
-/// Settings of a chain whose relays share one channel.
+/// Returns the settings of relays on a shared channel.
 pub fn shared() -> Settings {
     Settings {
         wiring: Wiring::Shared,

@@ -1,4 +1,4 @@
-//! What every set of features has in common: the places, the bytes on the air, and that what is left out is refused.
+//! Results common to all sets of features: positions, bytes on the air, and the refusal of missing features.
 
 use uav_relay::SetupError;
 use uav_relay::mission::MissionError;
@@ -8,8 +8,9 @@ use uav_relay::{
 };
 use uav_relay_features::{Chain, paper, shared};
 
-// What the full set says; `-- --nocapture` prints it, and after a change of the arithmetic or of the wire format that belongs here.
-/// x of five relays and of four, m, to the bit.
+// Results of the full set of features; `-- --nocapture` prints them, for an update after a change of the arithmetic or the wire
+// format.
+/// Positions x of five relays and of four, m, as bits.
 const OF_FIVE: [u32; 5] = [
     0x439b_7618,
     0x43ac_5a98,
@@ -19,7 +20,7 @@ const OF_FIVE: [u32; 5] = [
 ];
 const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
-/// The check sequences of all that is said in the flights below.
+/// CRCs of all bytes sent in the flights below.
 const SAID_BY_WIRES: u32 = 0x81db_29ac;
 const SAID_ON_A_CHANNEL: u32 = 0x9f11_89c6;
 
@@ -41,8 +42,8 @@ fn bits(places: &[f32]) -> Vec<u32> {
     places.iter().map(|x_m| x_m.to_bits()).collect()
 }
 
-/// The SIR of every hop, in f64 and by the paper's formulas: with line of sight in the air an excess loss of 0.1 dB, from the
-/// interferer to the receiver one of 21 dB.
+/// Returns the SIR of every hop, in f64 by the paper's formulas. The excess loss is 0.1 dB with line of sight in the air, 21 dB
+/// from the interferer to the receiver.
 fn hops(places: &[f32]) -> Vec<f64> {
     let squared = |x: f64, y: f64, h: f64| x * x + y * y + h * h;
     let mut before = (0.0, 0.0, 1.0);
@@ -71,7 +72,7 @@ fn five_find_the_best_places_on_the_same_bytes() {
         bits(&places),
         chain.said()
     );
-    // The best chain has hops that are all as good.
+    // In the best chain all hops have the same SIR.
     let (least, most) = hops.iter().fold((f64::MAX, 0.0_f64), |(least, most), hop| {
         (least.min(*hop), most.max(*hop))
     });
@@ -104,7 +105,6 @@ static POINTS: [FieldPoint; 1] = [FieldPoint {
     upsilon_per_w: 1e9,
 }];
 
-/// No error where the feature is there.
 fn unless<E>(there: bool, error: E) -> Option<E> {
     (!there).then_some(error)
 }
@@ -157,7 +157,6 @@ fn what_was_left_out_is_refused() {
     );
 }
 
-/// The same places, when every frame is signed.
 #[cfg(feature = "auth")]
 #[test]
 fn five_that_sign_find_the_same_places() {

@@ -1,4 +1,4 @@
-//! A chain of two to four relays on links that lose, double, reorder and damage what is sent.
+//! Fuzz target: a chain of two to four relays on links that lose, duplicate, reorder and damage frames.
 
 mod agreement;
 mod uploads;
@@ -12,34 +12,33 @@ use super::input::Input;
 use super::setting;
 use super::watch::{Sent, Watched};
 
-/// Operations in one run: some milliseconds of computing.
+/// Maximum number of operations in one run: some milliseconds of computing.
 const MOST_OPERATIONS: usize = 256;
 
-/// Relays, at most.
 const MOST_RELAYS: u8 = 4;
 
-/// Frames under way to one relay; one more, and the oldest is lost.
+/// Maximum number of frames in transit to one relay; one more displaces the oldest.
 const MOST_UNDER_WAY: usize = 24;
 
-/// Rounds of deliveries and wake-ups in one operation.
+/// Maximum number of rounds of deliveries and wake-ups in one operation.
 const MOST_ROUNDS: u8 = 128;
 
-/// What rounding may take from a place, as a part of D: a step of its f32.
+/// Rounding error of a position, relative to the distance: one step of its f32.
 const ROUNDING: f64 = 1.3e-7;
 
-/// Reads `data` as a mission, what each relay is set to, and then as what happens to the frames between them.
+/// Reads `data` as a mission, settings of each relay, and operations on the frames between them.
 ///
 /// # Panics
-/// Where a relay breaks a promise (`watch` has them), where two neighbours hold places of one pass that are too close, or
-/// where the chain, once nothing is lost any more, does not agree.
+/// A relay breaks a promise that `watch` checks, two neighbours hold positions of one pass that are too close, or the chain does
+/// not agree after faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
 
-/// As [`chain()`], and what its relays are in the end; `None` where the bytes ask for a mission or settings that are refused.
+/// Runs [`chain()`] and returns its relays at the end. `None` if the mission or the settings are refused.
 ///
 /// # Panics
-/// As [`chain()`].
+/// Those of [`chain()`].
 pub fn flown(data: &[u8]) -> Option<Vec<Watched>> {
     let mut input = Input::new(data);
     let mut chain = Chain::new(&mut input)?;
@@ -57,7 +56,6 @@ pub fn flown(data: &[u8]) -> Option<Vec<Watched>> {
     Some(relays.collect())
 }
 
-/// One relay, and what is under way to it.
 struct Member {
     watched: Watched,
     settings: Settings,
@@ -68,9 +66,8 @@ struct Chain {
     mission: Mission,
     members: Vec<Member>,
     now: Instant,
-    /// Of the next relay that is switched on: never the same twice.
+    /// Seed of the next start of a relay, never reused.
     seed: u32,
-    /// Of the last mission that was uploaded.
     version: u16,
 }
 
@@ -142,7 +139,6 @@ impl Chain {
         self.members.get_mut(at)?.arriving.pop_front()
     }
 
-    /// The oldest frame that is under way to a relay arrives.
     fn deliver(&mut self, at: usize) {
         if let Some(frame) = self.take(at) {
             self.arrive(at, frame.port, &frame.bytes);
@@ -164,7 +160,7 @@ impl Chain {
         }
     }
 
-    /// The oldest frame is overtaken by all others.
+    /// Reorders: the oldest frame is moved behind all others.
     fn put_back(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()
@@ -173,7 +169,6 @@ impl Chain {
         }
     }
 
-    /// The oldest frame arrives with one byte changed.
     fn damage(&mut self, at: usize, input: &mut Input<'_>) {
         let (place, change) = (usize::from(input.byte()), input.byte());
         if let Some(mut frame) = self.take(at) {
@@ -185,7 +180,7 @@ impl Chain {
         }
     }
 
-    /// The oldest frame arrives in two pieces, the second only if it is not lost.
+    /// Delivers the oldest frame in two pieces, the second unless it is lost.
     fn cut(&mut self, at: usize, input: &mut Input<'_>) {
         let (place, lost) = (usize::from(input.byte()), input.flag());
         if let Some(frame) = self.take(at) {
@@ -212,7 +207,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Time passes until a relay wants to be called.
+    /// Advances the time to the next timeout of a relay.
     fn wake(&mut self) {
         let next = self
             .members
@@ -223,7 +218,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// All that is under way arrives as it was sent; with nothing under way, time passes.
+    /// Delivers the oldest frame to each relay without faults. If no frame is in transit, first advances the time.
     fn round(&mut self) {
         if self.members.iter().all(|member| member.arriving.is_empty()) {
             self.wake();
@@ -238,14 +233,14 @@ impl Chain {
     }
 
     fn restart(&mut self) {
-        // Only who leads has something to begin.
+        // Only the leader has a pass to restart.
         for member in &mut self.members {
             member.watched.restart(self.now);
         }
         self.settle_all();
     }
 
-    /// A relay is switched off and on. What is under way to it stays there.
+    /// Restarts a relay. The frames in transit to it stay.
     fn reboot(&mut self, at: usize) {
         let Some(settings) = self.members.get(at).map(|member| member.settings) else {
             return;
@@ -257,15 +252,13 @@ impl Chain {
         if let Some(member) = self.members.get_mut(at) {
             member.watched = watched;
         }
-        // If it leads it numbers its passes from somewhere else, perhaps from where it was before; and views are counted anew
-        // where most have forgotten them.
+        // If it leads, its pass numbers restart, perhaps at an old one; and view numbers restart if most relays have lost them.
         for member in &mut self.members {
             member.watched.forget_pass();
         }
         self.settle(at);
     }
 
-    /// A relay finds out where it is.
     fn position(&mut self, at: usize, input: &mut Input<'_>) {
         let config = self.mission.config();
         let place = Placement {
@@ -298,7 +291,7 @@ impl Chain {
         }
     }
 
-    /// Drains a relay into the links, and looks at how far it is from its neighbours.
+    /// Collects a relay's frames, and checks its distance from its neighbours.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -313,7 +306,7 @@ impl Chain {
         self.look_at_separation(at + 1);
     }
 
-    /// Puts a frame on its way: to one neighbour, or on a shared channel to everybody.
+    /// Puts a frame in transit: to one neighbour, or on a shared channel to all relays.
     fn send(&mut self, from: usize, frame: &Sent) {
         for (at, member) in self.members.iter_mut().enumerate() {
             let port = match frame.port {
@@ -330,7 +323,7 @@ impl Chain {
         }
     }
 
-    /// Where nobody lies, each relay before one in its view is before it in the mission, and as for those after it.
+    /// Checks that a relay's view has no more relays on either side of it than the mission has.
     fn look_at_place(&self, at: usize) {
         if let Some(member) = self.members.get(at) {
             let relay = member.watched.relay();
@@ -344,7 +337,7 @@ impl Chain {
         }
     }
 
-    /// Relay `at` (from 0) and the one before it, where both hold places of the same pass.
+    /// Checks the separation of relay `at` (from 0) and its predecessor if both have positions of one pass.
     fn look_at_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

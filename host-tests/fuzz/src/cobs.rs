@@ -1,15 +1,15 @@
-//! Consistent overhead byte stuffing: frames by a published encoder, and what a damaged one still says, by the definition.
+//! Consistent overhead byte stuffing: encoding by a published encoder, decoding of damaged frames by the definition.
 
-/// `plain` without its zeros, and the delimiter.
+/// Encodes `plain` and appends the delimiter.
 pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     let mut out = cobs::encode_vec(plain);
     out.push(0);
     out
 }
 
-/// The bytes that `stuffed`, without its delimiter, stands for, and whether its last run is whole.
+/// Decodes `stuffed`, without its delimiter; returns the bytes, and true if the last run is complete.
 ///
-/// No published decoder: a stream cut short is judged too, by what came before the cut.
+/// A published decoder would not do, because a truncated stream is checked up to the cut, too.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
     let mut plain = Vec::with_capacity(stuffed.len());
     let (mut rest, mut whole) = (stuffed, true);

@@ -1,9 +1,10 @@
-//! The counters of a relay, taken together.
+//! Sums of a relay's counters.
 
 use uav_relay::Stats;
 
-/// Frames with the right check sequence: each is counted in one of these, at a relay with a key or without one. What is
-/// unsigned without a key are messages, which have been counted as received.
+/// Returns the number of frames with a valid CRC; each is in exactly one of these counters.
+///
+/// Unsigned frames count only with a `key`: without one they are messages, counted as received.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {
     let unsigned = if key { stats.unsigned } else { 0 };
     stats.received
@@ -18,7 +19,7 @@ pub const fn intact(stats: &Stats, key: bool) -> u32 {
         + stats.replayed
 }
 
-/// Every counter, in the order of [`Stats`].
+/// Returns every counter, in the order of [`Stats`].
 pub const fn all(stats: &Stats) -> [u32; 23] {
     let Stats {
         sent,

@@ -1,4 +1,4 @@
-//! Any bytes at all as a stream: what is a frame in it depends on the bytes alone.
+//! Fuzz target: an arbitrary byte stream, in which frames must not depend on how it is split.
 
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{MAX_DECODED, MAX_FRAME};
@@ -8,12 +8,12 @@ use super::cobs::unstuffed;
 use super::input::Input;
 use super::setting;
 
-/// Reads `data` as two lengths and a stream, which a deframer gets byte by byte and two relays get whole and in pieces of
-/// those lengths.
+/// Reads `data` as a stream and two lengths of pieces, for a deframer byte by byte, and for two relays. One relay gets the stream
+/// whole, the other in pieces of those lengths.
 ///
 /// # Panics
-/// Where the deframer gives anything else than COBS by its definition, a frame that is too long, or more bytes than it was
-/// given (each push keeps one at most: with what it keeps, its work is bounded); and where the relays differ.
+/// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it got (each
+/// push stores at most one, so that its work is bounded); or the relays differ.
 pub fn deframe(data: &[u8]) {
     let mut input = Input::new(data);
     let lengths = input.word();
@@ -50,7 +50,7 @@ fn frames_by_definition(stream: &[u8]) {
     }
 }
 
-/// The stream in one piece and in pieces of two lengths in turn, 1 to 256 bytes each.
+/// Compares the stream in one piece with pieces of two alternating lengths, 1 to 256 bytes each.
 fn cut(stream: &[u8], lengths: u16) {
     let Some(mut whole) = relay() else { return };
     let mut pieces = whole.clone();
@@ -79,7 +79,6 @@ fn cut(stream: &[u8], lengths: u16) {
     }
 }
 
-/// Relay 2 of 3 in the paper's scenario.
 fn relay() -> Option<Relay> {
     let mission = setting::mission(&mut Input::new(&[0, 2]), 3)?;
     let identity = Identity {

@@ -1,4 +1,4 @@
-//! Any bytes behind a good check sequence: what can be read can be written, and is then the same.
+//! Fuzz target: arbitrary bytes with a valid CRC. A frame that can be decoded is encoded identically.
 
 use uav_relay::mission::MAX_RELAYS;
 use uav_relay::sensing::belief::Belief;
@@ -15,17 +15,16 @@ use super::message::{Header, sealed};
 use super::setting;
 use super::watch::NETWORK;
 
-/// Bytes of the check sequence.
 const CHECK: usize = 4;
 
-/// What a chain that signs its frames has as the byte of its method.
+/// Method byte of a chain with signed frames.
 const SIGNS: u8 = 8;
 
-/// Takes `data` for the header and the body of a frame, adds the CRC and COBS, and reads it.
+/// Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
 ///
 /// # Panics
-/// Where the frame does not come out as it went in, a flipped bit goes unseen, a message does not have one encoding, or
-/// has a number that no message may have.
+/// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a message has a number out of its
+/// range.
 pub fn frame(data: &[u8]) {
     let mut plain = data.to_vec();
     sealed(&mut plain);
@@ -44,7 +43,7 @@ pub fn frame(data: &[u8]) {
         assert_eq!(len, 0, "nobody writes to 4095");
         return;
     }
-    // Written again, a frame that had a tag has none.
+    // A frame loses its tag when it is encoded again.
     let mut bare = plain.clone();
     if frame::open(&bare).is_ok_and(|opened| opened.tag.is_some()) {
         bare.truncate(bare.len() - TAG - CHECK);
@@ -58,7 +57,7 @@ pub fn frame(data: &[u8]) {
     assert_eq!(written.iter().position(|&byte| byte == 0), Some(len - 1));
 }
 
-/// An intact frame comes apart as the format has it.
+/// Checks that the parts of an intact frame are those of the format.
 fn taken_apart(plain: &[u8]) {
     let opened = frame::open(plain);
     let (Some(checked), Some(&[_, first, _, second])) = (
@@ -87,8 +86,8 @@ fn taken_apart(plain: &[u8]) {
     assert_eq!(opened.handshake, flags == 3);
 }
 
-/// The body behind the right addresses and the right tag counts as what it is, at a relay that asks for tags, and once; a
-/// flipped bit of it is a forgery.
+/// Checks a relay that requires tags. The body with valid addresses and tag is accepted once, and rejected as forged with a
+/// flipped bit.
 fn signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
     let Some(Met {
@@ -125,12 +124,12 @@ fn signed(plain: &[u8]) {
         ..before
     };
     match Message::decode(body) {
-        // The ground alone says the one, a node without a key the other.
+        // A Level is accepted only from the ground, a Claim only without a key.
         Ok(Message::Level { .. } | Message::Claim(_)) => expected.misaddressed += 1,
         Ok(_) => expected.received += 1,
         Err(_) => expected.malformed += 1,
     }
-    // What a message does is for other targets to look at.
+    // Effects of messages are checked by other targets.
     let after = Stats {
         mission: before.mission,
         view: before.view,
@@ -143,7 +142,7 @@ fn signed(plain: &[u8]) {
     assert_eq!(after, expected);
 }
 
-/// Relay 2 of 3 that asks for tags, and its neighbour upstream, who have met.
+/// Relay 2 of 3 that requires tags, and its upstream neighbour, after their handshake.
 #[derive(Clone)]
 struct Met {
     relay: Relay,
@@ -194,7 +193,7 @@ fn comes_through(plain: &[u8], wire: &[u8]) {
     }
 }
 
-/// One bit of the frame, which its own check sequence chooses, arrives flipped.
+/// Checks that a flipped bit, chosen by the CRC, is detected.
 fn flipped(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;
@@ -212,7 +211,6 @@ fn flipped(plain: &[u8]) {
     assert_eq!(frame::decode(&plain), Err(refusal));
 }
 
-/// What follows from the ranges of a message.
 fn look_at(message: &Message) {
     match message {
         Message::Sweep(sweep) => {
@@ -308,7 +306,6 @@ fn is_count(relays: u16) -> bool {
     (1..=MAX_RELAYS).contains(&relays)
 }
 
-/// Whether a node may have proposed that.
 fn is_proposed(view: ViewId) -> bool {
     view.number() > 0 && is_count(view.proposer())
 }

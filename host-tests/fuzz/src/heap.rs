@@ -1,7 +1,7 @@
-//! How often this thread asks for memory, to show that the crate never does.
+//! Allocation counter of this thread, to show that the crate never allocates.
 //!
-//! It counts where [`Counting`] is the global allocator: in the fuzz targets of relays and in `tests/fuzz.rs`. Elsewhere
-//! [`without`] looks on and sees nothing.
+//! It counts if [`Counting`] is the global allocator: in the fuzz targets of relays and in `tests/fuzz.rs`. Elsewhere [`without`]
+//! checks nothing.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -10,50 +10,50 @@ thread_local! {
     static ASKED: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, and a count of what is asked of it.
+/// System allocator that counts allocations.
 #[derive(Clone, Copy, Debug)]
 pub struct Counting;
 
 fn count() {
-    // A thread that is ending has no counter any more, and nothing that would look at it.
+    // A terminating thread has no counter any more, and needs none.
     _ = ASKED.try_with(|asked| asked.set(asked.get().wrapping_add(1)));
 }
 
-// SAFETY: every call goes to the system's allocator as it came.
+// SAFETY: every call is forwarded to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { System.realloc(pointer, layout, size) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
 
-/// How often this thread has asked for memory so far.
+/// Returns the number of allocations of this thread.
 pub fn asked() -> u64 {
     ASKED.get()
 }
 
-/// Does `work`, which must not ask for memory.
+/// Runs `work`, which must not allocate.
 ///
 /// # Panics
-/// If it does.
+/// It allocates.
 pub fn without<T>(work: impl FnOnce() -> T) -> T {
     let before = asked();
     let done = work();

@@ -1,22 +1,22 @@
-//! What the fuzz targets do, as plain functions: a plain test runs them too, on the corpora and on random bytes.
+//! Fuzz targets as plain functions, which a plain test also runs, on the corpora and on random bytes.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`deframe()`] | a stream is cut into the same frames however it comes |
-//! | [`frame()`] | what can be read is written the same |
-//! | [`relay()`] | one relay under anything that may come |
-//! | [`chain()`] | a chain on bad links: safe at any time, and in agreement once they are good |
+//! | [`deframe()`] | a stream is split into the same frames however it arrives |
+//! | [`frame()`] | a decoded frame is encoded identically |
+//! | [`relay()`] | one relay with arbitrary inputs |
+//! | [`chain()`] | a chain on faulty links: always safe, and in agreement after the faults |
 //! | [`scenario()`] | any text as a scenario file |
-//! | [`mavlink()`] | any bytes from an autopilot, and any orders to the link to it |
-//! | [`watch`] | what a relay promises, looked at after every input |
-//! | [`message`] | frames of mad neighbours |
-//! | [`member`] | the same, signed with the network's key |
-//! | [`setting`] | a mission and settings from bytes |
+//! | [`mavlink()`] | arbitrary bytes from an autopilot, and arbitrary calls of its link |
+//! | [`watch`] | checks of a relay's promises after every input |
+//! | [`message`] | frames with arbitrary content |
+//! | [`member`] | frames signed with the network's key |
+//! | [`setting`] | missions and settings from bytes |
 //! | [`input`] | numbers and choices from bytes |
-//! | [`cobs`] | COBS by a published encoder, and back by its definition |
-//! | [`heap`] | that the crate never asks for memory |
+//! | [`cobs`] | COBS by a published encoder, and decoding by its definition |
+//! | [`heap`] | check that the crate never allocates |
 //!
-//! Every function takes any bytes, panics where something promised does not hold, and else gives nothing.
+//! Every target accepts any bytes and panics if a promise is broken.
 
 pub mod chain;
 pub mod cobs;
@@ -40,10 +40,10 @@ pub use mavlink::mavlink;
 pub use relay::relay;
 pub use scenario::scenario;
 
-/// A target: its name, which is that of its corpus too, and what it does with an input.
+/// Target: its name, also that of its corpus, and its function.
 pub type Target = (&'static str, fn(&[u8]));
 
-/// Every target.
+/// Targets of all fuzz harnesses.
 pub const TARGETS: [Target; 6] = [
     ("deframe", deframe),
     ("frame", frame),

@@ -1,4 +1,4 @@
-//! Any bytes as what comes from an autopilot, and any orders to the link to it.
+//! Fuzz target: arbitrary bytes from an autopilot, and arbitrary calls of its link.
 
 mod link;
 mod payload;
@@ -13,13 +13,13 @@ use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
 
-/// Reads `data` as a stream of noise, frames and damaged frames, or as what happens to the link to an autopilot, which signs or does not.
+/// Reads `data` as a stream of frames, intact or damaged, or as operations on an autopilot link.
 ///
 /// # Panics
-/// Where the parser finds anything else than frames by their definition, misses one that is whole, or does more work than
-/// promised; where the link sends what is not finite, not near the line or not of its state, differs by how its bytes are cut,
-/// asks for memory, or wants to be called for nothing; where a link with a key takes what is not signed with it or has come before, refuses
-/// anything else, or does not sign what it says, with a stamp that rises.
+/// - The parser deviates from the definition of frames, misses an intact one, or exceeds its bound on work.
+/// - The link sends numbers that are not finite, targets far from the line or not of its state, depends on how its bytes are
+///   split, allocates, or requests needless calls.
+/// - A link with a key accepts unsigned or repeated frames, rejects others, or does not sign its frames with increasing stamps.
 pub fn mavlink(data: &[u8]) {
     let mut input = Input::new(data);
     match input.below(4) {
@@ -32,7 +32,6 @@ pub fn mavlink(data: &[u8]) {
     }
 }
 
-/// What a parser makes of bytes, one by one.
 fn parsed(bytes: &[u8]) -> (Vec<Received>, Counters) {
     let mut parser = Parser::new();
     let mut all = Vec::new();
@@ -64,7 +63,7 @@ fn frames_by_definition(bytes: &[u8], placed: &[Placed]) {
         bytes.len()
     );
     for &Placed { at, .. } in placed {
-        // It may stand where another frame that holds has its payload; else it is found.
+        // An inserted frame may lie in the payload of another valid frame; otherwise it must be found.
         let is_in = |frame: &reference::Frame| (frame.at..frame.end).contains(&at);
         assert!(reference.frames.iter().any(is_in), "lost at {at}");
     }

@@ -1,7 +1,7 @@
-//! A neighbour that has the network's key: it says handshake, and signs whatever it is to say, however mad.
+//! Neighbour with the network's key: it makes handshakes and signs arbitrary frames.
 //!
-//! Written from the format, not by the crate. A handshake holds the relay's nonce and its neighbour's as far as it knows that, 8
-//! bytes each, the low byte first, and whether it asks for an answer.
+//! Written from the format, independently of the crate. A handshake contains the relay's nonce and its neighbour's if known, 8
+//! bytes each, little-endian, and whether it requests an answer.
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
@@ -12,31 +12,29 @@ use uav_relay::wire::frame::{self, Opened};
 use super::message::{Header, sealed};
 use super::setting::KEY;
 
-/// Flag: a tag follows the body.
+/// Flag of a frame with a tag.
 const SIGNED: u16 = 0x1000;
 
-/// Flag: the body is a handshake.
+/// Flag of a handshake.
 const HELLO: u16 = 0x2000;
 
-/// Bytes of a nonce.
 const NONCE: usize = 8;
 
-/// Bytes of a handshake's body.
+/// Length of a handshake's body, bytes.
 const TOLD: usize = 2 * NONCE + 1;
 
-/// One neighbour of one relay.
+/// Neighbour of a relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Its own nonce, larger after every start.
+    /// Own nonce, larger after every start.
     own: Vec<u8>,
-    /// The relay's.
     relay: Vec<u8>,
     counter: u32,
 }
 
 impl Member {
-    /// A neighbour that has heard the relay's handshake, if `frame`, as it was sent, is one.
+    /// Creates a neighbour that has received the relay's handshake, if `frame` is one.
     pub fn greeted(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
@@ -54,7 +52,7 @@ impl Member {
         })
     }
 
-    /// One that the relay has not heard of, and which has not heard of the relay.
+    /// Creates a neighbour before any handshake in either direction.
     pub fn unknown() -> Self {
         Self {
             key: KEY,
@@ -64,7 +62,7 @@ impl Member {
         }
     }
 
-    /// As it is after its next start.
+    /// Returns this neighbour after a restart.
     pub fn restarted(&self) -> Self {
         Self {
             own: raised(&self.own),
@@ -73,7 +71,7 @@ impl Member {
         }
     }
 
-    /// The same, with another key.
+    /// Returns this neighbour with another key.
     pub fn stranger(&self) -> Self {
         let mut other = self.clone();
         for byte in &mut other.key {
@@ -82,13 +80,13 @@ impl Member {
         other
     }
 
-    /// Its next frame, signed: header, body, tag and CRC before COBS.
+    /// Returns its next frame, signed: header, body, tag and CRC before COBS.
     pub fn signed(&mut self, header: Header, body: &[u8]) -> Vec<u8> {
         let relay = self.relay.clone();
         self.frame(header, SIGNED, &relay, body)
     }
 
-    /// Its handshake, before COBS. It asks for nothing but the relay's, if it has not heard that yet.
+    /// Returns its handshake before COBS. It requests an answer only if it does not know the relay's nonce.
     pub fn handshake(&mut self, header: Header) -> Vec<u8> {
         let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
         let body = [&*self.own, &*self.relay, &[asks]].concat();
@@ -105,7 +103,7 @@ impl Member {
         plain
     }
 
-    /// Keyed BLAKE2s over the nonces of both ends and what is signed, cut to eight bytes.
+    /// Returns the tag: keyed BLAKE2s over both nonces and the signed bytes, cut to eight bytes.
     fn tag(&self, to: &[u8], signed: &[u8]) -> [u8; 8] {
         let Ok(mut mac) = Blake2sMac::<U8>::new_from_slice(&self.key) else {
             unreachable!("a key of 32 bytes");
@@ -117,7 +115,6 @@ impl Member {
     }
 }
 
-/// The body of `plain`, if that is a handshake.
 fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
     let Opened {
         body, handshake, ..
@@ -125,7 +122,7 @@ fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
     handshake.then(|| body.to_vec())
 }
 
-/// One more, the low byte first.
+/// Returns a little-endian number plus one.
 fn raised(number: &[u8]) -> Vec<u8> {
     let mut carry = true;
     let up = number.iter().map(|&byte| {

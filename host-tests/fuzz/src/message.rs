@@ -1,6 +1,6 @@
-//! Frames with a body of every kind and fuzzed numbers in it, right in everything else: what a mad neighbour may say.
+//! Valid frames with a body of every kind and fuzzed numbers: messages of a malicious neighbour.
 //!
-//! Bodies are written from the byte tables, not by the crate: what the crate would never write must come too.
+//! Bodies are written from the byte tables, independently of the crate, because they must include what the crate never writes.
 
 mod header;
 mod hearing;
@@ -15,7 +15,7 @@ use parts::Body;
 pub use header::{Header, sealed};
 pub use parts::Known;
 
-/// A body of any of the twenty kinds, or of none.
+/// Builds a body of any of the twenty kinds, or of none.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),
@@ -54,13 +54,11 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     body.bytes
 }
 
-/// What a sweep may have between the sender's profile and its reaches.
+/// Optional part of a sweep between the sender's profile and its reaches.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
-    /// What it measures.
     Upsilon,
-    /// How far it is from the line.
     Aside,
 }
 
@@ -70,7 +68,7 @@ impl Body<'_, '_> {
         let plain = self.input.flag();
         self.sir();
         if plain {
-            // The sign of the anchor.
+            // The sign bit of the anchor marks the variant.
             if let Some(byte) = self.bytes.last_mut() {
                 *byte ^= 0x80;
             }
@@ -107,7 +105,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Relays that bring along an altitude or a power of their own, most often after one another.
+    /// Appends profiles of relays that have their own, mostly with rising indices.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -156,7 +154,7 @@ impl Body<'_, '_> {
         self.small(0, 31);
     }
 
-    /// A mission, a proposal of it and a place.
+    /// Appends a mission, a proposal and a position in the view.
     fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);

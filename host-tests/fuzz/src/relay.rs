@@ -1,4 +1,4 @@
-//! One relay under anything that may come: bytes, lying neighbours, time in leaps, samples, restarts.
+//! Fuzz target: one relay with arbitrary bytes, malicious neighbours, time jumps, samples and restarts.
 
 mod addresses;
 
@@ -15,27 +15,27 @@ use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
-/// Operations in one run: some milliseconds of computing.
+/// Maximum number of operations in one run: some milliseconds of computing.
 const MOST_OPERATIONS: usize = 256;
 
-/// The relays of a chain, at most; in one of sixteen missions there are a thousand.
+/// Maximum number of relays of a chain; one mission in sixteen has a thousand.
 const MOST_RELAYS: u8 = 5;
 
-/// Wake-ups in one operation.
+/// Maximum number of wake-ups in one operation.
 const MOST_WAKES: u8 = 64;
 
-/// Reads `data` as a mission, one of its relays, its settings, and then as operations on it, until they end.
+/// Reads `data` as a mission, a relay, its settings, and operations on it.
 ///
 /// # Panics
-/// Where the relay breaks a promise: `watch` has them, and every intact frame counts once.
+/// The relay breaks a promise that `watch` checks, or an intact frame is not counted exactly once.
 pub fn relay(data: &[u8]) {
     _ = flown(data);
 }
 
-/// As [`relay()`], and what the relay is in the end; `None` where the bytes ask for a mission or settings that are refused.
+/// Runs [`relay()`] and returns the relay at the end. `None` if the mission or the settings are refused.
 ///
 /// # Panics
-/// As [`relay()`].
+/// Those of [`relay()`].
 pub fn flown(data: &[u8]) -> Option<Watched> {
     let mut input = Input::new(data);
     let mut bench = Bench::new(&mut input)?;
@@ -50,29 +50,26 @@ pub fn flown(data: &[u8]) -> Option<Watched> {
     Some(bench.watched)
 }
 
-/// The relay and its clock.
 struct Bench {
     watched: Watched,
     index: u16,
     mission: Mission,
     wiring: Wiring,
     now: Instant,
-    /// The neighbours upstream and downstream, at a relay that asks for tags.
+    /// Neighbours upstream and downstream, if the relay requires tags.
     members: [Option<Member>; 2],
 }
 
-/// A frame on the wire, and what must become of it.
+/// Frame on the wire, and its expected counter.
 struct Said {
     wire: Vec<u8>,
     fate: Fate,
 }
 
-/// What a frame must be counted as.
+/// Expected counter of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Fate {
-    /// One of all counters.
     Counted,
-    /// Its body counts.
     Read,
     Unsigned,
     Forged,
@@ -89,7 +86,6 @@ impl Bench {
         let chain = setting::of_chain(input, &mission);
         let mut settings = setting::settings(input, &mission, chain);
         if input.below(8) == 7 {
-            // As impatient as it can be.
             settings.hop_time = Duration::from_micros(1);
             settings.probe_after = Duration::from_micros(1);
             settings.dead_after = Duration::from_micros(2);
@@ -107,12 +103,12 @@ impl Bench {
         })
     }
 
-    /// The neighbours of a relay that asks for tags take its handshakes, and greet it.
+    /// Exchanges handshakes between the neighbours and a relay that requires tags.
     fn greet(&mut self) {
         let (sent, _) = self.watched.settle(self.now);
         for side in [0, 1] {
             let there = [self.index > 1, self.index < self.mission.relays()];
-            // Handshakes come first, to upstream before downstream.
+            // Handshakes come first, upstream before downstream.
             let place = usize::from(side == 1 && there == [true; 2]);
             let heard = sent.get(place).filter(|_| there.get(side) == Some(&true));
             let member = heard.and_then(|frame| Member::greeted(&frame.bytes));
@@ -121,7 +117,7 @@ impl Bench {
         }
     }
 
-    /// Tx or Rx, if that is next at `side` and the relay answers it: nobody is greeted there before they say something.
+    /// Returns Tx or Rx as the neighbour at `side` after a handshake. The relay does not greet the ground first.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -132,11 +128,11 @@ impl Bench {
         self.watched.bytes(self.now, port, &handshake);
         let (sent, _) = self.watched.settle(self.now);
         let heard = sent.last().and_then(|frame| Member::greeted(&frame.bytes));
-        // What it has said was of another life.
+        // The handshake above was that of an earlier start.
         heard.map(|member| member.restarted())
     }
 
-    /// `member` is the neighbour at `side` from now on, and says handshake.
+    /// Makes `member` the neighbour at `side`, and delivers its handshake.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -162,7 +158,7 @@ impl Bench {
         match input.below(16) {
             0 => self.pass(Duration::from_micros(u64::from(input.word()))),
             1 => self.pass(Duration::from_millis(u64::from(input.word()))),
-            // Time should not run backward. Where it does, nothing worse may happen than that something comes late.
+            // Time should not run backward. If it does, the only consequence may be delays.
             2 => {
                 let back = u64::from(input.word());
                 self.now = Instant::from_micros(self.now.as_micros().saturating_sub(back));
@@ -179,8 +175,7 @@ impl Bench {
         }
     }
 
-    /// Any bytes. There may be a recorded handshake among them, of neighbours in another life: those that there were are strangers
-    /// from then on.
+    /// Delivers arbitrary bytes. A recorded handshake in them replaces the neighbours' nonces, so the neighbours are forgotten.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -193,7 +188,7 @@ impl Bench {
         self.now = self.now + span;
     }
 
-    /// Comes back when the relay wants to be called, over and over.
+    /// Advances the time to the relay's next timeout, repeatedly.
     fn wake(&mut self, times: u8) {
         for _ in 0..times {
             let Some(next) = self.watched.relay().poll_timeout() else {
@@ -229,7 +224,7 @@ impl Bench {
         self.watched.sample(self.now, sample, count);
     }
 
-    /// It is told where it is or was, now and then that a neighbour has landed.
+    /// Reports a present or past position, now and then that a lost neighbour has landed.
     fn position(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         if how >= 0xF0 {
@@ -247,13 +242,13 @@ impl Bench {
         self.watched.position(self.now, at, place);
     }
 
-    /// A frame with a good CRC, from whichever node, at whichever port; mostly those it may come from.
+    /// Delivers a frame with a valid CRC, mostly from a valid sender and port, else from any.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
         let (mut header, mut port) = from(self.index, side, self.wiring);
         match how / 2 % 32 {
-            // On a shared channel it may become a neighbour.
+            // On a shared channel this node may become a neighbour.
             23..27 => header.sender = far(self.index, side, how / 64 + 1),
             // The version is in the top bits of the same word.
             27 => header.sender |= 0x2000,
@@ -278,7 +273,7 @@ impl Bench {
         if (header, port) != from(self.index, side, self.wiring) {
             fate = Fate::Counted;
         }
-        // The delimiter before it ends what may have begun.
+        // The delimiter ends an incomplete frame.
         self.watched.bytes(self.now, port, &[0]);
         let heard = (port == Port::Shared) == (self.wiring == Wiring::Shared);
         self.hear(port, &wire, heard.then_some(fate));
@@ -295,14 +290,12 @@ impl Bench {
         }
     }
 
-    /// Digest of the mission that the relay flies, with all its relays.
     fn flown(&self) -> u16 {
         let mission = self.watched.relay().mission();
         let whole = mission.with_relays(self.mission.relays());
         digest(&whole.unwrap_or(self.mission))
     }
 
-    /// The newest mission that it holds.
     fn held(&self) -> MissionId {
         let loaded = MissionId {
             version: 0,
@@ -311,7 +304,7 @@ impl Bench {
         self.watched.relay().upload().map_or(loaded, Upload::id)
     }
 
-    /// A frame arrives; `None` where nobody listens.
+    /// Delivers a frame and checks its counter; `fate` is `None` at a port that is not connected.
     fn hear(&mut self, port: Port, wire: &[u8], fate: Option<Fate>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);
@@ -336,7 +329,7 @@ impl Bench {
         assert_eq!(before.poll_timeout(), after.poll_timeout());
     }
 
-    /// The frame of a body, signed where tags are asked for, or as an attacker would have it.
+    /// Builds the frame of a body, signed if the relay requires tags, or as an attacker would.
     fn said(&mut self, side: usize, header: Header, body: &[u8], input: &mut Input<'_>) -> Said {
         let Some(Some(member)) = self.members.get_mut(side) else {
             let (wire, fate) = (stuffed(&header.unsigned(body)), Fate::Counted);
@@ -355,7 +348,7 @@ impl Bench {
             }
             11 => (header.unsigned(body), Fate::Unsigned),
             12 => (member.stranger().signed(header, body), Fate::Forged),
-            // Switched on anew, and without a handshake since.
+            // Restarted, but without a new handshake.
             13 => (member.restarted().signed(header, body), Fate::Forged),
             14 => {
                 let mut member = member.restarted();
@@ -375,14 +368,14 @@ impl Bench {
     }
 }
 
-/// Frames that have been taken or refused, at a relay with a key or without one.
+/// Returns the number of accepted and rejected frames, with or without a key.
 fn frames(stats: &Stats, key: bool) -> u64 {
     let broken = [stats.oversized, stats.truncated, stats.crc];
     let broken: u64 = broken.into_iter().map(u64::from).sum();
     broken + u64::from(intact(stats, key))
 }
 
-/// Frames that were no member's, or not new.
+/// Returns the counters of frames rejected by authentication.
 const fn refusals(stats: &Stats) -> [u32; 3] {
     [stats.unsigned, stats.forged, stats.replayed]
 }

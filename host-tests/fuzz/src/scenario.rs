@@ -1,17 +1,17 @@
-//! Any text as a scenario file: a scenario within its ranges or one line that says why not, and then a mission or a reason.
+//! Fuzz target: any text as a scenario file gives a scenario within its ranges or a one-line error, and then a mission or an
+//! error.
 
 use uav_relay::Mission;
 
 use uav_relay_scenario::mission;
 use uav_relay_scenario::{AirGround, Field, Interference, Scenario};
 
-/// Numbers of relays for which a mission is asked.
 const RELAYS: [u16; 4] = [1, 3, 8, 1000];
 
-/// Takes `data` for the text of a scenario file; what is not UTF-8 is none.
+/// Reads `data` as the text of a scenario file; ignores it if it is not UTF-8.
 ///
 /// # Panics
-/// Where an error is not one line, a number is out of the range that its field names, or a mission has a number that is none.
+/// An error has more than one line, a number is out of its field's range, or a mission has a number that is not finite.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {
         return;
@@ -44,7 +44,6 @@ fn within(value: f64, low: f64, high: f64) {
     assert!((low..=high).contains(&value), "{value} in {low} to {high}");
 }
 
-/// The ranges that the fields of a scenario name.
 fn look_at(scenario: &Scenario) {
     within(scenario.distance_m, 1.0, 1e6);
     within(scenario.altitude_m, 0.1, 1e5);
@@ -96,7 +95,7 @@ fn look_at_field(field: &Field) {
     }
 }
 
-/// Its numbers are numbers; its ranges are `Mission::try_new`'s to check.
+/// Checks that the mission's numbers are finite; their ranges are checked by `Mission::try_new`.
 fn look_at_mission(mission: &Mission) {
     let config = mission.config();
     let numbers = [

@@ -1,4 +1,4 @@
-//! A mission and the settings of a relay, from a fuzzer's bytes: within the ranges the crate takes, up to their ends.
+//! Missions and settings of relays from a fuzzer's bytes, within the accepted ranges, limits included.
 
 use uav_relay::GuardConfig;
 use uav_relay::channel::AirGround;
@@ -10,30 +10,30 @@ use uav_relay::{Auth, Key};
 
 use super::input::Input;
 
-/// Fields, made once: one lives as long as the program.
+/// Fields, made once, because a field is borrowed until the program ends.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
 const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Where there is room to the side.
+/// Interferer of the mission with lateral positions.
 const BESIDE: Interference = Interference::Source(Interferer {
     power_w: 80.0,
     x_m: 500.0,
     y_m: 150.0,
 });
 
-/// The key of every network here.
+/// Key of every network here.
 pub const KEY: [u8; 32] = *b"known to whoever reads this line";
 
 const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// A mission of at most `most` relays. `None` where they do not fit on the distance, or the bytes ask for what a mission refuses.
+/// Reads a mission of at most `most` relays. `None` if the relays do not fit or the mission is refused.
 ///
-/// Half of the missions are the paper's with little changed: a few bytes get a relay far there. The other half draws every
-/// number from the whole of its range.
+/// Half of the missions are the paper's with small changes, with which few bytes reach many states. The other half draws every
+/// number from its whole range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     let drawn = input.byte();
     let (kind, variant) = (drawn % 14, drawn / 14 % 8);
@@ -43,7 +43,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
         _ => tame(kind, relays)?,
     };
     let config = match (variant, config.interference) {
-        // Nobody knows of one.
+        // Interferer unknown to the relays.
         (6, Interference::Source(_)) => MissionConfig {
             interference: Interference::Unknown,
             ..config
@@ -57,7 +57,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// The paper's scenario, changed in one respect.
+/// Returns the paper's scenario, changed in one respect.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,
@@ -88,7 +88,6 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             },
             ..paper
         },
-        // As far apart as they fit.
         2 => MissionConfig {
             min_separation_m: 990.0 / f32::from(relays),
             ..paper
@@ -105,7 +104,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             interference: Interference::Field(STEEP),
             ..paper
         },
-        // Room above and to both sides.
+        // A range of altitudes, and lateral positions on both sides.
         _ => MissionConfig {
             band: Band {
                 least_m: 20.0,
@@ -121,7 +120,6 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     })
 }
 
-/// Any mission there may be.
 fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
     let distance_m = input.scaled(1.0, 1e6);
     let (least_m, most_m) = {
@@ -165,7 +163,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
     })
 }
 
-/// Where a drone is: mostly on the link, at any altitude, in the room beside it.
+/// Reads a position: mostly on the line's length, at any altitude, mostly in the lateral range.
 pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, config.distance_m)),
@@ -174,7 +172,7 @@ pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     }
 }
 
-/// How far from the line a drone is, m: in the room beside it or out of it, where there is some.
+/// Reads a lateral position, m, inside or outside of the lateral range; 0 without one.
 pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     if lateral.is_single() {
         0.0
@@ -183,7 +181,7 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     }
 }
 
-/// On the link or far away, on its line or aside.
+/// Reads an interferer on the line's length or far away, on the line or beside it.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
     let power_w = input.scaled(1e-6, 1e9);
     let x_m = match input.below(4) {
@@ -213,7 +211,7 @@ fn channel(input: &mut Input<'_>) -> Option<Channel> {
     Channel::from_db(carrier_hz, los.into(), nlos.into(), air_ground).ok()
 }
 
-/// The settings of one relay of `mission`; what every relay of a chain must have in common is in `chain`.
+/// Reads the settings of one relay of `mission`; `chain` has those common to all relays.
 pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Settings {
     let own = input.byte();
     let profile = (own % 4 == 1).then(|| Profile {
@@ -238,7 +236,7 @@ pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Se
     }
 }
 
-/// What all relays of a chain have in common.
+/// Reads the settings common to all relays of a chain.
 pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
     let how = input.byte();
     let method = match how % 4 {

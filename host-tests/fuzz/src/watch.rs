@@ -1,5 +1,4 @@
-//! A relay that is watched: after every input it is drained as a firmware drains it, and what its documentation promises
-//! must hold.
+//! Watched relay: after every input its output is collected as by a firmware, and the promises of its documentation are checked.
 
 mod frames;
 mod number;
@@ -18,56 +17,55 @@ use frames::Frames;
 
 pub use frames::NETWORK;
 
-/// Frames that a relay can owe at once: a pass or what came of one, a sign that it is busy; the decision on a proposal; a pulse, and
-/// what came of it; to either side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a claim and an echo of one; a handshake to each of
-/// the eight nodes that it remembers.
+/// Maximum number of frames pending at once.
+///
+/// They are: a pass or its result and a busy sign; a decision on a proposal; a pulse and its answer; for each side a heartbeat,
+/// four hellos, a fence, an offer and a hello to the ground; a claim and its echo; a handshake to each of the eight remembered
+/// nodes.
 const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
-/// Events that can be pending at once.
 const MOST_EVENTS: usize = 14;
 
-/// The shortest frame whose check sequence is worked out, on the wire: a header, no body, the check sequence.
+/// Length of the shortest frame whose CRC is computed, on the wire: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// The shortest frame of a message, on the wire: that a relay is busy.
+/// Length of the shortest frame of a message, on the wire: Busy.
 const LEAST_MESSAGE: usize = 19;
 
-/// A frame that a relay has sent.
+/// Frame sent by a relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Sent {
-    /// Through which port.
+    /// Port of the frame.
     pub port: Port,
-    /// Its bytes, the delimiter included.
+    /// Bytes of the frame, with its delimiter.
     pub bytes: Vec<u8>,
 }
 
-/// A relay, and what was true of it when it was looked at last.
+/// Relay, and its state at the last check.
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
-    /// Its node, and how many there are.
+    /// Number of its node, and number of relays.
     node: u16,
     all: u16,
     settings: Settings,
     stats: Stats,
-    /// The view it has agreed to.
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Between which sites it flies, as it was last; and the distance that it was loaded with, m.
+    /// Sites of the flown line, and the distance of the loaded mission, m.
     sites: Option<Sites>,
     loaded_m: f32,
     frames: Frames,
-    /// Bytes that have come in since the last delimiter, by port.
+    /// Number of bytes received since the last delimiter, by port.
     begun: [usize; 3],
-    /// View and number of the pass that its place is from, as far as that is known.
+    /// View and number of the pass that gave its position, if known.
     held: Option<(ViewId, u16)>,
-    /// What it flew when it was looked at last.
     flown: MissionConfig,
 }
 
 impl Watched {
-    /// Relay `index` of `mission`, switched on at `now`; `None` where a setting is refused.
+    /// Creates relay `index` of `mission`, started at `now`; `None` if a setting is refused.
     pub fn new(
         mission: Mission,
         index: u16,
@@ -98,46 +96,46 @@ impl Watched {
         })
     }
 
-    /// The relay.
+    /// Returns the relay.
     pub const fn relay(&self) -> &Relay {
         &self.relay
     }
 
-    /// What it is set to.
+    /// Returns its settings.
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Number of the last pass it has said anything of.
+    /// Returns the number of the last pass in its frames.
     pub const fn number(&self) -> u16 {
         self.frames.number
     }
 
-    /// Number of the talk that its last fence was of, 0 for none.
+    /// Returns the association number in its last fence message, 0 for none.
     pub const fn association(&self) -> u16 {
         self.frames.association
     }
 
-    /// The number of the last hello that it said, 0 for none.
+    /// Returns the nonce of its last hello, 0 for none.
     pub const fn asked(&self) -> u16 {
         self.frames.asked
     }
 
-    /// View and number of the pass that the place it has agreed to is from; `None` where a guard leads it there, too.
+    /// Returns view and number of the pass that gave its agreed position; `None` with a guard, too.
     pub const fn held(&self) -> Option<(ViewId, u16)> {
         self.held
     }
 
-    /// What its place is from does not count any more: passes are numbered anew.
+    /// Forgets the pass of its position, because passes are renumbered.
     pub const fn forget_pass(&mut self) {
         self.held = None;
     }
 
-    /// Bytes come in at `port`.
+    /// Delivers bytes at `port`.
     ///
     /// # Panics
-    /// Where more is made of them than there can be in them: a check sequence is worked out for at most one frame in 16 bytes,
-    /// and a message read in at most one in 19, so that the work is bounded by their number.
+    /// The relay computes more than one CRC for 16 bytes, or decodes more than one message for 19 bytes, which are its bounds on
+    /// work.
     pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let before = *self.relay.stats();
         heap::without(|| self.relay.handle_bytes(now, port, bytes));
@@ -157,7 +155,7 @@ impl Watched {
         *begun = ended.map_or(there, |at| bytes.len() - 1 - at);
     }
 
-    /// A measurement comes in, `count` times over.
+    /// Delivers a measurement, `count` times.
     pub fn sample(&mut self, now: Instant, sample: Sample, count: u8) {
         heap::without(|| {
             for _ in 0..count {
@@ -166,31 +164,31 @@ impl Watched {
         });
     }
 
-    /// It is told where it was at time `at`.
+    /// Reports the position at time `at`.
     pub fn position(&mut self, now: Instant, at: Instant, place: Placement) {
         heap::without(|| self.relay.handle_position(now, at, place));
     }
 
-    /// It is told that who fell silent at `side` has landed.
+    /// Reports that the lost relays at `side` have landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
         heap::without(|| self.relay.clear_lost(now, side));
     }
 
-    /// Its firmware hands it a mission.
+    /// Uploads a mission.
     pub fn upload(&mut self, now: Instant, upload: &Upload) {
-        // What is no newer, or comes to a relay without a key, is refused.
+        // An older mission, or one for a relay without a key, is refused.
         _ = heap::without(|| self.relay.handle_upload(now, upload));
     }
 
-    /// It is told to agree again.
+    /// Requests a new agreement.
     pub fn restart(&mut self, now: Instant) {
         heap::without(|| self.relay.restart(now));
     }
 
-    /// Handles what is due, drains the relay, and looks at it: what it has sent, and what happened.
+    /// Handles timeouts, collects frames and events, and checks the relay.
     ///
     /// # Panics
-    /// Where something that is promised does not hold.
+    /// A promise is broken.
     pub fn settle(&mut self, now: Instant) -> (Vec<Sent>, Vec<Event>) {
         heap::without(|| self.relay.handle_timeout(now));
         let mut sent = Vec::with_capacity(MOST_FRAMES);
@@ -225,7 +223,7 @@ impl Watched {
         (sent, events)
     }
 
-    /// A view comes after all before it, is told of and counted; the relay has a place in it, its neighbours are about it.
+    /// Checks views: they increase, are reported and counted. The relay has an index in its view, between its neighbours.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -243,7 +241,6 @@ impl Watched {
         self.view = view;
     }
 
-    /// No counter ever falls.
     fn look_at_counters(&mut self) {
         let stats = *self.relay.stats();
         let pairs = all(&stats).into_iter().zip(all(&self.stats));
@@ -254,12 +251,12 @@ impl Watched {
         self.stats = stats;
     }
 
-    /// A setpoint never changes in silence, and is the agreed place, or inside the fence of its guard.
+    /// Checks the setpoint. Each change is reported, and it is the agreed position, or inside the guard's geofence.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        // One that stands down flies nothing, nor does one whose line has changed before the chain has agreed anew.
+        // A passive relay has no setpoint; nor has one whose line has changed, before the next agreement.
         let moved = self.sites != self.relay.sites();
         let silent = self.relay.stands_down() || moved;
         let before = self.setpoint;
@@ -271,11 +268,11 @@ impl Watched {
         };
         if let Some(GuardConfig { mut fence, .. }) = self.settings.guard {
             if self.relay.sites().is_some() {
-                // It goes along with the receiver.
+                // The geofence extends with the distance of the receiver.
                 let longer_m = self.relay.mission().config().distance_m - self.loaded_m;
                 fence.most_x_m += longer_m;
             }
-            // It begins anywhere, and from outside the fence it goes no farther out.
+            // A first setpoint may be anywhere; from outside the geofence it must not move farther out.
             let before = before.unwrap_or(place);
             for (is, was, least, most) in [
                 (place.x_m, before.x_m, fence.least_x_m, fence.most_x_m),
@@ -297,7 +294,7 @@ impl Watched {
         }
     }
 
-    /// A place that was agreed on is finite, on the link or in the room beside it, at an altitude that this relay may hold.
+    /// Checks an agreed position. It is on the line's length and in its lateral range, at an altitude that this relay may have.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.final_setpoint();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
@@ -309,7 +306,8 @@ impl Watched {
             "taken away"
         );
         self.agreed = self.agreed.filter(|_| !moved);
-        // A place of the mission before is held until the next agreement, and may have been agreed on just before that came.
+        // A position of the previous mission is held until the next agreement, and may be the newest one when the mission
+        // changes.
         let flown = core::mem::replace(&mut self.flown, *self.relay.mission().config());
         let Some(place) = agreed.filter(|_| agreed != self.agreed) else {
             return;
@@ -327,7 +325,6 @@ impl Watched {
         assert!(sound, "{place:?} in {:?}", self.flown);
     }
 
-    /// Whatever else it tells is in its range.
     fn look_at_numbers(&self) {
         let sir = |sir: f32| (0.0..=f32::MAX).contains(&sir);
         assert!(

@@ -1,14 +1,13 @@
-//! A chain of relays on a virtual clock: the simulator that runs the on-board code, what came of a run as text, JSON
-//! and pictures.
+//! Simulator of a relay chain on a virtual clock: runs the on-board code and reports the outcome.
 //!
-//! | module | one idea |
+//! | module | contents |
 //! | --- | --- |
 //! | [`simulator`] | relays, links, faults and attackers on a virtual clock |
-//! | [`report`] | what came of a run, as text and JSON |
-//! | [`svg`] | the same as a picture |
+//! | [`report`] | the outcome of a run, as text and JSON |
+//! | [`svg`] | the outcome of a run, as a picture |
 //! | [`beta`] | random interference powers |
-//! | [`cli`] | `cargo chain` without its files and its terminal |
-//! | [`command`] | what the commands have in common |
+//! | [`cli`] | `cargo chain` without its file and terminal access |
+//! | [`command`] | code shared by all commands |
 
 pub mod beta;
 pub mod cli;

@@ -1,4 +1,4 @@
-//! The film of a run is of that run, and is no part of it.
+//! Film of a run: complete, and without influence on the run.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ fn an_agreement_is_filmed_from_nothing_to_the_places_it_ends_with() {
     assert_eq!(plain.bits(), filmed.bits(), "a film changes nothing");
     assert_eq!(plain.messages, filmed.messages);
     let film = filmed.film.as_ref().unwrap();
-    // At first nobody has a place, and then each takes one once.
+    // Initially no relay has a setpoint; then each gets one once.
     let (first, rest) = film.shots.split_at(8);
     assert!(first.iter().all(|shot| shot.is_on && shot.place.is_none()));
     let taken: BTreeMap<u16, _> = rest.iter().map(|shot| (shot.relay, shot.place)).collect();
@@ -66,7 +66,6 @@ fn a_relay_that_falls_silent_and_comes_back_is_filmed_as_that() {
     let last = of_three.last().unwrap();
     assert_eq!(last.place, outcome.relays[2].setpoint);
     assert!(last.place.is_some());
-    // The others took other places meanwhile.
     let meanwhile = |shot: &&uav_relay_sim::simulator::film::Shot| (off..on).contains(&shot.at);
     assert!(film.shots.iter().filter(meanwhile).count() > 4);
     assert!(film.sent.iter().all(|it| it.to.is_none()));

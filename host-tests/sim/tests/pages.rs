@@ -1,4 +1,4 @@
-//! What the pages for users say: tables that are displayed as tables, pictures that exist, figures that the commands print.
+//! Pages for users: valid tables, existing pictures, and figures equal to the commands' output.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -18,7 +18,7 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(root().join(name)).unwrap()
 }
 
-/// Every page of the repository, and the documentation of the crate.
+/// Returns all pages of the repository and of the crate's documentation.
 fn pages() -> Vec<PathBuf> {
     let mut all = vec![];
     for folder in ["", "examples", "host-tests", "src/docs", "src/wire"] {
@@ -33,7 +33,7 @@ fn pages() -> Vec<PathBuf> {
     all
 }
 
-/// The lines of a page that are not within a block of code, with their numbers.
+/// Returns the lines outside code blocks, with their numbers.
 fn prose(text: &str) -> Vec<(usize, &str)> {
     let mut code = false;
     let outside = |(_, line): &(usize, &str)| {
@@ -44,7 +44,7 @@ fn prose(text: &str) -> Vec<(usize, &str)> {
     (1..).zip(text.lines()).filter(outside).collect()
 }
 
-/// A row after a blank line has no header, and is displayed as text.
+/// A row after a blank line has no header and is displayed as text.
 #[test]
 fn every_row_of_a_table_is_displayed_in_a_table() {
     let mut cut = vec![];
@@ -84,7 +84,6 @@ fn the_readme_spells_sir_out_where_it_comes_first_and_stays_short() {
     assert!(text.len() < 12_288, "{} bytes", text.len());
 }
 
-/// A browser displays the picture of a page from the checkout.
 #[test]
 fn the_pictures_of_the_readme_are_there_and_one_is_of_the_page() {
     let text = read("README.md");
@@ -102,7 +101,7 @@ fn the_pictures_of_the_readme_are_there_and_one_is_of_the_page() {
     );
 }
 
-/// The row on a lost relay has the figures of the command that it names.
+/// The row on a lost relay must match the output of the command in it.
 #[test]
 fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
     let text = read("README.md");
@@ -135,8 +134,7 @@ fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
     assert_eq!(cells[2], expected, "{command} prints: {line}");
 }
 
-/// The firmware examples pass on what a SiK radio measures (examples/FIRMWARE.md), and a ground station what the receiver hears
-/// (examples/LINUX.md).
+/// RESULTS.md must not deny measurements that FIRMWARE.md (SiK radio) and LINUX.md (receiver) describe.
 #[test]
 fn the_limits_do_not_deny_what_the_guides_describe() {
     let limits = read("host-tests/RESULTS.md");

@@ -1,4 +1,4 @@
-//! A scenario that says where its ends are on earth.
+//! Scenarios with geographic sites.
 
 use uav_relay::Geodetic;
 use uav_relay_scenario::{Line, Problem, Scenario, ScenarioError};
@@ -19,7 +19,7 @@ fn the_distance_follows_from_the_sites() {
     let scenario = parse("", SITES).unwrap();
     let Line { axis, sites, .. } = scenario.line.unwrap();
     assert_eq!(scenario.distance_m.to_bits(), axis.distance_m().to_bits());
-    // By GeographicLib.
+    // Reference value by GeographicLib.
     assert!(
         (scenario.distance_m - 1_343.794_9).abs() < 0.001,
         "{}",

@@ -1,7 +1,7 @@
-//! One emulated drone: a QEMU process that dies with its owner, and a socket for each of its serial ports.
+//! Emulated drone: a QEMU process that ends with its owner, and a socket for each of its serial ports.
 //!
-//! The machine `netduinoplus2` is an STM32F405. What it does not have: a clock tree (`SysTick` counts at 168 MHz, so a
-//! firmware that believes in 16 MHz lives 10.5 times as fast), and baud rates (bytes arrive as fast as they are read).
+//! The machine `netduinoplus2` is an STM32F405. It lacks a clock tree (`SysTick` counts at 168 MHz, so a firmware that assumes 16
+//! MHz runs 10.5 times as fast) and baud rates (bytes arrive as fast as they are read).
 
 use std::io;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -13,24 +13,23 @@ use uav_relay_tools::provision::config;
 
 use super::{MISSING, QEMU};
 
-/// How much faster than the wall clock the drone's own clock runs, unless it is slowed down.
+/// Speed of the drone's clock relative to the wall clock, unless slowed down.
 pub const SPEED: f64 = 168.0 / 16.0;
 
-/// How long QEMU may take to connect its serial ports.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// How fast a drone lives.
+/// Speed of a drone's clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Life {
-    /// [`SPEED`] times as fast as everybody else.
+    /// [`SPEED`] times as fast as the wall clock.
     #[default]
     Fast,
-    /// In real time.
+    /// Real time.
     Real,
 }
 
 impl Life {
-    /// How much faster than the wall clock the drone's own clock runs.
+    /// Returns the speed of the drone's clock relative to the wall clock.
     pub const fn speed(self) -> f64 {
         match self {
             Self::Fast => SPEED,
@@ -39,43 +38,41 @@ impl Life {
     }
 }
 
-/// A serial port of the chip, by its place in QEMU's list.
+/// Serial port of the chip, in the order of QEMU's list.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Uart {
-    /// USART1: the autopilot.
+    /// USART1: autopilot.
     Usart1,
-    /// USART2: upstream, or the radio.
+    /// USART2: upstream neighbour, or radio.
     Usart2,
-    /// USART3: downstream.
+    /// USART3: downstream neighbour.
     Usart3,
-    /// UART4: the log.
+    /// UART4: log.
     Uart4,
 }
 
-/// As QEMU lists them.
 const UARTS: [Uart; 4] = [Uart::Usart1, Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
-/// Bytes in the flash, and the address of the first.
+/// Address in the flash, and the bytes from there.
 pub type Kept = (u32, Vec<u8>);
 
-/// A drone that is switched on.
+/// Running emulated drone.
 #[derive(Debug)]
 pub struct Emulator {
     process: Child,
     folder: PathBuf,
 }
 
-/// The serial ports of a drone, in the order of [`Uart`].
+/// Serial ports of a drone, in the order of [`Uart`].
 pub type Sockets = [UnixStream; 4];
 
 impl Emulator {
-    /// Switches a drone on with `image`, `block` at the place of its configuration, and what else stands in its flash: `kept`, each from
-    /// that address on. `folder` is made, and is its own.
+    /// Starts a drone with `image`, its configuration `block`, and further flash contents `kept`.
     ///
-    /// It lives as `life` says.
+    /// Its clock runs at the speed `life`. It creates the folder `name` in `folder` for itself.
     ///
     /// # Errors
-    /// [`MISSING`] if there is no QEMU; otherwise whatever went wrong, QEMU's own words included.
+    /// [`MISSING`] if there is no QEMU; otherwise the fault, with QEMU's own messages.
     pub fn start(
         image: &Path,
         block: &[u8],
@@ -157,25 +154,24 @@ impl Emulator {
         }
     }
 
-    /// What QEMU has to complain about.
+    /// Returns QEMU's error output.
     pub fn complaint(&self) -> String {
         std::fs::read_to_string(self.folder.join("qemu.txt")).unwrap_or_default()
     }
 
-    /// Whether it still runs.
+    /// Returns true while QEMU runs.
     pub fn is_running(&mut self) -> bool {
         matches!(self.process.try_wait(), Ok(None))
     }
 
-    /// Switches it off, in the middle of whatever it does.
+    /// Kills the drone's process at once.
     pub fn kill(&mut self) {
-        // It may have ended by itself, and then there is nothing to kill.
+        // A process that has already ended is no error.
         _ = self.process.kill();
         _ = self.process.wait();
     }
 }
 
-/// The option that loads `file` into the flash.
 fn loaded(file: &Path, address: u32) -> [String; 2] {
     let file = file.display();
     [

@@ -1,19 +1,18 @@
-//! The image that is flashed, built by cargo into a folder of its own, so that a cargo that waits for this one is not waited for.
+//! Firmware image, built by cargo into a folder of its own, so that a waiting outer cargo does not hold its lock.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The target the firmware is built for.
+/// Target of the firmware.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The profile that what is flashed is built with.
+/// Profile of flashed images.
 pub const PROFILE: &str = "firmware";
 
-/// Builds `examples` with the log and everything else, or with `smallest` nothing else, and says in which folder they are: until
-/// they are built otherwise.
+/// Builds `examples`, with the log alone if `smallest`, else with all features. Returns their folder, valid until the next build.
 ///
 /// # Errors
-/// What cargo has to say, if it fails.
+/// The output of cargo, if it fails.
 pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
@@ -37,7 +36,7 @@ pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     for example in examples {
         command.args(["--example", example]);
     }
-    // Flags for the host's compiler are none for the target's, and the tests read the log at the level of `.cargo/config.toml`.
+    // The host compiler's flags do not apply to the target, and the tests read the log at the level of `.cargo/config.toml`.
     for variable in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "DEFMT_LOG"] {
         command.env_remove(variable);
     }

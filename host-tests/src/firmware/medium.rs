@@ -1,4 +1,4 @@
-//! What happens to a frame between two drones, and when it arrives: bytes in, bytes out, and no clock of its own.
+//! Transmission between drones: faults and latency of frames. It has no clock of its own.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,10 +12,9 @@ use super::emulator::SPEED;
 use uav_relay_sim::simulator::faults::{Faults, Injected};
 use uav_relay_sim::simulator::link::LinkSpec;
 
-/// Any byte stream that goes on for so long without a delimiter is passed on as it is.
+/// Maximum number of bytes without a delimiter; a longer sequence is forwarded in pieces.
 const LONGEST: usize = 2 * MAX_FRAME;
 
-/// Bytes on their way.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Flying {
     at: Instant,
@@ -36,7 +35,7 @@ impl PartialOrd for Flying {
     }
 }
 
-/// The space between the drones. Senders and receivers are numbered by whoever owns it.
+/// Medium between the drones. The owner numbers senders and receivers.
 #[derive(Debug)]
 pub struct Medium {
     link: LinkSpec,
@@ -45,12 +44,12 @@ pub struct Medium {
     injected: Injected,
     flying: BinaryHeap<Reverse<Flying>>,
     order: u64,
-    /// What has come from each sender since its last delimiter, and until when its line is busy.
+    /// Bytes of each sender since its last delimiter, and the time until which its line is busy.
     lines: Vec<(Vec<u8>, Instant)>,
 }
 
 impl Medium {
-    /// A medium among `senders`, with `link` as the drones' own clocks see it.
+    /// Creates the medium of `senders`, with `link` in the time of the drones' own clocks.
     pub fn new(senders: usize, link: LinkSpec, faults: Faults, seed: u64, now: Instant) -> Self {
         Self {
             link,
@@ -63,7 +62,7 @@ impl Medium {
         }
     }
 
-    /// Takes in what `sender` sends; each whole frame goes to every one of `receivers`, with faults of its own.
+    /// Accepts bytes from `sender`; each complete frame goes to all `receivers`, with separate faults.
     pub fn send(&mut self, now: Instant, sender: usize, bytes: &[u8], receivers: &[usize]) {
         for &byte in bytes {
             let Some((frame, _)) = self.lines.get_mut(sender) else {
@@ -98,7 +97,7 @@ impl Medium {
         }
     }
 
-    /// The next bytes that have arrived by `now`, and at whom.
+    /// Returns the next bytes that have arrived by `now`, and their receiver.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
             return None;
@@ -107,18 +106,17 @@ impl Medium {
         Some((flying.receiver, flying.bytes))
     }
 
-    /// When the next bytes arrive.
+    /// Returns the next arrival time.
     pub fn next(&self) -> Option<Instant> {
         self.flying.peek().map(|Reverse(flying)| flying.at)
     }
 
-    /// What has been done to frames.
+    /// Returns the counters of injected faults.
     pub const fn injected(&self) -> Injected {
         self.injected
     }
 }
 
-/// A span of a drone's clock as one of the wall clock.
 fn wall(span: uav_relay::Duration) -> Duration {
     Duration::from_micros(span.as_micros()).div_f64(SPEED)
 }

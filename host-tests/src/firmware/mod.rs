@@ -1,15 +1,15 @@
-//! The firmware on the ground: its configuration, its image, and drones emulated by QEMU that run it.
+//! Firmware on the ground: its configuration, its image, and drones emulated by QEMU.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`journal`], [`epoch`], [`views`] | what is kept in flash, by the crate that the firmware has it from |
-//! | [`uploads`] | the missions that were uploaded in flight, and where they are kept; the firmware's own file |
-//! | [`ram`] | two sectors of flash in RAM, to fill them and to spoil them |
-//! | [`image`] | the image, built by cargo |
-//! | [`emulator`] | one emulated drone: a process, and a socket for each serial port |
-//! | [`slow`] | a clock by which emulated drones live in real time |
-//! | [`medium`] | what happens to frames between drones, and when they arrive |
-//! | [`network`] | who hears whom: threads that carry bytes between sockets |
+//! | [`journal`], [`epoch`], [`views`] | persistent state in flash, from the crate that the firmware uses |
+//! | [`uploads`] | persistent uploads, the firmware's own file |
+//! | [`ram`] | mock of two flash sectors, which can be worn or lose power |
+//! | [`image`] | firmware image, built by cargo |
+//! | [`emulator`] | emulated drone: a process, and a socket for each serial port |
+//! | [`slow`] | clock that makes emulated drones run in real time |
+//! | [`medium`] | faults and latency of frames between drones |
+//! | [`network`] | topology, and threads that carry bytes between sockets |
 
 #[cfg(unix)]
 pub mod emulator;
@@ -26,9 +26,9 @@ pub mod uploads;
 
 pub use uav_relay_kept::{epoch, journal, views};
 
-/// The emulator.
+/// Name of the emulator.
 pub const QEMU: &str = "qemu-system-arm";
 
-/// What to type where it is missing.
+/// Message if the emulator is missing.
 pub const MISSING: &str =
     "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";

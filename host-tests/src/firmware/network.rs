@@ -1,6 +1,6 @@
-//! Who hears whom: a thread for each serial port that listens, and one that carries bytes through the medium.
+//! Network of emulated drones: a thread for each receiving serial port, and one that carries bytes through the medium.
 //!
-//! As at a serial port, what nobody reads in time is lost: a drone that falls behind hears less, not later and later.
+//! As at a serial port, bytes not read in time are lost: a drone that falls behind receives less, instead of later and later.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -15,13 +15,13 @@ use rustix::net::sockopt::set_socket_send_buffer_size;
 use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
-/// How long a frame may take once there is room for its beginning.
+/// Maximum time to write a frame once there is room for its beginning.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What the kernel may use for frames that wait at a port, in bytes: some four, with what it needs for each.
+/// Kernel buffer for frames waiting at a port, bytes: some four frames with their overhead.
 const WAITING: usize = 16_384;
 
-/// Drones connected to each other. Ends when every drone's sockets have been closed, or when it is dropped.
+/// Connected drones. It ends when all sockets of the drones are closed, or on drop.
 #[derive(Debug)]
 pub struct Network {
     carrier: Option<JoinHandle<()>>,
@@ -29,17 +29,17 @@ pub struct Network {
     injected: Arc<Mutex<Injected>>,
 }
 
-/// What a port has sent; without bytes, the end.
+/// Bytes sent by a port; empty at the end.
 #[derive(Debug)]
 struct Heard {
     sender: usize,
     bytes: Vec<u8>,
 }
 
-/// Who hears each port, by their places in the list of ports.
+/// Receivers of each port, by their index in the list of ports.
 pub type Hearers = Vec<Vec<usize>>;
 
-/// The hearers of a chain whose ports are listed drone by drone, upstream first: each port's is its neighbour's.
+/// Returns the receivers in a chain with two ports per drone, upstream first. Each port leads to its neighbour.
 pub fn chain(drones: usize) -> Hearers {
     let downstream_of = |drone: usize| drone.checked_sub(1).map(|before| 2 * before + 1);
     let upstream_of = |drone: usize| (drone < drones).then_some(2 * drone);
@@ -49,7 +49,7 @@ pub fn chain(drones: usize) -> Hearers {
         .collect()
 }
 
-/// The hearers of one radio channel, a port for each drone: everybody but the sender within `range` drones.
+/// Returns the receivers on a radio channel with one port per drone: all others within `range` drones.
 pub fn radio(drones: usize, range: usize) -> Hearers {
     (0..drones)
         .map(|sender| {
@@ -64,7 +64,7 @@ impl Network {
     /// Connects `ports` through `medium`.
     ///
     /// # Errors
-    /// When a socket cannot be shared between two threads.
+    /// A socket can not be shared between two threads.
     pub fn connect(
         ports: Vec<UnixStream>,
         hearers: Hearers,
@@ -87,7 +87,7 @@ impl Network {
         })
     }
 
-    /// What has been done to frames so far.
+    /// Returns the counters of injected faults.
     pub fn injected(&self) -> Injected {
         *self.injected.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -105,7 +105,7 @@ impl Drop for Network {
     }
 }
 
-/// Until the drone's end is closed.
+/// Forwards bytes from a port until the drone closes its end.
 fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     let mut buffer = [0; 1024];
     while let Ok(count @ 1..) = port.read(&mut buffer) {
@@ -116,7 +116,7 @@ fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     }
 }
 
-/// Whether a frame can be written without waiting.
+/// Returns true if a frame can be written without waiting.
 fn has_room(port: &UnixStream) -> bool {
     let mut asked = [PollFd::new(port, PollFlags::OUT)];
     poll(&mut asked, Some(&Timespec::default())).is_ok_and(|ready| ready > 0)
@@ -133,7 +133,7 @@ fn carry(
         let now = Instant::now();
         while let Some((receiver, bytes)) = medium.receive(now) {
             if let Some(port) = ports.get_mut(receiver).filter(|port| has_room(port)) {
-                // A drone that is switched off hears nothing, and that is all.
+                // A write to a drone that is switched off fails and is ignored.
                 _ = port.write_all(&bytes);
             }
         }
@@ -177,7 +177,7 @@ mod tests {
         }
         let medium = Medium::new(3, LinkSpec::default(), Faults::default(), 1, Instant::now());
         let _network = Network::connect(ports, radio(3, 2), medium).unwrap();
-        // More than a socket holds, and nobody reads the third.
+        // More bytes than a socket holds, while the third port is not read.
         let frame = [[1; 60].as_slice(), &[0]].concat();
         for sent in 0..2_000 {
             drones[0].write_all(&frame).unwrap();

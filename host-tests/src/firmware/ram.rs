@@ -1,34 +1,33 @@
-//! Two sectors of flash in RAM: bits only fall, but for an erase; places may be worn, and power may fail in the middle of anything.
+//! Mock of two flash sectors in RAM: writes only clear bits, places may be worn, and power may fail during any operation.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::journal::{BLANK, Flash};
 
-/// The sectors, what is wrong with them, and what was done to them.
+/// Sectors, their faults and the number of erases.
 #[derive(Clone, Debug)]
 pub struct Ram {
-    /// The words of each.
+    /// Words of each sector.
     pub sectors: [Vec<u32>; 2],
-    /// Words and erases until one is cut short, and nothing after it is done; for good without a number.
+    /// Number of word writes and erases until power fails during one; `None` for no failure.
     pub power: Option<usize>,
-    /// How many of the next writes fail.
+    /// Number of next writes that fail.
     pub worn: usize,
     /// Sectors erased so far.
     pub erased: Vec<usize>,
     rng: ChaCha8Rng,
 }
 
-/// Whether there is power for something.
 enum Power {
     On,
-    /// It fails in the middle: of the bits to change, those stay that chance has set here.
+    /// Power fails in the middle: only a random part of the bits changes.
     Fails,
     Off,
 }
 
 impl Ram {
-    /// Two blank sectors of so many words.
+    /// Creates two blank sectors of `words` words each.
     pub fn blank(words: usize, seed: u64) -> Self {
         Self {
             sectors: [vec![BLANK; words], vec![BLANK; words]],
@@ -39,12 +38,12 @@ impl Ram {
         }
     }
 
-    /// Power is back for good; whether it had failed.
+    /// Restores the power for good; returns true if it had failed.
     pub fn switch_on(&mut self) -> bool {
         self.power.take() == Some(0)
     }
 
-    /// What stands there, as bytes.
+    /// Returns the content of both sectors as bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let words = self.sectors.iter().flatten();
         words.flat_map(|word| word.to_le_bytes()).collect()

@@ -1,13 +1,13 @@
-//! A clock for QEMU by which emulated drones live in real time, for peers that cannot live faster than that.
+//! Clock for QEMU that makes emulated drones run in real time, for peers that can not run faster.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The library that QEMU is to load first. The first call builds it, with the C compiler that links everything here.
+/// Returns the library that QEMU must preload. The first call builds it, with the C compiler.
 ///
 /// # Errors
-/// What the compiler has to say.
+/// The output of the compiler.
 pub fn library() -> Result<PathBuf, String> {
     static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     BUILT.get_or_init(build).clone()
@@ -16,7 +16,7 @@ pub fn library() -> Result<PathBuf, String> {
 fn build() -> Result<PathBuf, String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/emulated");
     std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
-    // Another process may be at it.
+    // Another process may be building it, too.
     let own = folder.join(format!("slow{}.so", std::process::id()));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/firmware/slow.c");
     let mut compiler = Command::new("cc");

@@ -35,7 +35,9 @@ impl Node {
             }
         }
         let placed = self.setpoint().is_some();
-        let leased = self.layers.lease.until().is_some_and(|until| until > now);
+        // A relay keeps its claim to its place while the next view is agreed on: a duplicate may have requested it.
+        let lease = &self.layers.lease;
+        let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
         let has_lease = placed && leased;
         if self.duplicate.hear(now, sender, has_lease, &settings) {
             self.layers.round.discard_place();

@@ -1,4 +1,4 @@
-//! What a board brings beside its ports.
+//! Hardware of a board besides its ports.
 
 use core::ops::Range;
 
@@ -6,34 +6,34 @@ use embedded_storage::nor_flash::NorFlash;
 use uav_relay_block::{Block, LEN};
 use uav_relay_chip::reset::Reset;
 
-/// The block, a seed, and a flash to keep things in.
+/// Configuration block, seed, reset cause and flash of a board.
 #[derive(Debug)]
 pub struct Board<F> {
-    /// The configuration block.
+    /// Configuration block.
     pub block: Block,
-    /// Differs from one board to the next, and better from one start to the next.
+    /// Seed that differs between boards, and if possible between starts.
     pub seed: u32,
-    /// The cause of the last reset.
+    /// Cause of the last reset.
     pub reset: Reset,
-    /// Where it keeps what has to survive a reboot. Without it a block with a key is refused, and what was said in votes forgotten.
+    /// Flash for persistent state. Without it a block with a key is refused, and votes are lost at a reboot.
     pub storage: Option<Storage<F>>,
 }
 
-/// A flash, and what is where in it: offsets of whole erase units that no image reaches.
+/// Flash and its layout: offsets of whole erase units that no image reaches.
 #[derive(Debug)]
 pub struct Storage<F> {
-    /// Its driver.
+    /// Driver of the flash.
     pub flash: F,
-    /// Where the configuration block begins.
+    /// Offset of the configuration block.
     pub block: u32,
-    /// The two sectors of the epoch.
+    /// Two sectors of the epoch.
     pub epochs: [Range<u32>; 2],
-    /// The two of what was said in votes. One is erased in flight when both are full: the smaller, the sooner that is done.
+    /// Two sectors of the votes. One is erased in flight when both are full; a smaller one takes less time.
     pub views: [Range<u32>; 2],
 }
 
 impl<F: NorFlash> Board<F> {
-    /// A board whose block is in the flash that it keeps things in; blank where it cannot be read.
+    /// Creates a board with a block in its flash; the block is blank if it can not be read.
     pub fn new(seed: u32, mut storage: Storage<F>) -> Self {
         let mut block = [0xFF; LEN];
         if storage.flash.read(storage.block, &mut block).is_err() {
@@ -47,7 +47,7 @@ impl<F: NorFlash> Board<F> {
         }
     }
 
-    /// The same, with the cause of the last reset.
+    /// Sets the cause of the last reset.
     #[must_use]
     pub fn reset_by(self, reset: Reset) -> Self {
         Self { reset, ..self }

@@ -1,4 +1,4 @@
-//! What a drone is by its configuration, whatever its ports are.
+//! Drone as defined by its configuration block, for either wiring.
 
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::GuardConfig;
@@ -19,10 +19,10 @@ use crate::board::{Board, Storage};
 use crate::log;
 use crate::votes::Votes;
 
-/// How far off its place a hovering drone may be reported, m.
+/// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Room for the relay and its field, which the stack would have to hold.
+/// Static storage of the relay and its field, to save stack.
 #[derive(Debug)]
 pub struct Room {
     field: config::Room,
@@ -30,7 +30,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// With nobody in it.
+    /// Creates empty storage.
     pub const fn new() -> Self {
         Self {
             field: config::EMPTY,
@@ -45,36 +45,32 @@ impl Default for Room {
     }
 }
 
-/// Why a drone takes no part.
+/// Reason why a drone takes no part.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Refused {
-    /// This is wrong with its block.
+    /// Invalid block.
     Block(ConfigError),
-    /// There is a key, and no flash to keep the epoch in.
+    /// Key without a flash for the epoch.
     NoFlash,
-    /// There is no epoch after the last one.
+    /// Last epoch already used.
     NoEpoch,
-    /// There are sites, and no port to an autopilot.
+    /// Sites without a port to an autopilot.
     NoAutopilot,
-    /// The sites make no line, or not the mission's.
+    /// Sites that form no line, or not the mission's.
     Course(CourseError),
-    /// The library was built without what the block asks for.
+    /// Feature that the block needs and this build lacks.
     Setup(SetupError),
 }
 
-/// The relay, what it has said, and the autopilot, if it is told where to fly.
 #[derive(Debug)]
 pub(crate) struct Drone<F> {
     pub(crate) relay: &'static mut Relay,
-    /// Where the board can keep them.
+    /// Votes, if the board has a flash.
     pub(crate) votes: Option<Votes<F>>,
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
-/// The drone of a board, its relay in `room`; `flies` tells whether there is a port to an autopilot.
-///
-/// # Errors
-/// Why it takes no part.
+/// Creates the drone of a board, with its relay in `room`. `flies` is true if there is a port to an autopilot.
 pub(crate) fn begin<F: NorFlash>(
     room: &'static mut Room,
     mut board: Board<F>,
@@ -96,12 +92,12 @@ pub(crate) fn begin<F: NorFlash>(
             let mut link = Autopilot::new(axis, pace, now);
             link.set_seed(board.seed);
             if let Some(key) = config::autopilot_key(&board.block) {
-                // Without a clock it takes the time from what it hears.
+                // Without a clock the link takes the time from received stamps.
                 link.sign(Signing::new(key, 0, Stamp::UNKNOWN, now));
                 log::signs_to_autopilot();
             }
             if board.reset == Reset::Watchdog {
-                // There is room for the first line.
+                // The empty queue has room for the line.
                 let _ = link.say("relay: restarted by its watchdog");
             }
             Some(AsyncAutopilot::new(link, ends))
@@ -115,7 +111,7 @@ pub(crate) fn begin<F: NorFlash>(
     let [probe_after, dead_after] = said.silence();
     let settings = Settings {
         auth,
-        // What it has in common with the others may change with an upload.
+        // A profile equal to the common one may change with an upload.
         profile: Some(said.profile).filter(|own| said.hold_altitude || *own != common),
         hold_altitude: said.hold_altitude,
         method: said.method,
@@ -143,7 +139,7 @@ pub(crate) fn begin<F: NorFlash>(
     })
 }
 
-/// What frames are signed with in this start, if they are.
+/// Returns the signing settings of this start, if the block has a key.
 fn sign<F: NorFlash>(board: &mut Board<F>) -> Result<Option<Auth>, Refused> {
     let Some(secret) = config::secret(&board.block).map_err(Refused::Block)? else {
         log::unsigned();

@@ -1,16 +1,17 @@
-//! The application of every board here: it reads the configuration block, makes the relay, runs its ports, and logs where to fly.
+//! Application of every board here: reads the configuration block, creates the relay, runs its ports, and logs events and
+//! setpoints.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`board`] | what a board brings beside its ports: its block, a seed, a flash |
-//! | [`drone`] | what a drone is by its block; why it takes no part |
-//! | `votes` | what the relay has said in votes, kept across a reboot |
-//! | `log` | what is logged |
-//! | this one | all of it together, for wires and for a radio |
+//! | [`board`] | hardware of a board besides its ports: block, seed, flash |
+//! | [`drone`] | drone as defined by its block; reasons why it takes no part |
+//! | `votes` | votes of the relay, persisted across a reboot |
+//! | `log` | log lines |
+//! | `lib.rs` | application for wires and for a radio |
 //!
-//! With a key in the block the relay signs, by an epoch in the board's flash that rises at every start. With sites in it an autopilot, a PX4 or
-//! ArduCopter on a port of its own, is told where to fly, and the guard keeps drones apart. What it has said in votes survives a reboot in
-//! flight. What it does not have: uploads that do, which `examples/stm32f405` has.
+//! With a key in the block the relay signs, with an epoch in the board's flash that increases at every start. With sites in the
+//! block it flies an autopilot, a PX4 or ArduCopter on a port of its own, and the guard keeps drones apart. Votes survive a
+//! reboot in flight. Uploads do not; `examples/stm32f405` has that.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -35,13 +36,13 @@ use uav_relay_chip::watchdog;
 use board::Board;
 use drone::{Drone, Refused, Room};
 
-/// Bits a second on every port, 8N1.
+/// Bit rate of every port, bit/s, 8N1.
 pub use uav_relay_block::BAUD;
 
-/// Bytes that the driver of a UART holds each way: 22 ms of them, where a call of the relay takes 3.
+/// Size of a UART driver's buffers, bytes: 22 ms, where a call of the relay takes 3 ms.
 pub const BUFFER: usize = 256;
 
-/// Embassy's clock.
+/// Clock of Embassy.
 #[derive(Clone, Copy, Debug)]
 pub struct EmbassyClock;
 
@@ -55,16 +56,16 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Bytes that the driver of an autopilot's UART holds of what comes in: it sends bursts.
+/// Size of the receive buffer of an autopilot's UART, bytes: it sends bursts.
 pub const BURST: usize = 512;
 
 /// Longest time between two feedings of the watchdog while the relay makes progress.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// A timer of the relay may be overdue for so long.
+/// Longest delay of a relay's timer with which the watchdog is fed.
 const LATE: uav_relay::Duration = uav_relay::Duration::from_millis(watchdog::LATE_MS);
 
-/// Calls `feed` every [`TURN`], for a board that takes no part: the watchdog restarts nobody whose configuration is refused.
+/// Calls `feed` every [`TURN`], so that the watchdog does not restart a board that takes no part.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -72,8 +73,9 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Calls `feed` every [`TURN`] while the relay's timers are served. It is a part of the task that serves ports and timers, so a turn of that task that
-/// does not end, a panic and a fault feed nobody.
+/// Calls `feed` every [`TURN`] while the relay's timers are served.
+///
+/// It runs in the task of ports and timers, so a hanging turn of that task, a panic or a fault ends the feeding.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     loop {
         let now = EmbassyClock.now();
@@ -85,11 +87,12 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     }
 }
 
-/// Flies the relay of `board` with a UART to each neighbour, given as reader and writer, and one to the autopilot if the board has one to
-/// spare. It never completes where it takes part, and calls `feed`, the watchdog's, every [`TURN`] while the relay makes progress.
+/// Flies the relay of `board` with a UART to each neighbour and, if `autopilot` is given, one to that.
+///
+/// It never completes if the drone takes part, and calls the watchdog's `feed` every [`TURN`] while the relay makes progress.
 ///
 /// # Errors
-/// Why it takes no part, which is logged.
+/// The reason why the drone takes no part, which is logged, too.
 pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read, AW: Write>(
     room: &'static mut Room,
     board: Board<F>,
@@ -114,10 +117,10 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
-/// The same with one UART to a radio that all relays share; `pin` is high while this one sends.
+/// Flies the relay with one UART to a radio shared by all relays; `pin` is high while this one sends.
 ///
 /// # Errors
-/// As [`fly`].
+/// Those of [`fly`].
 pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, AW: Write>(
     room: &'static mut Room,
     board: Board<F>,
@@ -149,7 +152,7 @@ fn begin<F: NorFlash>(
     drone::begin(room, board, wiring, flies, now).inspect_err(|why| log::refused(*why))
 }
 
-/// What runs beside the ports of the relay: the autopilot's, of a drone with sites, and the log.
+/// Runs the autopilot's port, for a drone with sites, and the log.
 async fn beside<R: Read, W: Write>(
     relay: &AsyncRelay<'_>,
     link: Option<&AsyncAutopilot>,

@@ -1,4 +1,4 @@
-//! What is logged.
+//! Log lines.
 
 use core::convert::Infallible;
 
@@ -12,7 +12,6 @@ use uav_relay_chip::reset::Reset;
 
 use crate::drone::Refused;
 
-/// The cause of the last reset.
 pub(crate) fn started(reset: Reset) {
     match reset {
         Reset::Watchdog => error!("started by the watchdog: the loop hung, or the clock stopped"),
@@ -33,7 +32,7 @@ pub(crate) fn unsigned() {
     warn!("no key: frames are not signed, and anybody can send some");
 }
 
-/// `kept` tells whether the epoch stands in the flash.
+/// Logs the signing epoch; `kept` is true if it was stored.
 pub(crate) fn signs(epoch: u32, kept: bool) {
     if kept {
         info!("frames are signed, epoch {}", epoch);
@@ -51,7 +50,7 @@ pub(crate) fn unguarded() {
     );
 }
 
-/// Where the autopilot is told to fly.
+/// Logs the line and the speed limit of the autopilot.
 pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
     info!(
         "the autopilot flies along {} m at {} m/s or less",
@@ -63,7 +62,7 @@ pub(crate) fn signs_to_autopilot() {
     info!("frames to the autopilot are signed, and only what is signed with its key counts");
 }
 
-/// What was said in the votes on views was kept before this start; `taken` tells whether the relay stands by it.
+/// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
 pub(crate) fn stands_by(taken: bool) {
     if taken {
         info!("what was said in the votes on views before holds");
@@ -72,7 +71,7 @@ pub(crate) fn stands_by(taken: bool) {
     }
 }
 
-/// What was said in the votes on views `kept` again, or not any more.
+/// Logs that storing the votes works again (`kept`) or fails.
 pub(crate) fn votes(kept: bool) {
     if kept {
         info!("what is said in the votes on views is kept again");
@@ -102,7 +101,7 @@ pub(crate) fn refused(why: Refused) {
     }
 }
 
-/// Logs what happens, and where to fly; has the operator's ground station show it, if there is an autopilot.
+/// Logs events and setpoints, and shows events on the operator's ground station, if any.
 pub(crate) async fn events(
     relay: &AsyncRelay<'_>,
     autopilot: Option<&AsyncAutopilot>,
@@ -125,7 +124,7 @@ pub(crate) async fn events(
     }
 }
 
-/// Logs what the link to the autopilot says.
+/// Logs the events of the autopilot link.
 pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
     loop {
         match link.next_event().await {

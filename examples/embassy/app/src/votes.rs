@@ -1,4 +1,4 @@
-//! What the relay has said in the votes on views, kept across a reboot in flight.
+//! Votes of the relay on views, persisted across a reboot in flight.
 
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::{Instant, Relay};
@@ -9,17 +9,17 @@ use uav_relay_kept::views::{Views, log as journal};
 use crate::board::Storage;
 use crate::log;
 
-/// What was said last, and the log that it is in.
+/// Votes of the relay, and their flash.
 #[derive(Debug)]
 pub(crate) struct Votes<F> {
     flash: Nor<F>,
-    /// The check sequence of the block: with another one a drone has forgotten what it said.
+    /// CRC of the block: with another block the votes are ignored.
     block: u32,
     said: Views,
 }
 
 impl<F: NorFlash> Votes<F> {
-    /// Has `relay`, which was just made, stand by what it said before this drone was switched off.
+    /// Restores the votes from before the reboot into a newly created `relay`.
     pub(crate) fn resume(
         storage: Storage<F>,
         block: &Block,
@@ -33,7 +33,7 @@ impl<F: NorFlash> Votes<F> {
         Self { flash, block, said }
     }
 
-    /// Writes down what `relay` has said, if that has changed. Called before anything is sent.
+    /// Stores the votes of `relay` if they have changed. Call it before each send.
     pub(crate) fn keep(&mut self, relay: &Relay) {
         let Self { flash, block, said } = self;
         if let Some(kept) = said.keep(relay, || journal(flash, *block)) {

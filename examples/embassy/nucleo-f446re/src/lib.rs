@@ -1,11 +1,11 @@
-//! The NUCLEO-F446RE: its flash, its seed, and its UARTs.
+//! Board support of the NUCLEO-F446RE: flash, seed and UARTs.
 //!
-//! | what | where |
+//! | function | resource |
 //! | --- | --- |
-//! | toward the transmitter, or the radio | USART1: TX PA9 (D8, CN10 pin 21), RX PA10 (D2, CN10 pin 33) |
-//! | toward the receiver | USART3: TX PC10 (CN7 pin 1), RX PC11 (CN7 pin 2) |
-//! | the autopilot, of a drone with sites | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
-//! | the radio's driver enable | PA8 (D7, CN10 pin 23): high while this relay sends |
+//! | neighbour toward the transmitter, or radio | USART1: TX PA9 (D8, CN10 pin 21), RX PA10 (D2, CN10 pin 33) |
+//! | neighbour toward the receiver | USART3: TX PC10 (CN7 pin 1), RX PC11 (CN7 pin 2) |
+//! | autopilot, for a drone with sites | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
+//! | driver enable of the radio | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
 //! | clock | PLL, 180 MHz, from the 8 MHz of the ST-LINK or from the HSI |
 //! | votes | sectors 1 and 2, of 16 KiB each |
@@ -13,8 +13,8 @@
 //! | image | sector 0, the vectors alone; sectors 5 and 6 |
 //! | configuration block | sector 7 |
 //!
-//! USART2 on PA2 and PA3 is left alone: solder bridges SB13 and SB14 lead both to the ST-LINK, whose virtual serial port it is, and none leads
-//! to D0 and D1.
+//! USART2 on PA2 and PA3 is not used: solder bridges SB13 and SB14 connect both pins to the ST-LINK's virtual serial port, and
+//! not to D0 and D1.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -39,7 +39,7 @@ use uav_relay_chip::reset::Reset;
 use uav_relay_chip::watchdog;
 
 bind_interrupts!(
-    /// Who handles which interrupt.
+    /// Interrupt handlers of the UARTs.
     pub struct Irqs {
         USART1 => BufferedInterruptHandler<USART1>;
         USART3 => BufferedInterruptHandler<USART3>;
@@ -47,8 +47,10 @@ bind_interrupts!(
     }
 );
 
-/// The chip with its watchdog started and its clocks set up, and the cause of the last reset. What the clock tree reaches is found out first, with
-/// bounded waits, since Embassy waits for good; should a clock stop in between, the watchdog restarts the chip.
+/// Starts the watchdog and the clocks; returns the peripherals and the cause of the last reset.
+///
+/// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
+/// between, the watchdog restarts the chip.
 pub fn init() -> (Peripherals, Reset) {
     let reset = Reset::take(&mut Chip);
     watchdog::start(&mut Chip);
@@ -66,7 +68,7 @@ pub fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// The same clocks for Embassy.
+/// Returns Embassy's settings for the probed clocks.
 fn tree(clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
     let (Some(source), Some(crystal)) = (clocks.pll, PLAN.crystal) else {
@@ -101,7 +103,7 @@ fn tree(clocks: Clocks) -> rcc::Config {
     config
 }
 
-/// The board. An erase stops its CPU: 0.25 s for 16 KiB, 0.55 s for 64 KiB, twice that at most.
+/// Creates the board. An erase stops its CPU: 0.25 s for 16 KiB, 0.55 s for 64 KiB, twice that at most.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     Board::new(
         seed(),
@@ -117,10 +119,10 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
 type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
 type Buffer = StaticCell<[u8; BUFFER]>;
 
-/// Reader and writer of USART1.
+/// Returns reader and writer of USART1.
 ///
 /// # Errors
-/// Where its clock does not give the baud rate.
+/// The UART's clock does not permit the baud rate.
 pub fn usart1(
     uart: Peri<'static, USART1>,
     tx: Peri<'static, PA9>,
@@ -132,10 +134,10 @@ pub fn usart1(
     halves(uart, tx, rx, sent, received)
 }
 
-/// Reader and writer of USART3.
+/// Returns reader and writer of USART3.
 ///
 /// # Errors
-/// Where its clock does not give the baud rate.
+/// The UART's clock does not permit the baud rate.
 pub fn usart3(
     uart: Peri<'static, USART3>,
     tx: Peri<'static, PC10>,
@@ -147,10 +149,10 @@ pub fn usart3(
     halves(uart, tx, rx, sent, received)
 }
 
-/// Reader and writer of USART6, to the autopilot.
+/// Returns reader and writer of USART6, to the autopilot.
 ///
 /// # Errors
-/// Where its clock does not give the baud rate.
+/// The UART's clock does not permit the baud rate.
 pub fn usart6(
     uart: Peri<'static, USART6>,
     tx: Peri<'static, PC6>,
@@ -178,10 +180,9 @@ where
     Ok((rx, tx))
 }
 
-/// Differs from one chip to the next: it has no random number generator.
+/// Returns a seed from the chip's unique number, because the chip has no random number generator.
 fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
-    // FNV-1a.
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
     words.into_iter().fold(0x811C_9DC5, step)
 }

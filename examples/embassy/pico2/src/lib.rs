@@ -1,14 +1,14 @@
-//! The Raspberry Pi Pico 2: its flash, its seed, and its UARTs.
+//! Board support of the Raspberry Pi Pico 2: flash, seed and UARTs.
 //!
-//! | what | where |
+//! | function | resource |
 //! | --- | --- |
-//! | toward the transmitter, or the radio | UART0: TX GP0, RX GP1 |
-//! | toward the receiver; beside a radio the autopilot, of a drone with sites | UART1: TX GP4, RX GP5 |
-//! | the radio's driver enable | GP2: high while this relay sends |
+//! | neighbour toward the transmitter, or radio | UART0: TX GP0, RX GP1 |
+//! | neighbour toward the receiver; with a radio the autopilot, for a drone with sites | UART1: TX GP4, RX GP5 |
+//! | driver enable of the radio | GP2: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | configuration block | the last 4 KiB of the flash |
-//! | epochs | 4 KiB twice before them |
-//! | votes | 16 KiB twice before those; an erase of 16 KiB stops the core for 0.2 s or so |
+//! | epochs | twice 4 KiB before the block |
+//! | votes | twice 16 KiB before the epochs; an erase of 16 KiB stops the core for 0.2 s or so |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -29,7 +29,7 @@ use static_cell::StaticCell;
 use uav_relay_chip::reset::Reset;
 
 bind_interrupts!(
-    /// Who handles which interrupt.
+    /// Interrupt handlers of the UARTs and the random number generator.
     pub struct Irqs {
         UART0_IRQ => BufferedInterruptHandler<UART0>;
         UART1_IRQ => BufferedInterruptHandler<UART1>;
@@ -37,17 +37,16 @@ bind_interrupts!(
     }
 );
 
-/// Bytes of the flash.
 const FLASH_SIZE: usize = 4 * 1024 * 1024;
 
-/// Its flash.
+/// Flash driver of the board.
 pub type BoardFlash = Flash<'static, FLASH, Blocking, FLASH_SIZE>;
 
-/// The watchdog, which was started: it waits as long as those of the other boards, and stands still while a debugger has stopped the core.
+/// Started watchdog, with the timeout of the other boards. It pauses while a debugger halts the core.
 pub struct Guard(Watchdog);
 
 impl Guard {
-    /// Starts it; returns the cause of the last reset, too.
+    /// Starts the watchdog; returns the cause of the last reset, too.
     pub fn start(watchdog: Peri<'static, WATCHDOG>) -> (Self, Reset) {
         let mut watchdog = Watchdog::new(watchdog);
         let reset = match watchdog.reset_reason() {
@@ -66,10 +65,9 @@ impl Guard {
     }
 }
 
-/// Time from the last feeding to the reset.
 const TIMEOUT: Duration = Duration::from_millis(6_000);
 
-/// The board, with a seed from its random number generator.
+/// Creates the board, with a seed from its random number generator.
 pub fn board(flash: Peri<'static, FLASH>, trng: Peri<'static, TRNG>) -> Board<BoardFlash> {
     Board::new(
         seed(trng),
@@ -82,18 +80,18 @@ pub fn board(flash: Peri<'static, FLASH>, trng: Peri<'static, TRNG>) -> Board<Bo
     )
 }
 
-/// Differs from one start to the next.
+/// Returns a random seed, which differs between starts.
 fn seed(trng: Peri<'_, TRNG>) -> u32 {
     Trng::new(trng, Irqs, embassy_rp::trng::Config::default()).blocking_next_u32()
 }
 
-/// Reader and writer.
+/// Reader and writer of a UART.
 pub type Port = (BufferedUartRx, BufferedUartTx);
 
-/// With a UART to each neighbour there is none left.
+/// Absent autopilot port: both UARTs lead to neighbours.
 pub const NO_AUTOPILOT: Option<Port> = None;
 
-/// Reader and writer of UART0.
+/// Returns reader and writer of UART0.
 pub fn uart0(
     uart: Peri<'static, UART0>,
     tx: Peri<'static, embassy_rp::peripherals::PIN_0>,
@@ -105,7 +103,7 @@ pub fn uart0(
     (rx, tx)
 }
 
-/// Reader and writer of UART1.
+/// Returns reader and writer of UART1.
 pub fn uart1(
     uart: Peri<'static, UART1>,
     tx: Peri<'static, embassy_rp::peripherals::PIN_4>,

@@ -1,14 +1,14 @@
-//! The STM32F405, on the pins of the other firmware: its flash, its seed, and its UARTs.
+//! Board support of the STM32F405, on the pins of `examples/stm32f405`: flash, seed and UARTs.
 //!
-//! | what | where |
+//! | function | resource |
 //! | --- | --- |
-//! | toward the transmitter, or the radio | USART2: TX PA2, RX PA3 |
-//! | toward the receiver | USART3: TX PB10, RX PB11 |
-//! | the autopilot, of a drone with sites | USART1: TX PA9, RX PA10 |
-//! | the radio's driver enable | PA1: high while this relay sends |
+//! | neighbour toward the transmitter, or radio | USART2: TX PA2, RX PA3 |
+//! | neighbour toward the receiver | USART3: TX PB10, RX PB11 |
+//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
+//! | driver enable of the radio | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI |
-//! | votes, epochs, configuration block | the sectors of the other firmware |
+//! | votes, epochs, configuration block | sectors as in `examples/stm32f405` |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -37,7 +37,7 @@ use uav_relay_chip::watchdog;
 use uav_relay_kept::{epoch, views};
 
 bind_interrupts!(
-    /// Who handles which interrupt.
+    /// Interrupt handlers of the UARTs.
     pub struct Irqs {
         USART2 => BufferedInterruptHandler<USART2>;
         USART3 => BufferedInterruptHandler<USART3>;
@@ -45,13 +45,14 @@ bind_interrupts!(
     }
 );
 
-/// Where the flash begins.
 const FLASH_START: u32 = 0x0800_0000;
 
 const KIB: u32 = 1024;
 
-/// The chip with its watchdog started and its clocks set up, and the cause of the last reset. What the clock tree reaches is found out first, with
-/// bounded waits, since Embassy waits for good; should a clock stop in between, the watchdog restarts the chip.
+/// Starts the watchdog and the clocks; returns the peripherals and the cause of the last reset.
+///
+/// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
+/// between, the watchdog restarts the chip.
 pub fn init() -> (Peripherals, Reset) {
     let reset = Reset::take(&mut Chip);
     watchdog::start(&mut Chip);
@@ -69,7 +70,7 @@ pub fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// The same clocks for Embassy.
+/// Returns Embassy's settings for the probed clocks.
 fn tree(clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
     let (Some(source), Some(crystal)) = (clocks.pll, PLAN.crystal) else {
@@ -99,7 +100,7 @@ fn tree(clocks: Clocks) -> rcc::Config {
     config
 }
 
-/// The board. An erase of a sector of the epoch stops its CPU for 1 s, for 2 s at most.
+/// Creates the board. An erase of a sector of the epoch stops its CPU for 1 s, at most 2 s.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     Board::new(
         seed(),
@@ -112,7 +113,6 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     )
 }
 
-/// The offsets of a sector at that address.
 const fn sector(address: u32, bytes: u32) -> Range<u32> {
     let start = address - FLASH_START;
     start..start + bytes
@@ -121,10 +121,10 @@ const fn sector(address: u32, bytes: u32) -> Range<u32> {
 type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
 type Buffer = StaticCell<[u8; BUFFER]>;
 
-/// Reader and writer of USART2.
+/// Returns reader and writer of USART2.
 ///
 /// # Errors
-/// Where its clock does not give the baud rate.
+/// The UART's clock does not permit the baud rate.
 pub fn usart2(
     uart: Peri<'static, USART2>,
     tx: Peri<'static, PA2>,
@@ -136,10 +136,10 @@ pub fn usart2(
     halves(uart, tx, rx, sent, received)
 }
 
-/// Reader and writer of USART3.
+/// Returns reader and writer of USART3.
 ///
 /// # Errors
-/// Where its clock does not give the baud rate.
+/// The UART's clock does not permit the baud rate.
 pub fn usart3(
     uart: Peri<'static, USART3>,
     tx: Peri<'static, PB10>,
@@ -151,10 +151,10 @@ pub fn usart3(
     halves(uart, tx, rx, sent, received)
 }
 
-/// Reader and writer of USART1, to the autopilot.
+/// Returns reader and writer of USART1, to the autopilot.
 ///
 /// # Errors
-/// Where its clock does not give the baud rate.
+/// The UART's clock does not permit the baud rate.
 pub fn usart1(
     uart: Peri<'static, USART1>,
     tx: Peri<'static, PA9>,
@@ -182,10 +182,9 @@ where
     Ok((rx, tx))
 }
 
-/// Differs from one chip to the next: its random number generator wants the PLL, which this board leaves alone.
+/// Returns a seed from the chip's unique number. The random number generator's clock, PLLQ, is not set up here.
 fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
-    // FNV-1a.
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
     words.into_iter().fold(0x811C_9DC5, step)
 }

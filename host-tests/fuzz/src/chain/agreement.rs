@@ -1,20 +1,19 @@
-//! From any state to one agreement of all, once nothing is lost any more.
+//! Agreement of all relays from any state, after faults have ended.
 
 use uav_relay::{Phase, Schedule, ViewId};
 
 use super::{Chain, Member};
 
-/// Wake-ups and deliveries that a chain may take to agree once nothing is lost any more: 24 passes of 4 relays, each in 65
-/// portions, and before that a few minutes of probation, with a few dozen
-/// hellos a second.
+/// Maximum number of wake-ups and deliveries until agreement. It covers 24 passes of 4 relays, each in 65 portions, after a few
+/// minutes of probation with a few dozen hellos a second.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
-    /// From now on nothing is lost: all of the chain must agree in one view, or its leader find that it cannot.
+    /// Ends all faults: the whole chain must agree in one view, or its leader find that it can not.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {
-            // Ten thousand sweeps are a schedule too, but take too long here.
+            // A fixed-step schedule takes ten thousand sweeps, too many here.
             return;
         }
         for member in &mut self.members {
@@ -58,7 +57,7 @@ fn phase(member: &Member) -> Phase {
     member.watched.relay().phase()
 }
 
-/// Phase, view, place in it, its size, and neighbours: what a failure shows.
+/// Returns phase, view, index, size of the view and neighbours, for the message of a failure.
 fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();

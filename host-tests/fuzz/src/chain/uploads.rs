@@ -1,11 +1,10 @@
-//! A newer mission for the chain.
+//! Upload of a newer mission.
 
 use uav_relay::{Geodetic, Interference, Interferer, MissionConfig, Sites, Upload};
 
 use super::super::input::Input;
 use super::Chain;
 
-/// A kilometre apart.
 const SITES: Option<Sites> = Some(Sites {
     tx: Geodetic {
         lat_e7: 474_000_000,
@@ -20,7 +19,7 @@ const SITES: Option<Sites> = Some(Sites {
 });
 
 impl Chain {
-    /// A relay's firmware hands it a mission that is newer than all before, with the interferer somewhere else.
+    /// Uploads a mission to a relay, newer than all before, with another interferer.
     pub(super) fn upload(&mut self, at: usize, input: &mut Input<'_>) {
         let config = *self.mission.config();
         let Some(interferer) = self.mission.interferer() else {
@@ -39,7 +38,7 @@ impl Chain {
         let Ok(upload) = Upload::new(&self.mission, self.version, config) else {
             return;
         };
-        // One time in four between sites of its own, if it is as long as these are apart.
+        // One time in four it has sites of its own, if its length is that between them.
         let sited = SITES.filter(|_| moved.x_m.to_bits() % 4 == 3);
         let upload = sited
             .and_then(|sites| upload.with_sites(sites).ok())

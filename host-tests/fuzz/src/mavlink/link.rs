@@ -1,4 +1,4 @@
-//! The link to an autopilot that says anything, of a relay that wants anything.
+//! Autopilot link with arbitrary bytes and arbitrary calls.
 
 use uav_relay::Geodetic;
 use uav_relay::flight::autopilot::carrot::Pace;
@@ -17,36 +17,31 @@ use super::wire::{
 use crate::heap::without;
 use crate::input::Input;
 
-/// Operations in one run.
 const MOST_OPERATIONS: usize = 256;
 
-/// Frames that may be due at once: a heartbeat, three requests, an answer, a target, three lines, four numbers, and as many again.
+/// Maximum number of frames due at once. Twice a heartbeat, three requests, an answer, a target, three lines, four numbers.
 const MOST_FRAMES: usize = 26;
 
-/// How far from the line a target may be, m: 5 km, and what a flat earth is off there.
+/// Maximum distance of a target from the line, m: 5 km, and the error of a flat earth there.
 const AROUND_M: f64 = 5_040.0;
 
-/// The transmitter's site and the receiver's: degrees, and m above the sea.
+/// Sites of transmitter and receiver: degrees, and m above the sea.
 const TX: [f64; 3] = [47.40, 8.54, 420.0];
 const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
-/// Where the receiver may move to.
 const MOVED: [f64; 3] = [47.408, 8.556, 440.0];
 
-/// A degree of latitude and one of longitude there, m.
+/// Lengths of a degree of latitude and of longitude there, m.
 const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
 
 struct Link {
     autopilot: Autopilot,
-    /// The other end, where frames are signed.
     peer: Option<Peer>,
     axis: Axis,
     rx: [f64; 3],
     now: Instant,
-    /// When the autopilot was switched on.
     began: Instant,
     kind: Option<Kind>,
-    /// The last target that was sent.
     told: [i32; 2],
 }
 
@@ -55,7 +50,7 @@ fn line_to(rx: [f64; 3]) -> Option<Axis> {
     Axis::try_new(site(TX)?, site(rx)?).ok()
 }
 
-/// Reads what is left as what is said to a link.
+/// Reads the rest of the input as operations on a link.
 pub(super) fn operate(input: &mut Input<'_>, signs: bool) {
     let Some(mut link) = Link::new(input, signs) else {
         return;
@@ -172,7 +167,7 @@ impl Link {
                     peer.set_clock(input);
                 }
             }
-            // The own clock jumps, by up to 50 days.
+            // The link's own clock jumps by up to 50 days.
             17 => self.now = self.now + Duration::from_millis(u64::from(input.long())),
             _ => {
                 let frame = frame(ACK, [1, 1], &sized(input.piece().to_vec(), 10), 0);
@@ -181,7 +176,7 @@ impl Link {
         }
     }
 
-    /// A frame comes, signed as it is chosen where frames are.
+    /// Delivers a frame, signed as chosen by the input if the link signs.
     fn says(&mut self, input: &mut Input<'_>, frame: &[u8]) {
         match &mut self.peer {
             Some(peer) => {
@@ -192,7 +187,7 @@ impl Link {
         }
     }
 
-    /// Bytes in one piece, and in pieces of two lengths in turn: the link is the same after either.
+    /// Delivers bytes in one piece, and to a clone in pieces of two alternating lengths. The results must be equal.
     fn hear(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
         without(|| self.autopilot.handle_bytes(self.now, bytes));
@@ -225,7 +220,7 @@ impl Link {
         }
     }
 
-    /// Of a PX4, an ArduCopter or something else, in any mode.
+    /// Delivers a heartbeat of a PX4, an ArduCopter or another system, in any mode.
     fn heartbeat(&mut self, input: &mut Input<'_>) {
         let autopilot = match input.below(8) {
             0..=3 => 12,
@@ -245,7 +240,7 @@ impl Link {
         self.says(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// A relay is lost, and an operator clears it, or others.
+    /// Reports a lost relay to the link, and delivers an operator's command to clear it or others.
     fn clears(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
@@ -272,7 +267,7 @@ impl Link {
         self.says(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
-    /// Where the drone is, said late or by a clock that is off.
+    /// Delivers a position, perhaps delayed or of a wrong clock.
     fn position(&mut self, input: &mut Input<'_>, place: Placement) {
         let clock = input.byte();
         let Some(point) = self.axis.point(place) else {
@@ -294,7 +289,7 @@ impl Link {
         );
     }
 
-    /// What a firmware's loop does, and a look at all that comes of it.
+    /// Runs a firmware's loop once and checks its output.
     fn settle(&mut self) {
         without(|| self.autopilot.handle_timeout(self.now));
         let mut frames = 0;
@@ -303,7 +298,7 @@ impl Link {
                 Some(peer) => {
                     assert_eq!(frame.get(2), Some(&1));
                     let unsigned = peer.sent(self.now, &frame);
-                    // Its checksum covers the flag.
+                    // The checksum covers the signed flag.
                     self.look_at(&unsigned, 1);
                 }
                 None => self.look_at(&frame, 0),
@@ -332,7 +327,7 @@ impl Link {
                 AutopilotEvent::LostCleared { .. } | AutopilotEvent::ClearRefused { .. }
             );
             events += 1;
-            // Eight, and four kinds of mistrust.
+            // Eight events, and four kinds of mistrust.
             assert!(events <= 12, "it never ends");
         }
         assert!(tells || cleared.is_none(), "cleared without a word");
@@ -344,7 +339,7 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// A frame without its signature; `covered_flags` are those that its checksum is of.
+    /// Checks a frame without its signature; `covered_flags` are the flags in its checksum.
     fn look_at(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()
@@ -375,7 +370,7 @@ impl Link {
         }
     }
 
-    /// Finite, near the line, no faster than allowed, and of a state that sends one.
+    /// Checks a target: finite, near the line, within the speed limit, and sent in a state that permits it.
     fn look_at_target(&mut self, payload: &[u8]) {
         let state = self.autopilot.state();
         let may = matches!(state, State::Engaged | State::Blind)
@@ -393,7 +388,7 @@ impl Link {
             velocity.iter().all(|part| part.abs() <= 20.5),
             "{velocity:?}"
         );
-        // On a flat earth.
+        // Computed on a flat earth.
         let [north_m, east_m] = DEGREE_M;
         let toward =
             |[to_lat, to_lon, _]: [f64; 3]| [(to_lat - TX[0]) * north_m, (to_lon - TX[1]) * east_m];
@@ -411,7 +406,6 @@ impl Link {
     }
 }
 
-/// A place near the line.
 fn near(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.even(-5_100.0, 6_500.0),
@@ -420,7 +414,7 @@ fn near(input: &mut Input<'_>) -> Placement {
     }
 }
 
-/// A place near the line, and now and then one that is none.
+/// Reads a position near the line, now and then with an arbitrary number.
 fn any(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, 1_400.0)),

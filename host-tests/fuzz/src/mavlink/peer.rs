@@ -1,5 +1,5 @@
-//! An autopilot that signs what it says, somebody who does not have its key, and what a link with a key has to make of either, by the
-//! definition of MAVLink's signatures.
+//! Signing autopilot, an attacker without its key, and the expected reaction of a link with a key, by the definition of MAVLink's
+//! signatures.
 
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;
@@ -12,10 +12,10 @@ use crate::input::Input;
 const KEY: [u8; 32] = *b"the key is the autopilot's alone";
 const OTHER: [u8; 32] = *b"somebody without it has this one";
 
-/// Bytes behind the checksum: link, stamp, tag.
+/// Length of a signature, bytes: link, stamp, tag.
 const SIGNATURE: usize = 13;
 
-/// The last stamp, a minute, and so many senders are remembered.
+/// Largest stamp, a minute in stamps, and the number of senders remembered.
 const LAST: u64 = (1 << 48) - 1;
 const MINUTE: u64 = 6_000_000;
 const SENDERS: usize = 8;
@@ -24,30 +24,27 @@ const SENDERS: usize = 8;
 const BEGIN_US: u64 = 1_420_070_400_000_000;
 const TODAY: u64 = 37_527_840_000_000;
 
-/// Frames that are kept, to be played again.
 const HISTORY: usize = 32;
 
-/// A sender: system, component, link; and the stamp of its last frame that was taken.
+/// Sender (system, component, link) and the stamp of its last accepted frame.
 type Sender = ((u8, u8, u8), u64);
 
-/// Both ends of a link whose frames are signed.
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// The autopilot's stamp, and what it has signed.
+    /// Current stamp of the autopilot, and its signed frames.
     stamp: u64,
     history: Vec<Vec<u8>>,
-    /// What the link knows: the time by stamps at a time of its clock, whom it has heard, and what it last signed.
+    /// State of the link: the time in stamps at a time of its clock, the known senders, the last own stamp.
     time: u64,
     at: Instant,
     senders: Vec<Sender>,
     sent: u64,
     parser: Parser,
-    /// Frames that it has to refuse.
     pub(super) refused: u32,
 }
 
 impl Peer {
-    /// Both, and what the link signs with: it has the time or has not.
+    /// Creates both ends, and the signing settings of the link, which may know the time or not.
     pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
         let time = match input.below(4) {
             0 => 0,
@@ -71,11 +68,12 @@ impl Peer {
         (peer, Signing::new(KEY, 3, stamp, now))
     }
 
-    /// The frame as it comes: signed mostly, and else not, by somebody else, with an old stamp, hurt, or one of before in its place.
+    /// Signs a frame, mostly correctly. Otherwise leaves it unsigned, uses another key or an old stamp, damages it, or replays
+    /// one.
     pub(super) fn signs(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {
-            // As many links as one more than are remembered.
+            // Ten links, more than the senders remembered.
             160..192 => (KEY, how % 10),
             192..208 => (OTHER, 0),
             208..216 => return frame.to_vec(),
@@ -109,13 +107,12 @@ impl Peer {
         frame
     }
 
-    /// A frame that was signed before.
     pub(super) fn before(&self, input: &mut Input<'_>) -> Option<Vec<u8>> {
         let at = usize::from(input.byte()) % self.history.len().max(1);
         self.history.get(at).cloned()
     }
 
-    /// The autopilot's clock is set: by a day, to the link's, to the end of all stamps.
+    /// Sets the autopilot's clock: by a day, to the link's time, or to the largest stamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
         const DAY: u64 = 8_640_000_000;
         self.stamp = match input.below(6) {
@@ -128,7 +125,7 @@ impl Peer {
         };
     }
 
-    /// The link hears those bytes: counts what it has to refuse.
+    /// Processes bytes received by the link, and counts the frames that it must reject.
     pub(super) fn heard(&mut self, now: Instant, bytes: &[u8]) {
         let mut parser = self.parser.clone();
         for &byte in bytes {
@@ -142,10 +139,9 @@ impl Peer {
         self.parser = parser;
     }
 
-    /// Whether a frame counts.
     fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         match received.message {
-            // Nothing of use, or of a radio.
+            // Unknown messages, and those of a radio, need no signature.
             None | Some(Incoming::RadioStatus { .. }) => return true,
             Some(_) => {}
         }
@@ -167,7 +163,7 @@ impl Peer {
         if frame != sealed(KEY, unsigned, *link, stamp) || !is_new {
             return false;
         }
-        // Of several whose last stamp is the same the one that was met first goes: where it stood the new one stands.
+        // With equal stamps the sender known longest is replaced, and the new one takes its place.
         let oldest = || {
             let places = (0..).zip(&self.senders);
             let oldest = places.min_by_key(|(_, (_, last))| *last);
@@ -185,17 +181,17 @@ impl Peer {
         true
     }
 
-    /// The time goes on: by 71 minutes at most from one look at it to the next.
+    /// Advances the time, by at most 71 minutes between two calls.
     fn advance(&mut self, now: Instant) {
         let passed = now.since(self.at).as_micros().min(u64::from(u32::MAX)) / 10;
         self.time = self.time.saturating_add(passed).min(LAST);
         self.at = self.at + uav_relay::Duration::from_micros(10 * passed);
     }
 
-    /// Looks at what the link has sent at `now`, and gives the same without its signature.
+    /// Checks a frame sent by the link at `now`; returns it without its signature.
     ///
     /// # Panics
-    /// Where it is not signed as it should be.
+    /// The signature is wrong.
     pub(super) fn sent(&mut self, now: Instant, frame: &[u8]) -> Vec<u8> {
         self.advance(now);
         let Some((unsigned, [link, stamp @ ..])) = frame.split_last_chunk::<SIGNATURE>() else {
@@ -208,7 +204,7 @@ impl Peer {
             stamp >= self.time || stamp == LAST,
             "{stamp} is of the past"
         );
-        // No faster than one of them for each frame, where its own clock stands.
+        // While its own clock stops, a stamp advances by at most one for each frame.
         assert!(
             stamp <= self.time.max(self.sent + 1),
             "{stamp} is of the future"
@@ -230,7 +226,7 @@ fn read(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(stamp)
 }
 
-/// A frame of an autopilot that does not sign, signed: the flag that says so is covered by its checksum.
+/// Signs an unsigned frame; its checksum covers the signed flag.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);
@@ -244,7 +240,7 @@ fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     sealed(key, &frame, link, stamp)
 }
 
-/// A frame with its checksum, and behind that link, stamp and tag.
+/// Appends link, stamp and tag to a frame with its checksum.
 fn sealed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.push(link);

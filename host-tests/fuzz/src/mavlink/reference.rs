@@ -1,10 +1,9 @@
-//! Frames in a stream by their definition: the earliest beginning that holds, and on behind its end.
+//! Reference parser by the definition of frames: the earliest valid frame, then the search continues behind it.
 
 use uav_relay::flight::mavlink::table;
 
 use super::wire::checksum;
 
-/// A frame that holds.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub(super) at: usize,
@@ -17,9 +16,8 @@ pub(super) struct Frame {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reference {
     pub(super) frames: Vec<Frame>,
-    /// Beginnings of a message that is known which do not hold.
+    /// Number of invalid frames with the header of a known message.
     pub(super) broken: usize,
-    /// Checksums that had to be computed.
     pub(super) checksums: usize,
 }
 
@@ -45,7 +43,7 @@ impl Reference {
             let checked = at + 10 + usize::from(length);
             let end = checked + 2 + if flags == 1 { 13 } else { 0 };
             let Some(frame) = bytes.get(at..end) else {
-                // What is there may become a frame, and nothing behind it is looked at until then.
+                // An incomplete frame may still become valid; nothing behind it is examined until then.
                 break;
             };
             all.checksums += 1;

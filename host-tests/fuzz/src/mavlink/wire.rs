@@ -1,8 +1,8 @@
-//! Frames and streams of them, written without the crate's codec.
+//! Frames and streams, written without the crate's codec.
 
 use crate::input::Input;
 
-/// CRC-16/MCRF4XX bit by bit, over `covered` and one byte more.
+/// Returns the CRC-16/MCRF4XX over `covered` and one byte more, computed bit by bit.
 pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     covered.iter().chain([&extra]).fold(0xFFFF, |crc, &byte| {
         (0..8).fold(crc ^ u16::from(byte), |crc, _| {
@@ -11,7 +11,7 @@ pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     })
 }
 
-/// A message: its number, the byte that is added to its checksum, and its length.
+/// Message type: number, extra byte of its checksum, and length.
 pub(super) type Kind = (u32, u8, usize);
 
 pub(super) const HEARTBEAT: Kind = (0, 50, 9);
@@ -26,14 +26,13 @@ pub(super) const TIMESYNC: Kind = (111, 34, 16);
 pub(super) const TEXT: Kind = (253, 83, 54);
 pub(super) const VALUE: Kind = (251, 170, 18);
 
-/// The number of the message in a frame.
 pub(super) fn id(frame: &[u8]) -> u32 {
     let id = frame.get(7..).and_then(<[u8]>::first_chunk);
     let [a, b, c] = id.copied().unwrap_or_default();
     u32::from_le_bytes([a, b, c, 0])
 }
 
-/// The byte that is added to the checksum of such a message; 0 for one that is not known here.
+/// Returns the extra checksum byte of a message; 0 for an unknown one.
 pub(super) fn extra(id: u32) -> u8 {
     let known = [
         HEARTBEAT,
@@ -54,10 +53,9 @@ pub(super) fn extra(id: u32) -> u8 {
         .map_or(0, |(_, extra, _)| extra)
 }
 
-/// What the link may send.
 pub(super) const SENT: [Kind; 7] = [HEARTBEAT, COMMAND, ACK, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
-/// A frame; zeros at the end of its payload are left out, but for the first byte.
+/// Builds a frame; trailing zeros of its payload are omitted, except in its first byte.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {
     let (id, extra, _) = kind;
     let zeros = payload.iter().rev().take_while(|byte| **byte == 0).count();
@@ -76,16 +74,15 @@ pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec
     frame
 }
 
-/// Where a whole frame was put.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     pub(super) at: usize,
 }
 
-/// Parts of a stream, at most: it is read a byte at a time, twice.
+/// Maximum number of parts of a stream, which is read twice, byte by byte.
 const MOST_PARTS: usize = 64;
 
-/// Noise, whole frames, frames with a byte changed or cut off, and in the end as many zeros as a false start waits for.
+/// Builds a stream of noise, intact, damaged and truncated frames. Zeros at its end complete any false start.
 pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
     let (mut bytes, mut placed) = (Vec::new(), Vec::new());
     for _ in 0..MOST_PARTS {

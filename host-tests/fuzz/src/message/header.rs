@@ -1,20 +1,20 @@
-//! What stands around a body.
+//! Frame around a body.
 
 use uav_relay::CRC_32C;
 
-/// Who sends a frame to whom, as words: what stands in the top bits of an address goes on the wire too.
+/// Addresses of a frame as whole words, because the top bits of an address go on the wire, too.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Header {
-    /// The network.
+    /// Network number.
     pub network: u16,
-    /// The sender, and above it the version less 1.
+    /// Sender, and above it the version less 1.
     pub sender: u16,
-    /// The destination, and above it flags.
+    /// Destination, and above it flags.
     pub destination: u16,
 }
 
 impl Header {
-    /// The bytes of a frame before the tag and the check sequence, with some flags more.
+    /// Returns the bytes of a frame before the tag and the CRC, with additional flags.
     pub fn before(self, flags: u16, counter: u32, body: &[u8]) -> Vec<u8> {
         let mut plain = Vec::with_capacity(22 + body.len());
         for word in [
@@ -29,7 +29,7 @@ impl Header {
         plain
     }
 
-    /// A frame without a tag, before COBS.
+    /// Returns a frame without a tag, before COBS.
     pub fn unsigned(self, body: &[u8]) -> Vec<u8> {
         let mut plain = self.before(0, 0, body);
         sealed(&mut plain);
@@ -37,7 +37,7 @@ impl Header {
     }
 }
 
-/// Adds the check sequence.
+/// Appends the CRC.
 pub fn sealed(plain: &mut Vec<u8>) {
     plain.extend_from_slice(&CRC_32C.checksum(plain).to_le_bytes());
 }

@@ -1,9 +1,9 @@
-//! What mad neighbours hear and believe: sums of places as relays would make them, or any eighteen numbers.
+//! Sensing messages of a malicious neighbour: sums as relays would compute them, or any eighteen numbers.
 
 use super::parts::Body;
 use crate::input::Input;
 
-/// Numbers that a pass adds up.
+/// Number of sums that a sensing pass collects.
 const SUMS: usize = 18;
 
 impl Body<'_, '_> {
@@ -39,7 +39,7 @@ impl Body<'_, '_> {
         self.float(|input| input.scaled(1e-30, 1e6));
     }
 
-    /// What an end hears, W, or that it has not said.
+    /// Appends the power received by an end of the chain, W, or 0 for none reported.
     fn level_or_none(&mut self) {
         if self.input.flag() {
             self.float(|input| input.scaled(1e-30, 1e6));
@@ -49,7 +49,7 @@ impl Body<'_, '_> {
     }
 }
 
-/// The sums over up to eight places where v is that of one source, or anything.
+/// Returns the sums over up to eight positions, where v is that of a single source, or arbitrary.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {
     let of_one = input.flag();
     let unit = input.scaled(1e-6, 1e12);

@@ -1,15 +1,15 @@
-//! Offers of mad neighbours: the numbers of a whole mission, most of them in range, some of them the relay's own.
+//! Offers of a malicious neighbour: the numbers of a whole mission, most of them in range, some equal to the relay's.
 
 use super::parts::Body;
 
-/// What the paper's scenario has after the number of relays and before the interferer: D and the least separation in m, power
-/// of Tx in W, common altitude in m, common power in W.
+/// Numbers of the paper's scenario between the number of relays and the interferer. They are distance and minimum separation, m,
+/// power of Tx, W, common altitude, m, common power, W.
 const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 
-/// The paper's path-loss factors, with and without line of sight.
+/// Path-loss factors of the paper, with and without line of sight.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
-/// Tx and Rx 1000 m apart, to the millimetre.
+/// Sites of Tx and Rx, 1000 m apart to the millimetre.
 const SITES: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -30,13 +30,12 @@ impl Body<'_, '_> {
             self.wild();
         }
         let choice = self.input.byte();
-        // Mostly without noise.
         self.reals(&[if choice % 16 == 7 { 1e-12 } else { 0.0 }]);
         self.sites(choice);
         self.answer(choice);
     }
 
-    /// The number of the last hello that the relay said, mostly.
+    /// Appends the nonce that the offer answers: mostly that of the relay's last hello.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
             0..240 => self.known.asked,
@@ -45,7 +44,7 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// None mostly; two that are a kilometre apart, which is what the paper has; or any numbers at all.
+    /// Appends sites: mostly none, else two a kilometre apart as in the paper, or arbitrary numbers.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -57,7 +56,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// The version that the relay holds, one of the next, or any.
+    /// Appends the version held by the relay, one of the next three, or any.
     fn version(&mut self) {
         let held = self.known.held.version;
         let version = match self.input.byte() {
@@ -67,7 +66,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// As many relays as the mission has, or any number.
+    /// Appends the mission's number of relays, or any number.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.known.relays,
@@ -76,7 +75,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// The paper's mission with the interferer somewhere else, any altitudes or one, and room to the side or none.
+    /// Appends the paper's mission with another interferer, perhaps with altitudes and lateral positions to choose from.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -91,7 +90,6 @@ impl Body<'_, '_> {
         self.reals(&[-room_m, room_m]);
     }
 
-    /// Every number from the whole of its range.
     fn wild(&mut self) {
         let distance_m = self.input.scaled(1.0, 1e6);
         self.float(|_| distance_m);
@@ -117,7 +115,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Path-loss factors, rarely one of them any number at all.
+    /// Appends path-loss factors, rarely with one arbitrary number.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

@@ -1,34 +1,33 @@
-//! The parts of a body: numbers that are right mostly, and otherwise anything.
+//! Parts of a body: numbers that are mostly valid, otherwise arbitrary.
 
 use uav_relay::ViewId;
 use uav_relay::wire::digest::MissionId;
 
 use crate::input::Input;
 
-/// What a neighbour may know of the relay it talks to.
+/// State of a relay that its neighbour may know.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Known {
-    /// Digest of the mission that it was loaded with.
+    /// Digest of the loaded mission.
     pub digest: u16,
-    /// The relays of that.
+    /// Number of relays in the loaded mission.
     pub relays: u16,
-    /// Digest of the mission that it flies.
+    /// Digest of the flown mission.
     pub flown: u16,
-    /// The newest mission that it holds.
+    /// Newest mission held.
     pub held: MissionId,
-    /// The view that it has agreed to.
+    /// Agreed view.
     pub view: ViewId,
-    /// Number of its current pass.
+    /// Number of the current pass.
     pub number: u16,
-    /// Number of the talk that its last fence was of, 0 for none.
+    /// Association number in its last fence message, 0 for none.
     pub association: u16,
-    /// Number of the last hello that it said, 0 for none.
+    /// Nonce of its last hello, 0 for none.
     pub asked: u16,
-    /// D, m.
+    /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
 }
 
-/// A body being written.
 pub(super) struct Body<'a, 'b> {
     pub(super) bytes: Vec<u8>,
     pub(super) input: &'a mut Input<'b>,
@@ -36,7 +35,7 @@ pub(super) struct Body<'a, 'b> {
 }
 
 impl Body<'_, '_> {
-    /// The current pass, the next, one before, or any.
+    /// Appends the number of the current pass, the next, an earlier one, or any.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
             0..96 => self.known.number.wrapping_add(1),
@@ -56,7 +55,7 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Of a pass of the relay's view, or, rarely, of another one.
+    /// Appends number and mark of a pass in the relay's view, rarely of another view.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.known.view);
@@ -68,7 +67,7 @@ impl Body<'_, '_> {
         self.word(self.known.flown.wrapping_add(mark));
     }
 
-    /// A view: the relay's, one of the next by a node that may propose it, one before, or any.
+    /// Appends a view: the relay's, one of the next from a possible proposer, an earlier one, or any.
     pub(super) fn view(&mut self) {
         let own = self.known.view;
         let view = match self.input.byte() {
@@ -87,13 +86,12 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&view.to_le_bytes());
     }
 
-    /// A view and its size.
     pub(super) fn sized(&mut self) {
         self.view();
         self.relay();
     }
 
-    /// The number of a question, mostly none or one of the first.
+    /// Appends a question number, mostly none or one of the first.
     pub(super) fn question(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -102,7 +100,7 @@ impl Body<'_, '_> {
         self.word(number);
     }
 
-    /// Tenths of a second, mostly few.
+    /// Appends a lease in tenths of a second, mostly short.
     pub(super) fn lease(&mut self) {
         let tenths = match self.input.byte() {
             few @ 0..240 => u16::from(few),
@@ -111,7 +109,7 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// A relay of a short chain, or any.
+    /// Appends a relay of a short chain, or any.
     pub(super) fn relay(&mut self) {
         let relay = match self.input.byte() {
             small @ 0..240 => u16::from(small % 6),
@@ -126,7 +124,7 @@ impl Body<'_, '_> {
         number
     }
 
-    /// A byte from `least` to `most`, rarely any.
+    /// Appends a byte from `least` to `most`, rarely any; returns it.
     pub(super) fn small(&mut self, least: u8, most: u8) -> u8 {
         let byte = self.input.byte();
         let small = if byte < 240 {
@@ -160,13 +158,13 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// How far from the line: as far as relays may go, or hardly.
+    /// Appends a lateral position, m: up to the allowed range, or small.
     pub(super) fn beside(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// A list of floats with its count: one number over and over, or each its own.
+    /// Appends a list of floats with its count: one number repeated, or separate numbers.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -180,7 +178,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// The number of a pulse, one of the first, and the digest of the relay's view, or, rarely, of another one.
+    /// Appends a pulse's number, mostly one of the first, and the digest of the view, rarely a wrong one.
     pub(super) fn pulse_number(&mut self) {
         self.question();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -188,7 +186,7 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// The mission that the relay holds, the one that it was loaded with, one that is newer or older than the one held, or any.
+    /// Returns the mission that the relay holds, the loaded one, a newer or older version, or any.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.known.held;
         match self.input.byte() {
@@ -212,7 +210,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// The number of the relay's own talk on that side, a small one, or any.
+    /// Appends the relay's own association number on that side, a small one, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),
@@ -223,7 +221,7 @@ impl Body<'_, '_> {
     }
 }
 
-/// What a view adds to the digest of the mission that it flies: its lower half, and its upper half with the bytes turned round.
+/// Returns the view's mark, which is added to the mission's digest: the lower half plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

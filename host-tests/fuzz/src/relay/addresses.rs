@@ -1,11 +1,11 @@
-//! Who says something to a relay, and through which port it comes.
+//! Senders and ports of frames to a relay.
 
 use uav_relay::{Port, Wiring};
 
 use super::super::message::Header;
 use super::super::watch::NETWORK;
 
-/// The header and the port of a frame from the neighbour at `side` of relay `index`.
+/// Returns the header and the port of a frame from the neighbour at `side` of relay `index`.
 pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Port) {
     let (sender, port) = if side == 1 {
         (index + 1, Port::Downstream)
@@ -23,7 +23,7 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// The node `more` beyond the neighbour at `side` of relay `index`, as far as there is one.
+/// Returns the node `more` beyond the neighbour at `side` of relay `index`, at least 0.
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
     let distance = 1 + more as u16;
     if side == 1 {

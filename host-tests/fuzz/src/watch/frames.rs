@@ -1,4 +1,4 @@
-//! The frames that a watched relay sends: each is one, from it, to a node that is there.
+//! Checks of the frames that a watched relay sends: each is valid, from this relay, and to an existing node.
 
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;
@@ -7,25 +7,22 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Nodes this far off are heard on a shared channel.
+/// Range of a shared channel, nodes.
 const NEAR: u16 = 4;
 
-/// The network of every relay here.
+/// Network number of every relay here.
 pub const NETWORK: u16 = 9;
 
-/// What the frames of a relay have said so far.
+/// Last contents of a relay's frames.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
-    /// Its node, and how many there are.
+    /// Number of its node, and number of relays.
     node: u16,
     all: u16,
-    /// Frames it has sent.
     pub(super) sent: u32,
-    /// Number of the last pass it has said anything of.
     pub(super) number: u16,
-    /// Number of the talk that its last fence was of.
+    /// Association number of the last fence message.
     pub(super) association: u16,
-    /// The number of the last hello that it said.
     pub(super) asked: u16,
 }
 
@@ -41,7 +38,7 @@ impl Frames {
         }
     }
 
-    /// A frame must be one, from this relay, to the neighbour behind its port.
+    /// Checks a frame: valid, from this relay, to the neighbour behind its port.
     pub(super) fn look(&mut self, relay: &Relay, settings: &Settings, port: Port, bytes: &[u8]) {
         let mut deframer = Deframer::new();
         let mut frames = 0;
@@ -65,8 +62,7 @@ impl Frames {
             let off = self.node.abs_diff(header.destination) <= far;
             let upstream = off && header.destination < self.node;
             let downstream = off && header.destination > self.node;
-            // One that stands down says so to the other node of its number, and one that defends its number does; neither where frames
-            // are signed.
+            // A passive relay, or one that defends its index, sends to its duplicate, but only unsigned.
             let own = header.destination == self.node && !signs;
             let right = own
                 || match (settings.wiring, port) {
@@ -77,7 +73,7 @@ impl Frames {
                 };
             assert!(right, "{header:?} through {port:?}");
             let config = relay.mission().config();
-            // Tx and Rx are told which mission is held, where there is a key.
+            // With a key Tx and Rx are informed of the held mission.
             let all = if signs {
                 0..=self.all + 1
             } else {

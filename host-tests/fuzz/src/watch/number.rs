@@ -1,8 +1,8 @@
-//! Which pass a message is of.
+//! Pass number of a message.
 
 use uav_relay::wire::message::Message;
 
-/// The number of the pass that a message is of; pulses have numbers of their own.
+/// Returns the pass number of a message; pulses have numbers of their own.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,

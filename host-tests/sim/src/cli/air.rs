@@ -1,4 +1,4 @@
-//! The medium: how radios share it, how fast it is, how it loses frames, who does not hear whom, and for how long that is watched.
+//! Options for links and the radio channel: access, speed, losses, one-way failures and soaks.
 
 use crate::command::{Failure, carries, number, whole};
 use crate::simulator::bursts::Bursts;
@@ -10,69 +10,68 @@ use uav_relay::{Duration, Instant, Wiring};
 
 use super::times::{instant, span};
 
-/// The options for that.
+/// Command-line options for links and the radio channel.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Links and the air")]
 pub struct Air {
-    /// How the radios share one channel, which those up to four away hear; csma unless said otherwise
+    /// Access method of the shared channel, which reaches four relays far; default csma
     #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
     sharing: Option<Sharing>,
-    /// Bits per second of every link, or of the channel, 300 to 10000000; a byte takes ten
+    /// Bits per second of every link or of the channel, 300 to 10000000; a byte takes ten bits
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole(300_u32, 10_000_000))]
     baud: u32,
-    /// Milliseconds of silence after which a neighbour is asked for a sign of life, 1 to 1200000, and a third of those after which it counts
-    /// as lost; 5000 without it. A slow channel carries more relays with more
+    /// Silence after which a neighbour is probed, ms, 1 to 1200000, and a third of the silence after which it counts as lost;
+    /// default 5000. Larger values allow more relays on a slow channel
     #[arg(long, value_name = "MS", value_parser = whole(1_u64, 1_200_000))]
     probe_after_ms: Option<u64>,
-    /// The radios reach K relays far, 1 to 1000, on one channel that relays share; four without it
+    /// Range of the radios on a shared channel, in relays, 1 to 1000; default 4
     #[arg(long, value_name = "K", conflicts_with = "wires", value_parser = whole(1_usize, 1_000))]
     reach: Option<usize>,
-    /// Losses come in runs of L frames on average, 1 to 1e6, each direction of a link by itself (Gilbert-Elliott), with --loss P as
-    /// the mean share; 1 is for independent losses, anything else at least 1 / (1 - P)
+    /// Mean length of a burst of losses, frames, 1 to 1e6, independent for each direction of a link (Gilbert-Elliott); --loss P
+    /// is the mean share of lost frames; 1 for independent losses, otherwise at least 1 / (1 - P)
     #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
     burst: f64,
-    /// Relay J does not hear relay I from S seconds on, until E or for good. Repeatable
+    /// Relay J does not receive relay I from second S until E, or permanently. Repeatable
     #[arg(long, value_name = "J:I@S[-E]", value_parser = deaf)]
     deaf: Vec<Deaf>,
-    /// The run goes on for S seconds, 1 to 1e6, with all that happens in it, and says how much of the time the chain was right
+    /// Run for S seconds, 1 to 1e6, with all events, and report the availability of the chain
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = soak)]
     soak: Option<Instant>,
 }
 
-/// How radios share a channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Sharing {
-    /// Half duplex: each listens before it sends, and waits a random time
+    /// Half duplex: radios sense the channel before they send, and wait a random time
     Csma,
-    /// Half duplex: each sends at once
+    /// Half duplex: radios send at once
     Aloha,
-    /// A line for every sender: nobody is in another's way
+    /// Separate line for every sender: no collisions
     Ideal,
 }
 
 impl Air {
-    /// Whether a shared channel is asked for.
+    /// Returns true if the options request a shared channel.
     pub fn is_chosen(&self) -> bool {
         self.sharing.is_some()
     }
 
-    /// Whether relays may be lost by it.
+    /// Returns true if the options can separate relays from the chain or fix the run's duration.
     pub fn is_eventful(&self) -> bool {
         !self.deaf.is_empty() || self.soak.is_some()
     }
 
-    /// When the run ends, if that is known.
+    /// Returns the end of a soak, if requested.
     pub const fn soaked(&self) -> Option<Instant> {
         self.soak
     }
 
-    /// When what begins.
+    /// Returns the failure options with their start times.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |deaf: &Deaf| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
         self.deaf.iter().map(name)
     }
 
-    /// When something happens.
+    /// Returns the times of all events.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()
@@ -80,7 +79,7 @@ impl Air {
             .chain(self.soak)
     }
 
-    /// Whether this goes together with a chain of `uavs`.
+    /// Checks the options against a chain of `uavs` relays.
     pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         let wrong = self.deaf.iter().find(|deaf| {
             !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
@@ -92,7 +91,7 @@ impl Air {
         Ok(())
     }
 
-    /// Puts all of it into a run that loses `loss` of the frames, once it is known how the relays talk.
+    /// Applies the options to a setup that loses `loss` of the frames. The wiring must already be set.
     pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
         if self.burst > 1.0 && loss <= 0.0 {
             let line = format!("--burst {}: would be ignored without --loss", self.burst);

@@ -1,4 +1,4 @@
-//! Drones with autopilots: that there are any, and what their pilots do.
+//! Options for drones with autopilots and their pilots.
 
 use crate::command::Failure;
 use std::path::{Path, PathBuf};
@@ -13,31 +13,31 @@ use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
 
 use super::times::span;
 
-/// How far off a drone takes itself to be at most, all the time and each time that it says so, m; how much gusts move it, m/s.
+/// Bounds on the constant and the random position error, m; standard deviation of gusts, m/s.
 const BIAS_M: f64 = 0.5;
 const NOISE_M: f64 = 0.3;
 const GUST_MPS: f64 = 0.3;
 
-/// How far off its setpoint a drone that hovers there may be reported, m: the noise, and what gusts make of it.
+/// Largest reported distance of a hovering drone from its setpoint, m: position noise and gusts.
 const HOVER_M: f32 = 1.5;
 
-/// The options for that.
+/// Command-line options for drones.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Drones")]
 pub struct Flight {
-    /// With drones: limited speed and acceleration, noise of their positions, gusts, an autopilot each that speaks MAVLink (PX4 and
-    /// ArduCopter in turn), a pilot each who takes off and hands over, the guard; ends when all that fly hover at their places
+    /// Simulate drones: limited speed and acceleration, position noise, gusts, MAVLink autopilots (PX4 and ArduCopter in turn),
+    /// pilots who take off and hand over, and the guard; the run ends when all flying drones hover at their positions
     #[arg(long)]
     fly: bool,
-    /// The pilot of drone I has the sticks from S seconds on, until E or for good. Repeatable
+    /// The pilot of drone I takes over from second S until E, or permanently. Repeatable
     #[arg(long, value_name = "I@S[-E]", value_parser = takeover)]
     takeover: Vec<Takeover>,
-    /// Place of each drone when it is handed over first: a file with a line `index, x_m, y_m, h_m` for each
+    /// File with the position of each drone's first hand-over, one line `index, x_m, y_m, h_m` per drone
     #[arg(long, value_name = "FILE", requires = "fly")]
     start: Option<PathBuf>,
 }
 
-/// Greatest |x| and |y| and height of a start, m.
+/// Bound on |x|, |y| and height of a start position, m.
 const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {
@@ -45,20 +45,20 @@ impl Flight {
         self.fly
     }
 
-    /// When what begins.
+    /// Returns the takeover options with their start times.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
         self.takeover.iter().map(name)
     }
 
-    /// When something happens.
+    /// Returns the times of all events.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.takeover
             .iter()
             .map(|takeover| takeover.until.unwrap_or(takeover.from))
     }
 
-    /// Whether this goes together with a chain of `uavs`.
+    /// Checks the options against a chain of `uavs` relays.
     pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
             let line = format!("--takeover {relay}@..: would be ignored without --fly");
@@ -74,7 +74,7 @@ impl Flight {
         }
     }
 
-    /// Puts the drones into a run, in order along the line.
+    /// Adds the drones to the setup; by default evenly spaced along the line.
     pub fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
         if !self.fly {
             return Ok(());
@@ -128,7 +128,7 @@ fn takeover(text: &str) -> Result<Takeover, String> {
     })
 }
 
-/// Reads where each of so many drones begins.
+/// Reads the start positions of all drones from a file.
 fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
     let named = |what: String| Failure::input(format!("--start {}: {what}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| named(error.to_string()))?;

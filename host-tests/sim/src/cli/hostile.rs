@@ -1,4 +1,4 @@
-//! What may happen to the chain in the air: relays that go silent, parts that do not hear each other, an attacker, a new mission.
+//! Options for failures, partitions, attacks and uploads.
 
 use crate::command::{Failure, whole};
 use crate::simulator::attack::Attack;
@@ -11,7 +11,7 @@ use super::flight::Flight;
 use super::times::{instant, seconds, span};
 use super::upload::Uploads;
 
-/// The options for that.
+/// Command-line options for events in the air.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Hostile air")]
 #[expect(
@@ -19,35 +19,34 @@ use super::upload::Uploads;
     reason = "each is an option of its own"
 )]
 pub struct Hostile {
-    /// Relay I goes silent S virtual seconds after the start; the others form anew without it. Repeatable
+    /// Relay I goes silent at second S of virtual time; the others form a new chain. Repeatable
     #[arg(long, value_name = "I@S", value_parser = one)]
     pub kill: Vec<One>,
-    /// Relay I is switched on again after S seconds, with nothing left of what it knew but a mission that was uploaded.
-    /// Repeatable
+    /// Relay I reboots at second S; of its state it keeps only persisted data such as an uploaded mission. Repeatable
     #[arg(long, value_name = "I@S", value_parser = one)]
     boot: Vec<One>,
-    /// Relays 1 to K and the others do not hear each other from S seconds on, until T or for good. Repeatable
+    /// Relays 1 to K and the others do not receive each other from second S until T, or permanently. Repeatable
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
-    /// An attacker sends N forged frames, 1 to 100000: with guessed tags, altered, without a tag, with another key
+    /// An attacker sends N forged frames, 1 to 100000: with guessed tags, altered, without tags, with another key
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     forge: Option<u32>,
-    /// An attacker sends N of the frames that it has heard again, 1 to 100000
+    /// An attacker replays N received frames, 1 to 100000
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     replay: Option<u32>,
     #[command(flatten)]
     pub uploads: Uploads,
-    /// Frames carry tags, with a key drawn from the seed; so they do when there is an attacker or an upload
+    /// Sign frames with a key drawn from the seed; default with an attacker or an upload
     #[arg(long, conflicts_with = "no_auth")]
     auth: bool,
-    /// Frames carry no tags, even when there is an attacker; without them nothing can be uploaded
+    /// Do not sign frames, even with an attacker; excludes uploads
     #[arg(long)]
     no_auth: bool,
-    /// All relays talk by one radio, which those up to four away hear; so they do with any of --kill, --boot, --partition,
+    /// Connect all relays by one radio channel, which reaches four relays far; default with any of --kill, --boot, --partition,
     /// --deaf, --soak, --air, --fly, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
-    /// Each relay has a wire to either neighbour, even then; there a break is reported, not closed
+    /// Connect each relay to its neighbours by wires even then; a failure is reported, but the gap is not closed
     #[arg(long)]
     wires: bool,
     #[command(flatten)]
@@ -56,21 +55,21 @@ pub struct Hostile {
     pub flight: Flight,
 }
 
-/// A relay, and when something happens to it.
+/// Event of a relay with its time.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct One {
     index: u16,
     at: Instant,
 }
 
-/// An attack goes on for so long after all else has happened, s.
+/// Duration of an attack after the last other event, s.
 const ATTACK_S: u64 = 30;
 
-/// A run in which something happens ends so long after the last of it at the latest, s.
+/// Time limit of a run after its last event, s.
 const PATIENCE_S: u64 = 3_600;
 
 impl Hostile {
-    /// Whether anything happens that a plain run does not have.
+    /// Returns true if the options add events to the run.
     fn is_eventful(&self) -> bool {
         !(self.kill.is_empty() && self.boot.is_empty() && self.partition.is_empty())
             || self.is_attack()
@@ -83,7 +82,7 @@ impl Hostile {
         self.forge.is_some() || self.replay.is_some()
     }
 
-    /// When the last of it happens, apart from an attack.
+    /// Returns the time of the last event, without attacks.
     fn last(&self) -> Instant {
         let ones = self.kill.iter().chain(&self.boot).map(|one| one.at);
         let parts = self
@@ -98,7 +97,7 @@ impl Hostile {
         all.max().unwrap_or(Instant::ZERO)
     }
 
-    /// Whether this goes together with a chain of `uavs`, and with a closed loop if there `is_loop`.
+    /// Checks the options against a chain of `uavs` relays, and against `--closed-loop` if `is_loop` is true.
     pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
@@ -137,13 +136,13 @@ impl Hostile {
         Ok(())
     }
 
-    /// Whether relays that go silent are on before, and those that are switched on again have gone silent if they ever do.
+    /// Checks the order of the kills and boots of each relay.
     fn in_order(&self) -> Result<(), Failure> {
         let kills = self.kill.iter().map(|one| (one, true));
         let mut all: Vec<(&One, bool)> = kills
             .chain(self.boot.iter().map(|one| (one, false)))
             .collect();
-        // Of one time, too, it goes silent first.
+        // Kills sort before boots of the same time.
         all.sort_by_key(|(one, _)| (one.index, one.at));
         for (place, (one, is_kill)) in all.iter().enumerate() {
             let of_it = |(other, _): &&(&One, bool)| other.index == one.index;
@@ -172,7 +171,7 @@ impl Hostile {
         Ok(())
     }
 
-    /// Whether all of it begins before the run ends.
+    /// Checks that all events begin before the run ends.
     fn in_time(&self) -> Result<(), Failure> {
         let Some(end) = self.air.soaked() else {
             return Ok(());
@@ -202,7 +201,7 @@ impl Hostile {
         }
     }
 
-    /// Puts all of it into a run.
+    /// Applies the options to a setup.
     pub fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
         let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);

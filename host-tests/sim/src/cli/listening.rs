@@ -1,4 +1,4 @@
-//! Relays that are not told of the interferers: that they listen, and how well.
+//! Options for relays that measure the interference instead of knowing it.
 
 use crate::command::{Failure, number, whole};
 use crate::simulator::setup::Setup;
@@ -11,30 +11,30 @@ use uav_relay_scenario::scene::Scene;
 
 use super::said::said;
 
-/// The options for that.
+/// Command-line options for measurements.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Listening")]
 pub struct Listening {
-    /// The relays are not told the scenario's interferers: each measures, once a second, what it hears where it is, and together they
-    /// find one that accounts for it. How they listen is what the scenario says of it, if it does
+    /// Hide the interferers from the relays: each measures the interference at its position once a second, and together they
+    /// estimate an equivalent interferer. The scenario's listening parameters apply, if any
     #[arg(long)]
     listen: bool,
-    /// Independent samples of the interference in one measurement, 1 to 1000000; 1000 unless said otherwise
+    /// Independent samples per measurement, 1 to 1000000; default 1000
     #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u32, 1_000_000))]
     samples: Option<u32>,
-    /// Standard deviation of a place's own error, dB, 0 to 20; 0 unless said otherwise
+    /// Standard deviation of the shadowing at a position, dB, 0 to 20; default 0
     #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 20.0))]
     shadow: Option<f64>,
-    /// All interferers move from the start on, m/s along the line and to its right, each -100 to 100
+    /// Velocity of all interferers, m/s along the line and to its right, each -100 to 100
     #[arg(long, value_name = "VX,VY", allow_hyphen_values = true, value_parser = velocity)]
     move_interferer: Option<[f64; 2]>,
-    /// For how many virtual seconds they listen, 10 to 1e5; 120 unless said otherwise
+    /// Virtual duration of the measurements, s, 10 to 1e5; default 120
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = |text: &str| number(text, 10.0, 1e5))]
     listen_for: Option<f64>,
 }
 
 impl Listening {
-    /// Refuses what says how they listen where they do not.
+    /// Rejects measurement options without `--listen`.
     pub fn agree(&self) -> Result<(), Failure> {
         let velocity = self
             .move_interferer
@@ -53,7 +53,7 @@ impl Listening {
         }
     }
 
-    /// Has the relays of `setup` find the interferers of `scenario`.
+    /// Changes the setup so that the relays have to find the interferers of `scenario`.
     pub fn prepare(
         &self,
         setup: &mut Setup,
@@ -105,7 +105,7 @@ impl Listening {
         Ok(())
     }
 
-    /// `mission` with its interferer where it is at `then`.
+    /// Returns `mission` with the interferer's position at `then`.
     pub fn moved(&self, mission: Mission, then: Instant) -> Mission {
         let (Some([along, aside]), Some(source)) = (self.move_interferer, mission.known_source())
         else {

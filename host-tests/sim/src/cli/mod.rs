@@ -1,11 +1,11 @@
-//! `cargo chain` without its files and its terminal: options, what they make of a run, and what is reported of it. The page runs the same.
+//! `cargo chain` without its file and terminal access; the browser page runs the same code.
 //!
-//! | step | by |
+//! | step | item |
 //! | --- | --- |
-//! | options are read | [`Options`] |
-//! | a scenario and they make a run | [`Prepared::new`] |
-//! | the chain flies | [`Prepared::fly`] |
-//! | what came of it is told, and drawn | [`Prepared::report`], [`Prepared::picture`] |
+//! | parse the options | [`Options`] |
+//! | prepare a run from a scenario and options | [`Prepared::new`] |
+//! | run the chain | [`Prepared::fly`] |
+//! | report and draw the outcome | [`Prepared::report`], [`Prepared::picture`] |
 
 mod air;
 mod flight;

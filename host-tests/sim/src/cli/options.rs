@@ -1,4 +1,4 @@
-//! The options of `cargo chain`, and their ranges.
+//! Options of `cargo chain` and their ranges.
 
 use std::path::PathBuf;
 
@@ -10,43 +10,42 @@ use super::hostile::Hostile;
 use super::listening::Listening;
 use super::said::said;
 
-/// N simulated relays exchange real frames over simulated serial links until they hold the places that make the worst hop
-/// as good as it can be.
+/// N simulated relays exchange real frames over simulated links and move to the positions that maximise the SIR of the worst hop
 #[derive(Parser, Debug)]
 #[command(name = "chain", bin_name = "cargo chain", disable_version_flag = true)]
 pub struct Options {
-    /// Scenario file (TOML); without it the paper's multi-hop scenario
+    /// Scenario file (TOML); default: the paper's multi-hop scenario
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
     /// Number of relays, 1 to 1000
     #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = whole(1_u16, 1000))]
     pub uavs: u16,
-    /// How the places are found
+    /// Planning method
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     pub method: Method,
-    /// The fixed step of the -step methods, linear SIR, 1e-6 to 1e6; 0.1 unless said otherwise
+    /// Step of the -step methods, linear SIR, 1e-6 to 1e6; default 0.1
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
     pub epsilon: Option<f64>,
-    /// Rounds of `adjust` at most, 1 to 65535; 500 unless said otherwise
+    /// Largest number of rounds of `adjust`, 1 to 65535; default 500
     #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u16, 65_535))]
     pub rounds: Option<u16>,
-    /// How far a relay may go up or down in one round of `adjust`, metres, 0 to 1e5; 10 unless said otherwise
+    /// Largest change of altitude in a round of `adjust`, m, 0 to 1e5; default 10
     #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
     pub explore_m: Option<f32>,
-    /// Have `adjust` search a grid of columns by rows, 2 to 255 each, instead of from coarse to fine
+    /// Search a grid of columns by rows in `adjust`, 2 to 255 each, instead of from coarse to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub grid: Option<uav_relay::Local>,
-    /// The relays of a stochastic chain are told that Upsilon is everywhere what it is at Rx, fly, measure the true field where
-    /// they stand, and agree again, R times, 1 to 100
+    /// Start a stochastic chain with the value of Upsilon at Rx everywhere, then fly, measure the true field and agree again R
+    /// times, 1 to 100
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = whole(1_u8, 100))]
     pub closed_loop: Option<u8>,
-    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; 1e-4 unless said otherwise. The -step methods have their step instead
+    /// Relative tolerance of the achieved SIR, 1e-6 to 0.1; default 1e-4. Not for the -step methods
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 0.1))]
     pub tolerance: Option<f64>,
-    /// Probability that a frame never arrives, 0 to 0.9
+    /// Probability that a frame is lost, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub loss: f64,
-    /// Probability that bytes of a frame arrive changed, 0 to 0.9
+    /// Probability that a frame is corrupted, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub corrupt: f64,
     /// Probability that a frame arrives twice, 0 to 0.9
@@ -55,30 +54,30 @@ pub struct Options {
     /// Probability that a frame is overtaken by others, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub reorder: f64,
-    /// The leader does not solve the chain beforehand; it brackets from scratch
+    /// Bracket the target from scratch instead of from the leader's own prediction
     #[arg(long)]
     pub no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
     #[arg(long, value_name = "S", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0, u64::MAX))]
     pub seed: u64,
-    /// One JSON object on standard output and nothing else there
+    /// Print only one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Draw the chain from the side, and from above where there is room or an interferer beside the line, with each hop's SIR
+    /// Draw the chain with each hop's SIR: a side view, and a top view with room or an interferer beside the line
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub svg: Option<PathBuf>,
-    /// Write every frame that is put on the air to a pcapng capture, with virtual times, for `cargo decode` and Wireshark
+    /// Write every transmitted frame to a pcapng capture with virtual times, for `cargo decode` and Wireshark
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub capture: Option<PathBuf>,
-    /// Relays that measure.
+    /// Measurement options.
     #[command(flatten)]
     pub listening: Listening,
-    /// What goes wrong.
+    /// Failure, attack and upload options.
     #[command(flatten)]
     pub hostile: Hostile,
 }
 
-/// How the places are found.
+/// Planning method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Method {
     /// Algorithm 1 with bracketed targets
@@ -87,7 +86,7 @@ pub enum Method {
     AlignStep,
     /// Algorithm 1, then Algorithm 2
     Adjust,
-    /// Places, sides and altitudes together
+    /// Positions, sides and altitudes together
     #[value(alias = "altitude")]
     Joint,
     /// Algorithm 4 with bracketed targets
@@ -97,7 +96,7 @@ pub enum Method {
 }
 
 impl Options {
-    /// Refuses an option that the method would ignore.
+    /// Rejects options that the method would ignore.
     pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
         let is_adjust = self.method == Method::Adjust;
@@ -143,7 +142,7 @@ fn grid_said(grid: uav_relay::Local) -> String {
 }
 
 impl Method {
-    /// Whether it is for a field of interference, and not for an interferer.
+    /// Returns true if the method is for a field of interference instead of an interferer.
     pub const fn is_for_fields(self) -> bool {
         matches!(self, Self::Stochastic | Self::StochasticStep)
     }

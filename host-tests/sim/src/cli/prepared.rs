@@ -1,4 +1,4 @@
-//! A run as the options and a scenario have it.
+//! Run prepared from command-line options and a scenario.
 
 use clap::ValueEnum as _;
 use uav_relay::{Instant, Measure, Mission, Placement, Schedule, Sites, Wiring};
@@ -16,23 +16,23 @@ use crate::simulator::outcome::{Outcome, RelayEnd};
 use crate::simulator::setup::Setup;
 use crate::svg::{Others, Picture, room};
 
-/// A run, and what it is held against.
+/// Setup of a run, with the true mission for its evaluation.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     options: &'a Options,
     scenario: Scenario,
     method: String,
-    /// What is run.
+    /// Setup of the run.
     pub setup: Setup,
     told: Mission,
 }
 
-/// Why nothing is run.
+/// Reason why a run was not started.
 #[derive(Debug)]
 pub enum Refused {
-    /// The input is wrong.
+    /// Invalid input.
     Failed(Failure),
-    /// The relays cannot be placed, and this is reported. With a failure where that is the input's fault.
+    /// Report that the relays cannot be placed, with a failure if the input is at fault.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 
@@ -42,14 +42,14 @@ impl From<Failure> for Refused {
     }
 }
 
-/// Samples that a relay of a closed loop takes at each place.
+/// Samples per relay and position in a closed loop.
 const SAMPLES: u32 = 10_000;
 
 impl<'a> Prepared<'a> {
-    /// What `options` make of `scenario`, which messages call `name`; without a name it is the default scenario.
+    /// Prepares a run. `name` is the scenario's name in messages; `None` for the default scenario.
     ///
     /// # Errors
-    /// [`Refused`]: options that do not go together, or a chain that cannot be placed.
+    /// [`Refused`]: contradictory options, or a chain that cannot be placed.
     pub fn new(
         options: &'a Options,
         scenario: Scenario,
@@ -80,7 +80,7 @@ impl<'a> Prepared<'a> {
         };
         let (mission, profiles) = match mission::mission(&scenario, options.uavs, tolerance) {
             Ok(briefed) => briefed,
-            // Who has given no scenario has none of its keys before them.
+            // Without a scenario file, a message about its keys would not help the user.
             Err(Refusal::NoRoom { .. }) if is_default => {
                 let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
                 let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
@@ -120,10 +120,10 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Flies `setup` to its end; in a closed loop as often as that measures. `watch` runs a chain until it has settled.
+    /// Runs `setup`, in a closed loop with all its measurements. `watch` runs a chain until it settles.
     ///
     /// # Errors
-    /// A setting that a relay refuses, and what `watch` fails with.
+    /// A setting that a relay rejects, or an error of `watch`.
     pub fn fly(
         &self,
         mut setup: Setup,
@@ -156,7 +156,7 @@ impl<'a> Prepared<'a> {
         Ok(chain)
     }
 
-    /// What came of it. It is held against what is there, whatever the relays were told: that is the setup's mission from now on.
+    /// Reports the outcome against the true interference, which also replaces the setup's mission.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
         let listened = ListenedReport::of(&self.setup, outcome);
@@ -174,8 +174,9 @@ impl<'a> Prepared<'a> {
         report
     }
 
-    /// SIR of every hop, from the transmitter's to the receiver's, linear, with these relays (index from 1, and place; in the order of the
-    /// chain) against what is there at `then`. Before anything is uploaded.
+    /// Returns the SIR of every hop from Tx to Rx, linear, with the true interference at `then`.
+    ///
+    /// `places` has the relays' indices (from 1) and positions in the order of the chain. Uploads are not considered.
     pub fn sirs_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let mission = self.options.listening.moved(self.told, then);
         let usual = mission.config().common;
@@ -191,14 +192,14 @@ impl<'a> Prepared<'a> {
         report::hop_sirs(&mission, &places)
     }
 
-    /// The chain at its places, after [`report`](Self::report).
+    /// Returns the picture of the final chain; call [`report`](Self::report) first.
     pub fn picture(&self, outcome: &Outcome, report: &ChainReport) -> Picture {
         let flown = report::flown(&self.setup, outcome);
         drawn(&flown, &self.scenario, outcome, report)
     }
 }
 
-/// Whether the options go together, and with the scenario.
+/// Checks the options against each other and against the scenario.
 fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
     options.agree(method)?;
     options.listening.agree()?;
@@ -236,7 +237,6 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
     Ok(())
 }
 
-/// What the options say of the run.
 fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Setup, Failure> {
     let mut setup = Setup::new(mission);
     setup.settings.schedule = match options.method {
@@ -267,7 +267,6 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
     Ok(setup)
 }
 
-/// The chain at its places in the mission that it flies.
 fn drawn(
     mission: &Mission,
     scenario: &Scenario,

@@ -3,7 +3,7 @@
 use crate::command::number;
 use uav_relay::Instant;
 
-/// Seconds after the start, 0 to 1e6.
+/// Parses seconds after the start, 0 to 1e6.
 pub(super) fn instant(text: &str) -> Option<Instant> {
     let seconds = number(text, 0.0, 1e6).ok()?;
     #[expect(
@@ -15,12 +15,12 @@ pub(super) fn instant(text: &str) -> Option<Instant> {
     Some(Instant::from_micros(micros))
 }
 
-/// From one time to another: `S-E`; or from a time on: `S`.
+/// Parses a period `S-E`, or a start time `S` without an end.
 pub(super) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
     if let Some(from) = instant(text) {
         return Some((from, None));
     }
-    // A minus sign may also stand in an exponent.
+    // A minus sign may also be part of an exponent.
     let mut cuts = text.match_indices('-').filter_map(|(at, _)| {
         let (from, until) = text.split_at_checked(at)?;
         Some((instant(from)?, Some(instant(until.get(1..)?)?)))
@@ -28,7 +28,6 @@ pub(super) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
     cuts.next()
 }
 
-/// The same, back.
 pub(super) fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }

@@ -1,4 +1,4 @@
-//! Missions that the ground uploads in flight: what the options say of them.
+//! Options for missions that the ground uploads in flight.
 
 use crate::command::{Failure, number};
 use crate::simulator::setup::UploadSpec;
@@ -12,33 +12,31 @@ use uav_relay_scenario::number::narrow;
 
 use super::times::instant;
 
-/// The options for that.
+/// Command-line options for uploads.
 #[derive(Args, Debug)]
 pub struct Uploads {
-    /// The ground uploads the mission of the scenario with other parameters S virtual seconds after the start, and the chain
-    /// flies it. Keys as in a scenario file: x_m, y_m and power_w of the interferer, altitude_m, altitude_min_m,
-    /// altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m, distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. Where the
-    /// scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and those of rx move an end; the distance then follows. Repeatable: versions count from 1
+    /// Upload the scenario's mission with changed parameters at second S of virtual time. Keys as in a scenario file: x_m, y_m
+    /// and power_w of the interferer, altitude_m, altitude_min_m, altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m,
+    /// distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. If the scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and
+    /// those of rx move an end and the distance follows. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
-    /// Which end of the link uploads; tx unless said otherwise
+    /// Uploading end of the link; default tx
     #[arg(long, value_name = "END", value_enum)]
     upload_from: Option<End>,
-    /// Relays do not store what was uploaded: one that is switched on again begins with the mission of the scenario
+    /// Do not persist uploads: a rebooted relay starts with the scenario's mission
     #[arg(long)]
     no_store: bool,
 }
 
-/// An end of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum End {
-    /// The transmitter
+    /// Transmitter
     Tx,
-    /// The receiver
+    /// Receiver
     Rx,
 }
 
-/// One upload, as it was asked for.
 #[derive(Clone, PartialEq, Debug)]
 struct Planned {
     text: String,
@@ -46,7 +44,6 @@ struct Planned {
     changes: Vec<(Key, f64)>,
 }
 
-/// A parameter that an upload may change.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Key {
     X,
@@ -71,7 +68,7 @@ enum Key {
     RxHeight,
 }
 
-/// The names of the keys, and the ranges of their values: those of a scenario file, of a mission's noise and of `--tolerance`.
+/// Names and ranges of the keys, as in a scenario file, a mission's noise and `--tolerance`.
 const KEYS: [(&str, Key, f64, f64); 20] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
@@ -96,17 +93,17 @@ const KEYS: [(&str, Key, f64, f64); 20] = [
 ];
 
 impl Uploads {
-    /// Whether there are any.
+    /// Returns true if uploads are requested.
     pub fn are_planned(&self) -> bool {
         !self.upload.is_empty()
     }
 
-    /// Whether relays keep what was uploaded when they are switched off.
+    /// Returns true if relays persist uploads.
     pub fn are_stored(&self) -> bool {
         !self.no_store
     }
 
-    /// Refuses what says how they are done where there are none, and where no relay `boots` that could have stored any.
+    /// Rejects upload options without an upload, and `--no-store` without a reboot.
     pub fn agree(&self, boots: bool) -> Result<(), Failure> {
         let given = match (self.upload_from, self.no_store) {
             (Some(End::Tx), _) => "--upload-from tx",
@@ -125,18 +122,18 @@ impl Uploads {
         Ok(())
     }
 
-    /// When what begins.
+    /// Returns the uploads' options and start times.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |one: &Planned| (format!("--upload {}", one.text), one.at);
         self.upload.iter().map(name)
     }
 
-    /// When each of them begins.
+    /// Returns the uploads' start times.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.upload.iter().map(|one| one.at)
     }
 
-    /// All of them, in the order of their times, for relays that are loaded with `base`, between `sites` if it is known where these are.
+    /// Returns the uploads in order of time. `base` is the relays' mission, `sites` their sites, if known.
     pub fn of(&self, base: &Mission, sites: Option<Sites>) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
             None | Some(End::Tx) => Side::Upstream,
@@ -171,7 +168,7 @@ impl Uploads {
 }
 
 impl Planned {
-    /// Between which sites the mission is flown from then on, if an end of `sites` moves.
+    /// Returns the new sites if the upload moves an end.
     fn moved(&self, sites: Option<Sites>) -> Result<Option<Sites>, &'static str> {
         let of = |key| {
             let mut changes = self.changes.iter();
@@ -201,7 +198,7 @@ impl Planned {
         }))
     }
 
-    /// `base` with what is to be changed.
+    /// Returns `base` with the requested changes.
     fn changed(&self, base: &MissionConfig) -> Result<MissionConfig, &'static str> {
         let Interference::Source(at) = base.interference else {
             return Err("a [field] of interference cannot be uploaded");
@@ -216,7 +213,7 @@ impl Planned {
             altitude_m: to(Key::Altitude, base.common.altitude_m),
             power_w: to(Key::UavPower, base.common.power_w),
         };
-        // A band of one altitude is that of relays that keep to the common one, whichever that is.
+        // A single altitude is the common one, even if that changes.
         let band = if base.band.is_single() {
             Band::at(common.altitude_m)
         } else {

@@ -1,4 +1,4 @@
-//! What places that were found against one interferer are worth against all that it stands for.
+//! Performance of positions planned for one equivalent interferer against all actual interferers.
 
 use serde::Serialize;
 use uav_relay_scenario::Scenario;
@@ -7,24 +7,24 @@ use uav_relay_scenario::scene::{Place, Scene};
 
 use super::hops::{RelayReport, db};
 
-/// The chain against all interferers, where one stood for several.
+/// SIR of the chain against all interferers, if its relays assumed a single one.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct AgainstAll {
-    /// SIR of the worst hop against all, linear.
+    /// SIR of the worst hop against all interferers, linear.
     pub all_sir: f64,
-    /// The same in dB.
+    /// SIR of the worst hop against all interferers, dB.
     pub all_sir_db: f64,
-    /// How much of the SIR that the relays believe in is not there, as a part of it; below 0 where there is more.
+    /// Relative loss from the SIR that the relays assume; negative for a gain.
     pub all_loss: f64,
 }
 
 impl AgainstAll {
-    /// Of `relays`, which believe in `sir`; `None` where one interferer or a field is all there is.
+    /// Evaluates `relays`, which assume `sir`; `None` if there is a single interferer or a field.
     pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {
         mission::hypothetical(scenario)?;
         let last = relays.last()?.index;
         let mut scene = Scene::new(scenario, last)?;
-        // Those that are left, in their order.
+        // Remaining relays, in order.
         let all = std::mem::take(&mut scene.relays);
         let of = |relay: &RelayReport| all.get(usize::from(relay.index) - 1).copied();
         scene.relays = relays.iter().filter_map(of).collect();
@@ -44,7 +44,7 @@ impl AgainstAll {
         })
     }
 
-    /// As a line to read.
+    /// Formats the result as a line of text.
     pub fn text(&self) -> String {
         let Self {
             all_sir,

@@ -1,4 +1,4 @@
-//! What happened on a shared channel.
+//! Report of a shared channel.
 
 use std::fmt::Write as _;
 
@@ -9,20 +9,20 @@ use crate::simulator::medium::{Access, AirCounts};
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 
-/// A channel that is not ideal, and what happened on it.
+/// Channel parameters and counters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct AirReport {
-    /// `csma` or `aloha`.
+    /// Access method: `csma` or `aloha`.
     pub access: &'static str,
     /// Bits per second.
     pub baud: u32,
-    /// What was counted.
+    /// Counters of the channel.
     #[serde(flatten)]
     pub counts: AirCounts,
 }
 
 impl AirReport {
-    /// What happened in a run of `setup`; `None` if its relays share no channel, or an ideal one.
+    /// Report of a run of `setup`; `None` without a shared channel, or with an ideal one.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let access = match (setup.settings.wiring, setup.access) {
             (Wiring::Shared, Access::Csma) => "csma",
@@ -36,7 +36,7 @@ impl AirReport {
         })
     }
 
-    /// The same as a line of text, of a run that took `virtual_s`.
+    /// Formats the report as a line; `virtual_s` is the duration of the run.
     pub(super) fn text(&self, virtual_s: f64) -> String {
         let counts = self.counts;
         let load = counts.air_time_us as f64 / 1e6 / virtual_s.max(1e-6);

@@ -1,4 +1,4 @@
-//! What an attacker sent, how the relays counted it, and what it changed.
+//! Report of an attack: frames sent, their classification by the relays, and the effect.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -8,45 +8,45 @@ use serde::Serialize;
 use crate::simulator::attack::Strike;
 use crate::simulator::outcome::{Moment, Outcome, Turning};
 
-/// Frames of one kind.
+/// Attacker's frames of one kind.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct StruckReport {
     /// Frames sent.
     pub sent: u64,
-    /// Of those, frames that a relay took for a neighbour's.
+    /// Frames that a relay accepted as a neighbour's.
     pub taken: u64,
-    /// All of them, by the relay's counter that grew; `received` are those taken.
+    /// Frames by the relay's counter that grew; `received` are the accepted ones.
     pub counted: BTreeMap<&'static str, u64>,
 }
 
-/// What an attack came to.
+/// Result of an attack.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AttackReport {
-    /// Whether frames carried tags.
+    /// True if frames carried tags.
     pub auth: bool,
     /// Forged frames.
     pub forged: StruckReport,
-    /// Recorded frames that were sent again.
+    /// Replayed frames.
     pub replayed: StruckReport,
-    /// Whether the run ended otherwise than the same run without the attack.
+    /// True if the run ended differently from the same run without the attack.
     pub ended_otherwise: bool,
-    /// Relays that ended at another place, or for another target, than without the attack.
+    /// Relays whose final position or target differs from the run without the attack.
     pub moved: u64,
-    /// How far from there they ended at most, m; absent if one of them ended without a place.
+    /// Largest displacement of those relays (x and altitude), m; absent if one has no position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest_m: Option<f64>,
-    /// How many places relays took on the way for a target that nobody holds without the attack.
+    /// Positions that relays accepted for targets that do not occur without the attack.
     pub misled: u64,
-    /// How often the chain formed anew.
+    /// Views that the chain formed.
     pub formed: u64,
-    /// How often it does without the attack.
+    /// Views that the chain forms without the attack.
     pub formed_without: u64,
-    /// How often a relay was told to fly to a place that it must not: a bug if not 0.
+    /// Setpoints outside their limits; nonzero is a bug.
     pub unsafe_setpoints: u64,
 }
 
 impl AttackReport {
-    /// What came of a run with an attack, beside `calm`, the same run without it.
+    /// Compares a run with an attack to `calm`, the same run without it.
     pub fn new(auth: bool, outcome: &Outcome, calm: &Outcome) -> Self {
         let moved = outcome
             .relays
@@ -80,7 +80,7 @@ impl AttackReport {
         }
     }
 
-    /// What it did that it should not have been able to; `None` if nothing.
+    /// Describes the harm done by the attack; `None` if there was none.
     pub fn harm(&self) -> Option<String> {
         match (self.moved, self.ended_otherwise) {
             (0, false) => None,
@@ -90,7 +90,6 @@ impl AttackReport {
         }
     }
 
-    /// A few lines.
     pub(super) fn text(&self) -> String {
         let mut text = String::new();
         let tags = if self.auth { "with" } else { "without" };
@@ -136,14 +135,14 @@ impl AttackReport {
     }
 }
 
-/// The targets that relays took places for, as their bits.
+/// Returns the accepted targets as bit patterns.
 fn targets(outcome: &Outcome) -> impl Iterator<Item = u32> {
     let converged = |moment: &&Moment| moment.what == Turning::Converged;
     let moments = outcome.moments.iter().filter(converged);
     moments.filter_map(|moment| moment.target.map(f32::to_bits))
 }
 
-/// How many views of the chain anybody agreed to.
+/// Returns the number of accepted views.
 fn formed(outcome: &Outcome) -> u64 {
     let views: BTreeSet<u32> = outcome
         .moments

@@ -1,4 +1,4 @@
-//! The report of a simulated chain.
+//! Report of a simulated chain.
 
 use std::fmt::Write as _;
 
@@ -21,115 +21,115 @@ use super::watched::WatchedReport;
 use crate::simulator::outcome::{Ending, Outcome};
 use crate::simulator::setup::Setup;
 
-/// What happened to frames.
+/// Counts of frame faults.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct FaultReport {
-    /// Frames that never arrived.
+    /// Lost frames.
     pub lost: u64,
-    /// Frames that arrived changed.
+    /// Corrupted frames.
     pub corrupted: u64,
-    /// Frames that arrived twice.
+    /// Duplicated frames.
     pub duplicated: u64,
-    /// Frames that others could overtake.
+    /// Delayed frames.
     pub reordered: u64,
-    /// Frames the relays refused, for whatever reason.
+    /// Frames that the relays rejected for any reason.
     pub rejected: u64,
 }
 
-/// The result of `cargo chain`.
+/// Result of `cargo chain`.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ChainReport {
-    /// The method, as on the command line.
+    /// Planning method, as on the command line.
     pub method: String,
-    /// Number of relays asked for.
+    /// Requested number of relays.
     pub uavs: u16,
-    /// Version of the mission that the chain flies, 0 for the one it took off with, if one was uploaded: what SIRs are of.
+    /// Version of the final mission if one was uploaded; 0 for the original one. All SIRs refer to it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// What went wrong, if anything.
+    /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// The most that could be had, where nothing could be placed.
+    /// Best possible SIR, if no positions were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// SIR of the worst hop, linear; absent unless every relay of the chain has its place.
+    /// SIR of the worst hop, linear; absent unless every relay of the chain has a position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// The same in dB.
+    /// SIR of the worst hop, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
-    /// The target the relays agreed on, linear.
+    /// Target SIR that the relays agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// In a field: whether no chain of equals can have a higher target. False means that it is not known.
+    /// True in a field if no chain of equal relays can reach a higher target; false if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
-    /// SIR of the chain before Algorithm 2 and after each of its rounds, linear.
+    /// SIR of the chain before Algorithm 2 and after each round, linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<f64>,
-    /// The relays of the chain, from the transmitter on, if all of them have a place.
+    /// Relays of the chain, from the transmitter, if all of them have a position.
     pub relays: Vec<RelayReport>,
     /// SIR at the receiver, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir: Option<f64>,
-    /// The same in dB.
+    /// SIR at the receiver, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
     /// Forward passes along the chain.
     pub sweeps: u32,
-    /// Frames put on any link.
+    /// Frames sent on all links.
     pub messages: u64,
-    /// Bytes put on any link.
+    /// Bytes sent on all links.
     pub bytes: u64,
-    /// Virtual time the run took, s.
+    /// Virtual duration of the run, s.
     pub virtual_s: f64,
-    /// What happened to frames.
+    /// Frame faults.
     pub faults: FaultReport,
-    /// Whose silence was noticed by whom.
+    /// Detected failures of relays.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub silences: Vec<SilenceReport>,
-    /// `shared` where the relays talk by one radio channel; absent where each has a link to either neighbour.
+    /// `shared` for a common radio channel; absent for a separate link to each neighbour.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
-    /// What happened on that channel, unless it is ideal.
+    /// Counters of the channel, unless it is ideal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// What the run was like over its whole time, where that was watched.
+    /// Statistics over the whole run, if recorded.
     #[serde(flatten)]
     pub watched: WatchedReport,
-    /// What relays that had to find the interferer by themselves believe, and what it is worth.
+    /// Result of the search for the interferer, for relays that measure it.
     #[serde(flatten)]
     pub listened: Option<ListenedReport>,
-    /// What the places are worth against several interferers, for which one stood.
+    /// SIR against all interferers, if the relays assumed a single one.
     #[serde(flatten)]
     pub against_all: Option<AgainstAll>,
-    /// How many relays are in the chain at the end, where that is not what it began with, or might not have been.
+    /// Number of relays in the chain at the end, if the run had other events than convergence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
-    /// The relays that are not, where they were last.
+    /// Relays outside the chain, with their last positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<LostReport>,
-    /// Where the drones are, where they were flown by autopilots.
+    /// Final positions of drones with autopilots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
-    /// What happened when, if anything did but that the chain converged.
+    /// Log of the run, if it has more than convergence.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub timeline: Vec<MomentReport>,
-    /// How long it took each time the chain formed anew.
+    /// Recovery times for each new view.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub recovery: Vec<RecoveryReport>,
-    /// What an attack came to, if there was one.
+    /// Result of the attack, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attack: Option<AttackReport>,
     /// Seed of every random draw.
     pub seed: u64,
-    /// Whether there is room beside the line: the table then says where in it a relay is.
+    /// True if relays may leave the line: the table then has a y column.
     #[serde(skip)]
     pub room: bool,
 }
 
 impl ChainReport {
-    /// The report of a run in which the chain flies `mission` in the end.
+    /// Report of a run in which the chain's final mission is `mission`.
     pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
         let chain = left(outcome);
         let timeline = timeline::timeline(&outcome.moments);
@@ -150,7 +150,7 @@ impl ChainReport {
         let rx_sir = sirs.last().copied();
         let injected = outcome.injected;
         let target = chain.first().and_then(|(_, head)| head.target);
-        // Whether no chain can have more, as far as the tolerance goes.
+        // True if no chain can exceed the target, within the tolerance.
         let bound = outcome.relays.iter().find_map(|relay| relay.bound);
         let promised = match (mission.interference(), target, bound) {
             (Interference::Field(_), Some(target), Some(bound)) => {
@@ -163,7 +163,7 @@ impl ChainReport {
             uavs: mission.relays(),
             version: offered.map(|_| version(outcome)),
             error: error(method, outcome),
-            // A fixed step may have stepped over what there is.
+            // A fixed step may skip feasible targets.
             best_sir: (outcome.ending == Ending::Infeasible && !method.ends_with("-step"))
                 .then_some(0.0),
             sir: worst,
@@ -206,7 +206,7 @@ impl ChainReport {
         }
     }
 
-    /// The report of a run that could not be started.
+    /// Report of a run that could not be started.
     pub fn refused(method: &str, uavs: u16, seed: u64, why: &str) -> Self {
         Self {
             method: method.to_owned(),
@@ -250,7 +250,7 @@ impl ChainReport {
         }
     }
 
-    /// The report as a table to read, and what it cost.
+    /// Formats the report as a table with the cost of the run.
     pub fn table(&self) -> String {
         let mut text = hops::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
@@ -343,7 +343,7 @@ impl ChainReport {
         text
     }
 
-    /// How many relays, of how many.
+    /// Formats the number of remaining relays, with the total if some are lost.
     fn relays_left(&self) -> String {
         match self.left {
             Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),

@@ -1,4 +1,4 @@
-//! Where drones with an autopilot are in the end.
+//! Final positions of drones with autopilots.
 
 use serde::Serialize;
 use uav_relay::Placement;
@@ -6,25 +6,24 @@ use uav_relay::Placement;
 use crate::simulator::drones::{Point, apart};
 use crate::simulator::outcome::{Outcome, RelayEnd};
 
-/// One drone at the end of a run.
+/// Final state of a drone.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct DroneReport {
-    /// Its relay's number in the mission, from 1.
+    /// Relay number in the mission, from 1.
     pub index: u16,
-    /// Where it truly is, m.
+    /// True position along the line, m.
     pub x_m: f64,
-    /// To the right of the line, m.
+    /// True position to the right of the line, m.
     pub y_m: f64,
-    /// Above the ground, m.
+    /// True height above the ground, m.
     pub h_m: f64,
-    /// Whether its autopilot flies to the relay's setpoints.
+    /// True if the relay controls the drone.
     pub flown: bool,
-    /// How far it is from its relay's place, m, where that has one.
+    /// Distance from the relay's setpoint, m, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
 }
 
-/// All of them; none where no autopilots were flown.
 pub(super) fn drones(outcome: &Outcome) -> Vec<DroneReport> {
     let ends = (1..).zip(outcome.fleet.iter().zip(&outcome.relays));
     ends.map(|(index, (&(at, flown), relay))| one(index, at, flown, relay))

@@ -1,13 +1,13 @@
-//! Why a run has not ended well, in words.
+//! Error messages for runs that failed.
 
 use super::flown::version;
 use super::timeline::seconds;
 use crate::simulator::outcome::{Ending, Outcome, Turning};
 
-/// Why a run by `method` has not ended well, and what else it lacks.
+/// Returns the reason for a failed run, and the upload that was not adopted, if any.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
-    // One that was adopted and is flown by nobody who is left was adopted all the same.
+    // A mission counts as adopted even if its relays are lost.
     let known = version(outcome).max(adopted(outcome));
     let missing = outcome.offered().filter(|newest| *newest > known);
     Some(match missing {
@@ -16,7 +16,7 @@ pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     })
 }
 
-/// The newest mission that any relay has ever flown, 0 for the one that all took off with.
+/// Returns the newest mission version that any relay adopted; 0 for the original mission.
 fn adopted(outcome: &Outcome) -> u16 {
     let versions = outcome.moments.iter().map(|moment| match moment.what {
         Turning::Adopted(version) => version,
@@ -25,7 +25,6 @@ fn adopted(outcome: &Outcome) -> u16 {
     versions.max().unwrap_or(0)
 }
 
-/// Why a run has not ended well.
 fn ended(method: &str, outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Settled | Ending::Soaked => None,

@@ -1,4 +1,4 @@
-//! Which mission a chain flies: the one that it took off with, or one that was uploaded since.
+//! Final mission of the chain: the original or an uploaded one.
 
 use uav_relay::Mission;
 
@@ -6,7 +6,7 @@ use super::left::left;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 
-/// The mission that the chain flies when a run of `setup` has ended, with all its relays: what a report has to be of.
+/// Returns the mission that the chain flies at the end of a run, with all its relays.
 pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
     let version = version(outcome);
     let mut uploads = setup.uploads.iter().map(|spec| spec.upload);
@@ -16,7 +16,7 @@ pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
         .unwrap_or(setup.mission)
 }
 
-/// Its version; of relays that have not agreed yet, the newest that one of them flies.
+/// Returns the version of that mission; the newest one if the relays differ.
 pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);

@@ -1,4 +1,4 @@
-//! The relays at their places, with the SIR of every hop.
+//! Positions of the relays and SIR of every hop.
 
 use std::fmt::Write as _;
 
@@ -9,35 +9,35 @@ use uav_relay::{Mission, Placement, Profile};
 
 use super::left::LostReport;
 
-/// One relay at its place.
+/// Position and SIR of a relay.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RelayReport {
     /// Index in the chain, from 1.
     pub index: u16,
     /// Distance from the transmitter, m.
     pub x_m: f64,
-    /// Distance from the line to the receiver, m: to its right above 0.
+    /// Distance from the line, m, positive to the right as seen toward the receiver.
     pub y_m: f64,
     /// Altitude, m.
     pub h_m: f64,
-    /// SIR of the hop that ends here, linear.
+    /// SIR of the hop that ends at the relay, linear.
     pub sir: f64,
-    /// The same in dB.
+    /// SIR of the hop that ends at the relay, dB.
     pub sir_db: f64,
-    /// Version of the mission that it flies, 0 for the one it took off with; absent where nothing was uploaded.
+    /// Version of the relay's mission, 0 for the original one; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
 }
 
-/// A linear power ratio in dB.
+/// Converts a linear power ratio to dB.
 pub fn db(linear: f64) -> f64 {
-    // The same on every machine, and in a browser.
+    // `libm` gives the same result on every machine, and in a browser.
     10.0 * libm::log10(linear)
 }
 
-/// The SIR of every hop, from the transmitter's to the receiver's, for relays that stand at `places`.
+/// Returns the SIR of every hop, from the transmitter to the receiver, for relays at `places`.
 ///
-/// By the formulas of the crate, as a relay works them out; at most the largest f32, where two places all but coincide.
+/// Uses the crate's formulas, as on board; limited to the largest f32 for nearly coincident positions.
 pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let mut sender = Sender::transmitter(mission);
     let mut from_m = 0.0;
@@ -59,7 +59,7 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
     sirs
 }
 
-/// The relays at `places`, with the SIR of the hop that ends at each.
+/// Reports the relays at `places` with the SIR of the hop that ends at each.
 pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
     (1..)
         .zip(places.iter().zip(sirs))
@@ -75,8 +75,7 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
         .collect()
 }
 
-/// The relays and Rx as a table to read, those that are lost at their last places among them; nothing where no relay has a
-/// place. With y where there is `room` beside the line.
+/// Formats the relays, the lost ones and Rx as a table; with a y column if `room` is true.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

@@ -1,34 +1,34 @@
-//! Who is left of a chain, and who is not.
+//! Relays that are in the chain at the end of a run, and those that are not.
 
 use serde::Serialize;
 
 use crate::simulator::outcome::{Ending, Outcome, RelayEnd};
 
-/// A relay that is not in the chain any more.
+/// Relay that is no longer in the chain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LostReport {
-    /// Its number in the mission, from 1.
+    /// Relay number in the mission, from 1.
     pub index: u16,
-    /// Where it was told to fly last: distance from the transmitter, m.
+    /// Last setpoint: distance from the transmitter, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_m: Option<f64>,
-    /// Distance from the line there, m: to its right above 0.
+    /// Last setpoint: distance from the line, m, positive to the right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_m: Option<f64>,
-    /// Altitude there, m.
+    /// Last setpoint: altitude, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub h_m: Option<f64>,
-    /// Version of the mission that it flies, or flew when it went silent; absent where nothing was uploaded.
+    /// Last version of the relay's mission; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// `silent` if it went silent; `apart` if it lives but cannot reach the others; `cut` if it lives and no chain is left.
+    /// Reason: `silent`; `apart` (alive, cannot reach the others); `cut` (alive, no chain is left).
     pub why: &'static str,
 }
 
-/// The relays that are in the chain when the run has ended, each with its number from 1, in order from Tx.
+/// Returns the relays of the chain at the end of the run, with their numbers from 1, in order from Tx.
 ///
-/// That is the largest part whose relays have all been counted with each other; where there is none, all that live. On wires
-/// a break is only reported: there nobody is left out. Where no part is large enough to go on, there is no chain.
+/// The chain is the largest complete view, or all living relays if there is none. On separate links a failure is only reported:
+/// all relays stay. Without a quorum there is no chain.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -51,14 +51,14 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Whether these are all the relays of their view.
+/// Returns true if these are all relays of their view.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)
         .all(|(place, (_, relay))| relay.index == place && usize::from(relay.relays) == part.len())
 }
 
-/// The relays that are not among those left.
+/// Reports the relays that are not in `left`.
 pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostReport> {
     (1..)
         .zip(&outcome.relays)

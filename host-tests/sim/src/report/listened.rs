@@ -1,4 +1,4 @@
-//! What came of a run whose relays had to find the interferer by themselves.
+//! Report of a run whose relays had to find the interferer by measuring.
 
 use std::fmt::Write as _;
 
@@ -15,41 +15,41 @@ use crate::simulator::sky::Sky;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
-/// An interferer that is believed to be there.
+/// Estimated interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct BelievedReport {
     /// Transmit power, W.
     pub power_w: f32,
-    /// Along the line, m.
+    /// Position along the line, m.
     pub x_m: f32,
-    /// To its right, m; relays that never left the line cannot tell the sides from each other.
+    /// Position to the right of the line, m; its sign is arbitrary if the relays never left the line.
     pub y_m: f32,
 }
 
-/// What was found, and what it is worth.
+/// Interference estimate and its quality.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct ListenedReport {
-    /// What the first relay believes in the end.
+    /// Final estimate of relay 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed: Option<BelievedReport>,
-    /// How often the chain has agreed on other places, the first time included.
+    /// Number of agreements on new positions, including the first.
     pub agreements: u32,
-    /// The SIR of the relays that are left in the end against the true interferers, linear.
+    /// Final SIR of the remaining relays against the true interferers, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub true_sir: Option<f64>,
-    /// That of the same relays if they were told of the interferer as it is in the end, linear. Of one interferer.
+    /// Final SIR of the same relays if they knew the interferer, linear; for a single interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
-    /// The one over the other.
+    /// Ratio `true_sir` / `optimum_sir`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share_of_optimum: Option<f64>,
-    /// The mean of that at every measurement since the first agreement.
+    /// Mean of that ratio over all measurements since the first agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_share_of_optimum: Option<f64>,
 }
 
 impl ListenedReport {
-    /// Of a run of `setup`; `None` where nobody listened.
+    /// Report of a run of `setup`; `None` if the relays did not measure.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let sky = setup.sky.as_ref()?;
         let believed = outcome.relays.first().map(|relay| relay.believed.belief);
@@ -71,7 +71,7 @@ impl ListenedReport {
             let sir = scene.chain_sir(&stand.places);
             report.true_sir = Some(sir);
             report.agreements = stand.agreements;
-            // Of an interferer that does not move it is found once for the same relays.
+            // The optimum for a fixed interferer and the same relays is computed once.
             let known = still.take().filter(|(nodes, _)| *nodes == stand.nodes);
             let optimum =
                 known.map_or_else(|| optimum(setup, &scene, &stand.nodes), |(_, known)| known);
@@ -87,7 +87,6 @@ impl ListenedReport {
         Some(report)
     }
 
-    /// The same as lines of text.
     pub(super) fn text(&self) -> String {
         let mut text = String::new();
         _ = match self.believed {
@@ -127,7 +126,7 @@ fn moves(sky: &Sky) -> bool {
     sky.velocity_mps.iter().any(|speed| speed.abs() > 0.0)
 }
 
-/// The scene of `nodes` alone, the relays that are left, by index from 1.
+/// Returns the scene with only the relays `nodes`, by index from 1.
 fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
     let relay = |node: &u16| {
         scene
@@ -139,7 +138,7 @@ fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
     Scene { relays, ..scene }
 }
 
-/// The SIR of the chain of `nodes` that is told of the one interferer of `scene`, linear.
+/// Returns the SIR of the chain of `nodes` that knows the single interferer of `scene`, linear.
 fn optimum(setup: &Setup, scene: &Scene, nodes: &[u16]) -> Option<f64> {
     let [source] = scene.sources.as_slice() else {
         return None;

@@ -1,4 +1,4 @@
-//! What a run or a plan came to, as people and programs read it.
+//! Reports of runs and plans, as text and JSON.
 
 pub mod against;
 pub mod air;

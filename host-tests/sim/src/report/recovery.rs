@@ -1,4 +1,4 @@
-//! How long it took the chain to form anew after it lost relays, got some back, or was given another mission.
+//! Recovery times: new views after the loss or return of relays, or after a mission upload.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -9,48 +9,48 @@ use uav_relay::Instant;
 use super::timeline::{list, seconds};
 use crate::simulator::outcome::{Moment, Turning};
 
-/// One new view of the chain. All times are of virtual time since the start, s.
+/// New view of the chain. All times are virtual time since the start, s.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecoveryReport {
-    /// The number of the view.
+    /// Number of the view.
     pub view: u32,
-    /// How many relays it has.
+    /// Number of relays in the view.
     pub relays: u16,
-    /// The relays that are in it no more.
+    /// Relays of the previous view that left.
     pub lost: Vec<u16>,
-    /// The relays that are in it again.
+    /// Relays that joined or returned.
     pub back: Vec<u16>,
-    /// Version of the mission that is first flown in it, if that was uploaded.
+    /// Version of an uploaded mission that is first flown in this view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// When the ground began to upload that.
+    /// Start of that upload.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offered_s: Option<f64>,
-    /// When the first of them went silent, was switched on, or was parted from the others or joined with them.
+    /// Time of the cause: the first failure, reboot, partition or reunion of those relays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
-    /// When a neighbour first noticed.
+    /// Time of its first detection by a neighbour.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detected_s: Option<f64>,
-    /// When all its relays had agreed to the view.
+    /// Time when all its relays had accepted the view.
     pub formed_s: f64,
-    /// When all of them held their new places, unless another view came before that.
+    /// Time when all its relays held their new positions; absent if another view came first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged_s: Option<f64>,
-    /// Passes along the chain from when it was noticed, or the upload began, until then; the calls for the view are among them.
+    /// Sweeps from the detection, or the start of the upload, to convergence, including view requests.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<u32>,
 }
 
-/// A view that all its relays have agreed to.
+/// View that all its relays have accepted.
 struct View {
     number: u32,
     members: BTreeSet<u16>,
-    /// Where in the story its first relay agreed, and the last.
+    /// Log indices of its first and last acceptance.
     span: (usize, usize),
 }
 
-/// The new views of a run of `relays` relays, in order.
+/// Reports the new views of a run of `relays` relays, in order.
 pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport> {
     let views = views(moments);
     let mut before: BTreeSet<u16> = (1..=relays).collect();
@@ -115,9 +115,9 @@ fn views(moments: &[Moment]) -> Vec<View> {
     whole.map(|(_, view)| view).collect()
 }
 
-/// The newest mission that one of the relays of `view` flies once it is formed, if that was uploaded.
+/// Returns the newest uploaded mission that a relay of `view` adopted with it.
 fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
-    // A relay tells that it flies it right after it has told of the view.
+    // A relay logs the adoption right after the view.
     let story = moments.get(..=view.span.1 + 1).unwrap_or(moments);
     let versions = story.iter().filter_map(|moment| match moment.what {
         Turning::Adopted(version) if view.members.contains(&moment.relay) => Some(version),
@@ -126,14 +126,13 @@ fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
     versions.max()
 }
 
-/// The moment at which the ground began to upload a mission.
 fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
     moments
         .iter()
         .find(|moment| moment.what == Turning::Offered(version))
 }
 
-/// When the last thing happened to relays that are lost now, or back.
+/// Returns the time of the event that removed relays from the view, or brought them back.
 fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: Turning, common: Turning| {
         let latest = |relay: &u16| {
@@ -151,7 +150,7 @@ fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     gone.into_iter().chain(come).min()
 }
 
-/// The first moment at which one of them was missed, or found.
+/// Returns the first detection of a lost or returned relay.
 fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
     earlier.iter().find(|moment| match moment.what {
         Turning::Lost(_) => moment.other.is_some_and(|other| lost.contains(&other)),
@@ -162,7 +161,7 @@ fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a
     })
 }
 
-/// The last moment at which one of `members` took its place, if all have.
+/// Returns the last convergence among `members`, if all have converged.
 fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed =
         |moment: &&Moment| moment.what == Turning::Converged && members.contains(&moment.relay);
@@ -175,7 +174,7 @@ fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Mom
     later.iter().rfind(placed).filter(|_| all)
 }
 
-/// Passes that `members` have begun from one time to another, as far as the story tells how many they had begun when.
+/// Returns the sweeps that `members` began in `span`, as far as the log tells.
 fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant)) -> u32 {
     let begun = |relay: u16, by: Instant| {
         let mut story = moments.iter().rev();
@@ -189,7 +188,7 @@ fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant))
         .sum()
 }
 
-/// A line for each, in which somebody was lost or came back, or a new mission is flown; the others are only counted.
+/// Formats a line per view with lost or returned relays or a new mission; other views are only counted.
 pub(super) fn text(recoveries: &[RecoveryReport]) -> String {
     let mut text = String::new();
     let mut same = 0;

@@ -1,4 +1,4 @@
-//! Who noticed that a relay went silent.
+//! Detected failures of relays.
 
 use std::collections::BTreeMap;
 
@@ -7,18 +7,18 @@ use serde::Serialize;
 use super::timeline::seconds;
 use crate::simulator::outcome::{Outcome, Turning};
 
-/// A relay whose silence was noticed.
+/// Detected failure of a relay.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SilenceReport {
-    /// The relay that went silent.
+    /// Failed relay.
     pub silent: u16,
-    /// The neighbour that noticed.
+    /// Neighbour that detected the failure.
     pub noticed_by: u16,
-    /// When it had been silent for long enough, s of virtual time.
+    /// Detection time, s of virtual time.
     pub at_s: f64,
 }
 
-/// Who noticed the relays that really went silent; over a bad link a living one may be missed for a while as well.
+/// Reports which neighbours detected the relays that failed. False detections over bad links are left out.
 pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     let killed = |index: u16| {
         let at = usize::from(index).checked_sub(1);

@@ -1,4 +1,4 @@
-//! The story of a run, moment by moment for programs and in a few lines for people.
+//! Log of a run, as JSON entries and as grouped lines of text.
 
 use std::fmt::Write as _;
 
@@ -7,36 +7,37 @@ use uav_relay::Instant;
 
 use crate::simulator::outcome::{Moment, Turning};
 
-/// Virtual time since the start, s.
+/// Converts to seconds of virtual time since the start.
 pub(super) fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }
 
-/// One moment.
+/// Log entry of a run.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MomentReport {
-    /// When, s of virtual time.
+    /// Time of the entry, s of virtual time.
     pub at_s: f64,
-    /// Whose, by its number in the mission, from 1. Of a partition it is the last relay before it; of an upload that begins, 0 is the
-    /// transmitter, and the receiver comes after the last relay.
+    /// Relay number from 1; Tx and Rx count as 0 and N + 1; for a partition, the last relay before it.
     pub relay: u16,
-    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`, `offered`,
-    /// `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch`, `namesake`,
-    /// `engaged`, `released`, `blind` or `restarted`: those four of its autopilot; `believes`, `unclear` or `off`: of relays that listen.
+    /// Kind of the entry.
+    ///
+    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`,
+    /// `offered`, `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch`, `namesake`; of autopilots
+    /// `engaged`, `released`, `blind`, `restarted`; of relays that measure `believes`, `unclear`, `off`.
     pub what: &'static str,
-    /// The neighbour that was lost or found, the relay that is not heard, or the one that is told of.
+    /// Other node of the entry, for example a lost or found neighbour.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other: Option<u16>,
-    /// Number of the view that was formed.
+    /// Number of the new view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub view: Option<u32>,
-    /// How many relays it has.
+    /// Number of relays in the new view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relays: Option<u16>,
-    /// Version of the mission that was offered, held or adopted.
+    /// Version of the mission that was offered, stored or adopted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// The target agreed on, linear.
+    /// Target SIR agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
 }
@@ -97,7 +98,7 @@ impl MomentReport {
     }
 }
 
-/// The moments of a run; none if all it did was to converge.
+/// Returns all log entries; none if the run has only convergence.
 pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     let plain = |moment: &Moment| matches!(moment.what, Turning::Converged | Turning::Infeasible);
     if moments.iter().all(plain) {
@@ -106,24 +107,24 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     moments.iter().map(MomentReport::of).collect()
 }
 
-/// What several relays did in common.
+/// Log entries of several relays that form one line.
 #[derive(Clone, PartialEq, Debug)]
 struct Group {
     first_s: f64,
     last_s: f64,
-    /// Who, in the order in which they did; a pair of neighbours that found each other, in order from Tx.
+    /// Relays in order of their entries; a pair of neighbours that found each other, in order from Tx.
     relays: Vec<u16>,
     sample: MomentReport,
 }
 
-/// Seconds between two moments that belong together, at most: a neighbour may notice a silence so much later than another.
+/// Longest time between entries of one group, s: neighbours may detect a failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
-/// The story in groups, by the time that counts: the last one's where all have to agree, else the first one's.
+/// Groups the log entries; sorted by a group's last time if all relays have to agree, else by its first.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
-        // What came before another view has nothing to do with what came after it.
+        // Entries before a new view do not belong to those after it.
         let open = groups
             .iter()
             .rposition(|group| group.sample.what == "formed" && moment.what == "converged")
@@ -158,13 +159,13 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         "lost" | "unheard" | "stranger" | "other key" | "old epoch" | "namesake" => {
             one.other == moment.other
         }
-        // Each of two neighbours finds the other.
+        // Both neighbours log that they found each other.
         "found" => {
             one.other == Some(moment.relay) && moment.other == Some(one.relay)
                 || (one.relay, one.other) == (moment.relay, moment.other)
         }
         "formed" => one.view == moment.view,
-        // What is the same to the bit.
+        // Targets are compared bit by bit.
         "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
         "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
         "held" | "adopted" => one.version == moment.version,
@@ -183,7 +184,7 @@ impl Group {
         }
     }
 
-    /// What happened, in a few words, for a picture.
+    /// Describes the group in a few words, for a picture.
     fn words(&self) -> String {
         let who = list(&self.relays);
         let one = &self.sample;
@@ -215,7 +216,7 @@ impl Group {
         }
     }
 
-    /// What happened, as a line of text.
+    /// Describes the group as a line of text.
     fn line(&self) -> String {
         let many = self.relays.len() > 1;
         let who = format!(
@@ -285,7 +286,7 @@ impl Group {
     }
 }
 
-/// "3", "3 and 5", "1, 2 and 5", "1 to 3 and 5 to 9".
+/// Formats relay numbers: "3", "3 and 5", "1, 2 and 5", "1 to 3 and 5 to 9".
 pub(super) fn list(relays: &[u16]) -> String {
     let mut sorted = relays.to_vec();
     sorted.sort_unstable();
@@ -303,15 +304,15 @@ pub(super) fn list(relays: &[u16]) -> String {
     }
 }
 
-/// "1 relay", "8 relays".
+/// Formats a count: "1 relay", "8 relays".
 fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
-/// Lines at either end of a long story.
+/// Number of lines at the start and at the end of a shortened log.
 const ENDS: usize = 20;
 
-/// The story as text: a line for each thing that happened, the middle of a very long one left out.
+/// Formats the log, one line per group, without the middle of a very long log.
 pub(super) fn text(timeline: &[MomentReport]) -> String {
     let groups = groups(timeline);
     let mut text = String::new();
@@ -327,7 +328,7 @@ pub(super) fn text(timeline: &[MomentReport]) -> String {
     text
 }
 
-/// The same for a picture: seconds, and a few words.
+/// Returns the groups' times, s, and short descriptions, for a picture.
 pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
     groups(timeline)
         .iter()

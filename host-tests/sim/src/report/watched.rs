@@ -1,4 +1,4 @@
-//! What a run was like over its whole time.
+//! Statistics over the whole run.
 
 use std::fmt::Write as _;
 
@@ -7,28 +7,28 @@ use serde::Serialize;
 use super::timeline::seconds;
 use crate::simulator::watch::Watched;
 
-/// What a run was like over its whole time; empty where that was not watched.
+/// Statistics over the whole run; all absent if not recorded.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct WatchedReport {
-    /// When all relays of a view held their places for the first time, s.
+    /// Time of the first agreement, s: all relays of a view hold their positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_agreement_s: Option<f64>,
-    /// The share of the time since then in which all relays that can be in one chain held its optimum.
+    /// Share of the time since then in which a longest possible chain held its optimum.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub availability: Option<f64>,
-    /// The longest time since then in which they did not, s.
+    /// Longest continuous time since then without that, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_outage_s: Option<f64>,
-    /// The largest number of separate groups that flew an agreement of their own at once.
+    /// Largest number of groups that held separate agreements at the same time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_flying: Option<usize>,
-    /// The least distance that two relays ever had, m.
+    /// Smallest distance of two relays, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_separation_m: Option<f64>,
 }
 
 impl WatchedReport {
-    /// The report of it.
+    /// Report of `watched`.
     pub fn of(watched: Watched) -> Self {
         let longest = watched.longest_wrong;
         Self {
@@ -40,7 +40,6 @@ impl WatchedReport {
         }
     }
 
-    /// The same as lines of text.
     pub(super) fn text(&self) -> String {
         let mut text = String::new();
         if let Some(availability) = self.availability {

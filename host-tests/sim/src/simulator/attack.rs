@@ -1,4 +1,4 @@
-//! An attacker on the air: it hears every frame, knows the mission and lacks the key, and sends what it likes to any relay.
+//! Attacker without the key: receives every frame, and sends forged and replayed frames to any relay.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -9,59 +9,56 @@ use uav_relay::{Instant, Port, Stats};
 
 use super::link::LinkSpec;
 
-/// What an attacker does. Half of its frames it sends back to back from the start on, the rest at random times.
+/// Attack plan. Half of the frames are sent back to back from the start, the others at random times.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Attack {
-    /// Forged frames.
+    /// Number of forged frames.
     pub forged: u32,
-    /// Recorded frames, sent again.
+    /// Number of replayed frames.
     pub replayed: u32,
-    /// The last of them is sent at this time, or a little later.
+    /// Time of the last frame; back-to-back frames may end slightly later.
     pub until: Instant,
 }
 
-/// One frame of an attacker.
+/// Kind of an attacker's frame.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Strike {
-    /// One of its own making.
+    /// A forged frame.
     Forge,
-    /// One that it has heard.
+    /// A received frame, sent again.
     Replay,
 }
 
-/// What became of the frames of an attacker: how many of them the relays that they came to counted as what.
+/// Counts of the attacker's frames by how the receiving relays classified them.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Struck {
-    /// By kind, and by the name of the counter in [`Stats`]; `received` is a frame that was taken for a neighbour's.
+    /// Frames by kind and by the name of the counter in [`Stats`]; `received` counts frames accepted as a neighbour's.
     pub counted: BTreeMap<(Strike, &'static str), u64>,
 }
 
-/// A frame that was heard.
 #[derive(Clone, Debug)]
 pub(super) struct Recorded {
-    /// When it has arrived at whoever it is for: before that it would be no replay.
+    /// Arrival time at the intended receiver; sending it earlier would not be a replay.
     pub(super) arrived: Instant,
-    /// The port it comes in by.
+    /// Port at which the receiver gets it.
     pub(super) port: Port,
     pub(super) bytes: Vec<u8>,
 }
 
-/// The attacker in a run.
 #[derive(Debug)]
 pub(super) struct Attacker {
     pub(super) attack: Attack,
-    /// Its own: what it draws changes nothing in what the relays and the links draw.
+    /// Separate generator, so that the attacker's draws do not change those of relays and links.
     pub(super) rng: ChaCha8Rng,
     recorded: VecDeque<Recorded>,
 }
 
-/// The stream of random numbers that an attacker draws from.
 const ATTACKER: u64 = 2;
 
-/// Frames that an attacker keeps: the latest.
+/// Largest number of recorded frames; older ones are discarded.
 const MEMORY: usize = 65_536;
 
-/// How many frames it looks at to find one that has arrived.
+/// Random picks before the search for an arrived frame is given up.
 const TRIES: usize = 64;
 
 impl Attacker {
@@ -75,7 +72,7 @@ impl Attacker {
         }
     }
 
-    /// When it sends what, in no order.
+    /// Times and kinds of all frames, unsorted.
     pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, Strike)> {
         let Attack {
             forged,
@@ -101,7 +98,6 @@ impl Attacker {
         plan
     }
 
-    /// Hears a frame.
     pub(super) fn record(&mut self, frame: Recorded) {
         if self.recorded.len() >= MEMORY {
             self.recorded.pop_front();
@@ -109,7 +105,7 @@ impl Attacker {
         self.recorded.push_back(frame);
     }
 
-    /// One of the frames that have arrived by `now`; `None` if there are none, or next to none.
+    /// Returns a random recorded frame that has arrived before `now`; `None` if [`TRIES`] picks find none.
     pub(super) fn recall(&mut self, now: Instant) -> Option<Recorded> {
         if self.recorded.is_empty() {
             return None;
@@ -125,11 +121,10 @@ impl Attacker {
     }
 }
 
-/// The counter that tells what a frame was taken for: the first that has grown from `before` to `after`.
+/// Returns the name of the first counter that grew from `before` to `after`.
 pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
-    /// A counter, by its name.
     type Counter = (&'static str, fn(&Stats) -> u32);
-    // What was received and then refused has grown in two of them: why it was refused comes first.
+    // A received but rejected frame increments two counters; the reason for the rejection comes first.
     let counters: [Counter; 16] = [
         ("forged", |stats| stats.forged),
         ("unsigned", |stats| stats.unsigned),

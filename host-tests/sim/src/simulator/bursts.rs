@@ -1,25 +1,25 @@
-//! Losses in runs: the model of Gilbert and Elliott, in which a link is good or bad and loses every frame while it is bad.
+//! Bursts of frame losses: Gilbert-Elliott model with a good and a bad state per link; every frame is lost in the bad state.
 
 use std::collections::HashMap;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// The links that lose frames in runs, each by itself and either direction by itself.
+/// Burst state of all links; each direction of a link is independent.
 #[derive(Debug)]
 pub struct Bursts {
-    /// The mean share of lost frames, and so that of bad links.
+    /// Mean share of lost frames, equal to the share of time in the bad state.
     share: f64,
-    /// From a good link to a bad one, per frame.
+    /// Probability per frame of the transition from good to bad.
     worsens: f64,
-    /// From a bad one to a good one: one over the mean length of a run.
+    /// Probability per frame of the transition from bad to good: the inverse of the mean burst length.
     heals: f64,
-    /// Whether a link is bad, by sender and receiver.
+    /// True for a bad link, by sender and receiver.
     bad: HashMap<(usize, usize), bool>,
 }
 
 impl Bursts {
-    /// Links that lose `share` of the frames, 0 to 0.9, in runs of `length` frames on average, at least [`Bursts::shortest`].
+    /// Links with a `share` of lost frames, 0 to 0.9, and a mean burst `length` from [`Bursts::shortest`] up.
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {
@@ -30,12 +30,12 @@ impl Bursts {
         }
     }
 
-    /// The mean length of a run of losses where frames are lost independently: with `share` lost, no model makes sense below it.
+    /// Returns the mean burst length of independent losses with probability `share`: the model's lower limit.
     pub fn shortest(share: f64) -> f64 {
         1.0 / (1.0 - share)
     }
 
-    /// Whether the next frame on a link is lost.
+    /// Returns true if the link's next frame is lost.
     pub fn loses(&mut self, from: usize, to: usize, rng: &mut ChaCha8Rng) -> bool {
         let share = self.share;
         let Some(bad) = self.bad.get_mut(&(from, to)) else {

@@ -1,4 +1,4 @@
-//! The relays, connected, run until they hold their places.
+//! Event loop of a run: connects the relays and processes events until the run ends.
 
 mod air;
 mod begin;
@@ -38,24 +38,24 @@ use super::outcome::{Outcome, RelayEnd, Turning};
 use super::queue::Happening;
 use super::setup::Setup;
 
-/// After this many happenings the run is given up: some minutes of computing.
+/// Limit on the events of a run: some minutes of computing.
 const MOST_HAPPENINGS: u64 = 400_000_000;
 
 impl Chain {
     /// Switches every relay on at time 0.
     ///
     /// # Errors
-    /// [`SetupError`] where a profile or setting is refused by the relay.
+    /// [`SetupError`] if a relay rejects its profile or settings.
     pub fn new(setup: Setup) -> Result<Self, SetupError> {
         Self::begin(setup, |other| run(other).ok())
     }
 
-    /// Sweeps that have begun and virtual time so far.
+    /// Returns the number of sweeps begun and the virtual time.
     pub fn progress(&self) -> (u32, Instant) {
         (self.sweeps(), self.now)
     }
 
-    /// Runs up to `happenings` happenings; whether the run has ended.
+    /// Processes up to `happenings` events. Returns true if the run has ended.
     pub fn step(&mut self, happenings: u64) -> bool {
         for _ in 0..happenings {
             if let Some(ending) = self.ending() {
@@ -78,7 +78,7 @@ impl Chain {
         false
     }
 
-    /// Has every living relay that holds a place measure there: `samples` times what `draw` gives for a place, W.
+    /// Feeds `samples` interference samples to every living relay that has a setpoint; `draw` returns one, W, for a position.
     pub fn measure(
         &mut self,
         samples: u32,
@@ -101,7 +101,7 @@ impl Chain {
         }
     }
 
-    /// Where the relays were told to fly, if all of them were.
+    /// Returns the setpoints of all relays; `None` unless every relay has one.
     pub fn setpoints(&self) -> Option<Vec<Placement>> {
         self.members
             .iter()
@@ -109,7 +109,7 @@ impl Chain {
             .collect()
     }
 
-    /// Has the chain agree again.
+    /// Restarts planning at the leader.
     pub fn restart(&mut self) {
         let now = self.now;
         self.holding = 0;
@@ -126,7 +126,7 @@ impl Chain {
         self.finish()
     }
 
-    /// What came of the run so far.
+    /// Returns the outcome of the run so far.
     pub fn finish(mut self) -> Outcome {
         self.outcome.ended = self.now;
         self.outcome.sweeps = self.progress().0;
@@ -190,7 +190,7 @@ impl Chain {
         }
     }
 
-    /// Something happens to relay `index` (from 0).
+    /// Handles an event of relay `index` (from 0).
     fn happen_to(&mut self, index: usize, happening: Happening) {
         let now = self.now;
         let Some(member) = self.members.get_mut(index) else {
@@ -204,7 +204,7 @@ impl Chain {
                     seed: self.rng.random(),
                     now,
                 };
-                // As a firmware has it in its flash before anything is sent.
+                // The firmware persists the record before it sends, so the record survives the reboot.
                 let record = member.relay.view_record();
                 let stored = member.stored.as_ref();
                 let Ok(relay) = switched_on(&self.setup, start, stored, Some(&record)) else {
@@ -231,14 +231,14 @@ impl Chain {
                 return;
             }
             Happening::Bytes { port, bytes } => {
-                // However a driver cuts the stream, the relay must not care: cut it at random.
+                // The relay must accept any fragmentation of the byte stream: split at a random offset.
                 let cut = self.rng.random_range(0..=bytes.len());
                 let (first, second) = bytes.split_at_checked(cut).unwrap_or((&bytes, &[]));
                 member.relay.handle_bytes(now, port, first);
                 member.relay.handle_bytes(now, port, second);
             }
             Happening::Wake => {
-                // An earlier wake-up has taken the place of this one: what is left of it must not multiply.
+                // Ignore a wake-up that was replaced by an earlier one; otherwise wake-ups would multiply.
                 if member.wake != Some(now) {
                     return;
                 }
@@ -250,7 +250,7 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Takes out what the relay has to say, and when it wants to be called again.
+    /// Sends the relay's pending frames, handles its events, and schedules its next wake-up.
     fn drain(&mut self, index: usize) {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];
@@ -270,7 +270,7 @@ impl Chain {
         if let Some(at) = member.relay.poll_timeout()
             && member.wake.is_none_or(|wake| at < wake)
         {
-            // The contract of a relay: drained, it never wants to be called at once.
+            // A drained relay must not request an immediate call.
             assert!(at > now, "relay {} would spin", index + 1);
             member.wake = Some(at);
             self.queue.put(at, index, Happening::Wake);
@@ -281,7 +281,7 @@ impl Chain {
 /// Runs `setup` to the end.
 ///
 /// # Errors
-/// [`SetupError`] where a profile or setting is refused by the relay.
+/// [`SetupError`] if a relay rejects its profile or settings.
 pub fn run(setup: Setup) -> Result<Outcome, SetupError> {
     Chain::new(setup).map(Chain::run)
 }

@@ -1,22 +1,22 @@
-//! A relay that does not hear another one, while that one may well hear it.
+//! One-way link failure: a relay does not receive another one, which may still receive it.
 
 use uav_relay::Instant;
 
-/// A time in which relay `by` does not hear relay `of`.
+/// Period in which relay `by` does not receive relay `of`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Deaf {
-    /// The relay that does not hear, from 1.
+    /// The relay that does not receive, from 1.
     pub by: u16,
-    /// The relay that it does not hear, from 1.
+    /// The relay that is not received, from 1.
     pub of: u16,
-    /// When it begins.
+    /// Start time.
     pub from: Instant,
-    /// When it ends, if it does.
+    /// End time; `None` if the failure is permanent.
     pub until: Option<Instant>,
 }
 
 impl Deaf {
-    /// Whether it is `by` that does not hear `of` at `now`.
+    /// Returns true if this failure keeps `by` from receiving `of` at `now`.
     pub fn applies(&self, by: u16, of: u16, now: Instant) -> bool {
         (self.by, self.of) == (by, of)
             && now >= self.from

@@ -1,4 +1,4 @@
-//! Drones that fly to where they are told as fast as they can, and know where they are only nearly.
+//! Simple drones with speed and acceleration limits and position errors.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,15 +6,13 @@ use uav_relay::{Duration, Instant, Placement};
 
 use uav_relay_scenario::number::narrow;
 
-/// A place in the air: x, y and altitude, m.
+/// Position: x, y and altitude, m.
 pub type Point = [f64; 3];
 
-/// A place as its point.
 pub(super) fn point(place: Placement) -> Point {
     [place.x_m, place.y_m, place.altitude_m].map(f64::from)
 }
 
-/// A point as a place.
 pub(super) fn placement(at: Point) -> Placement {
     let [x_m, y_m, altitude_m] = at.map(narrow);
     Placement {
@@ -24,30 +22,30 @@ pub(super) fn placement(at: Point) -> Placement {
     }
 }
 
-/// The stream of random numbers that errors of positions are drawn from.
+/// Random-number stream of the position errors.
 const ERRORS: u64 = 2;
 
-/// How drones fly.
+/// Flight parameters of the drones.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FlightSpec {
-    /// Where each one hovers when it is switched on: x, y and altitude, m.
+    /// Initial hover position of each drone: x, y and altitude, m.
     pub start: Vec<Point>,
-    /// How fast each one flies at most along each axis, m/s, above 0.
+    /// Speed limit of each drone per axis, m/s, above 0.
     pub speed_mps: Vec<f64>,
-    /// How fast that changes at most, m/s^2, above 0; infinite for at once.
+    /// Acceleration limit per axis, m/s^2, above 0; infinite for instant changes of speed.
     pub acceleration_mps2: f64,
-    /// A drone takes itself to be so far off where it is at most, along each axis and for the whole run, m.
+    /// Bound on each drone's constant position error per axis, m.
     pub bias_m: f64,
-    /// It says so far off where it takes itself to be at most, along each axis and each time anew, m.
+    /// Bound on the additional error of each position report per axis, m.
     pub noise_m: f64,
-    /// Between two steps of the flight.
+    /// Simulation time step.
     pub step: Duration,
-    /// So many of them between two reports of where a drone is, at least 1.
+    /// Time steps between two position reports, at least 1.
     pub report_steps: u32,
 }
 
 impl FlightSpec {
-    /// Drones that are at once as fast as they fly, and know where they are; they say so at each step.
+    /// Drones with unlimited acceleration and exact positions, reported at each time step.
     pub fn exact(start: Vec<Point>, speed_mps: Vec<f64>, step: Duration) -> Self {
         Self {
             start,
@@ -60,7 +58,7 @@ impl FlightSpec {
         }
     }
 
-    /// Drones of 10 m/s and 3 m/s^2 that say five times a second where they are.
+    /// Drones with 10 m/s and 3 m/s^2 that report their positions five times per second.
     pub fn multicopters(start: Vec<Point>, bias_m: f64, noise_m: f64) -> Self {
         Self {
             speed_mps: vec![10.0; start.len()],
@@ -73,17 +71,17 @@ impl FlightSpec {
     }
 }
 
-/// What flies: each axis for itself, as fast as it may, so that it stops at its goal.
+/// Point mass with per-axis speed and acceleration limits that stops at its goal.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
-    /// Where it is.
+    /// Position, m.
     pub at: Point,
-    /// How fast, m/s.
+    /// Velocity, m/s.
     pub velocity_mps: Point,
 }
 
 impl Body {
-    /// One that hovers.
+    /// Body at rest at `at`.
     pub const fn hovering(at: Point) -> Self {
         Self {
             at,
@@ -91,7 +89,7 @@ impl Body {
         }
     }
 
-    /// Where it stops, if it brakes from now on.
+    /// Returns the position where the body comes to rest if it brakes from now on.
     pub fn stops_at(&self, acceleration_mps2: f64) -> Point {
         let braked = self
             .velocity_mps
@@ -104,7 +102,7 @@ impl Body {
         let axes = self.at.iter_mut().zip(&mut self.velocity_mps);
         for ((at, velocity), goal) in axes.zip(goal) {
             let way = goal - *at;
-            // So fast it may be for this step, and stop in time after it.
+            // Largest speed in this time step that still allows stopping at the goal.
             let most = if acceleration_mps2.is_finite() {
                 let brakes = 2.0 * way.abs() / acceleration_mps2;
                 acceleration_mps2 * ((step_s * step_s + brakes).sqrt() - step_s)
@@ -122,19 +120,19 @@ impl Body {
     }
 }
 
-/// Two drones when they were nearest to each other.
+/// Closest approach of two drones.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
-    /// How far apart they were, m.
+    /// Smallest distance, m.
     pub apart_m: f64,
-    /// Which ones, from 1.
+    /// Indices of the two drones, from 1.
     pub pair: [usize; 2],
-    /// When.
+    /// Time of the closest approach.
     pub at: Instant,
 }
 
 impl Nearest {
-    /// The two of `places` that are nearest to each other at `now`; none of fewer than two.
+    /// Returns the closest pair of `places` at `now`; `None` for fewer than two.
     pub(super) fn of(places: &[Point], now: Instant) -> Option<Self> {
         let mut nearest: Option<Self> = None;
         for (one, at) in places.iter().enumerate() {
@@ -153,7 +151,6 @@ impl Nearest {
     }
 }
 
-/// The drones of a run.
 #[derive(Debug)]
 pub(super) struct Flight {
     pub(super) drones: Vec<Drone>,
@@ -174,14 +171,14 @@ pub(super) struct Drone {
 }
 
 impl Drone {
-    /// Flies to its goal for `step_s` seconds: to where it takes that to be.
+    /// Flies toward the goal for `step_s` seconds, using the drone's own position estimate.
     pub(super) fn fly(&mut self, step_s: f64) {
         let goal = sum(self.goal, self.bias.map(|part| -part));
         self.body
             .fly(goal, self.speed_mps, self.acceleration_mps2, step_s);
     }
 
-    /// Where it takes itself to be.
+    /// Returns the drone's own position estimate: the true position plus the bias.
     pub(super) fn taken(&self) -> Point {
         sum(self.body.at, self.bias)
     }
@@ -189,7 +186,7 @@ impl Drone {
 
 impl Flight {
     pub(super) fn new(spec: &FlightSpec, seed: u64) -> Self {
-        // Not the generator of the run: what is drawn there does not depend on how drones fly.
+        // Separate generator, so that the run's other draws do not depend on the flight.
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(ERRORS);
         let drones = spec.start.iter().zip(&spec.speed_mps);
@@ -215,7 +212,7 @@ impl Flight {
         }
     }
 
-    /// One more step; whether drones say where they are at its end.
+    /// Advances all drones by one time step. Returns true if positions are reported at its end.
     pub(super) fn go_on(&mut self) -> bool {
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
         let step_s = self.step.as_micros() as f64 / 1e6;
@@ -226,21 +223,20 @@ impl Flight {
         self.steps.is_multiple_of(self.report_steps.max(1))
     }
 
-    /// Where drone `index` (from 0) says it is.
+    /// Returns the reported position of drone `index` (from 0).
     pub(super) fn reported(&mut self, index: usize) -> Option<Point> {
         let drone = self.drones.get(index)?;
         let noise = off(&mut self.rng, drone.noise_m);
         Some(sum(drone.taken(), noise))
     }
 
-    /// The two drones that are nearest to each other at `now`; none of fewer than two.
     pub(super) fn nearest(&self, now: Instant) -> Option<Nearest> {
         let places: Vec<Point> = self.drones.iter().map(|drone| drone.body.at).collect();
         Nearest::of(&places, now)
     }
 }
 
-/// At most `most_m` along each axis.
+/// Draws an error of at most `most_m` per axis.
 fn off(rng: &mut ChaCha8Rng, most_m: f64) -> Point {
     [0; 3].map(|_| most_m * rng.random_range(-1.0..=1.0))
 }
@@ -251,7 +247,7 @@ pub(super) fn sum(one: Point, other: Point) -> Point {
     [x + more_x, y + more_y, h + more_h]
 }
 
-/// How far apart two places are, m.
+/// Returns the distance of two points, m.
 pub fn apart(one: Point, other: Point) -> f64 {
     let [x, y, h] = one;
     let [other_x, other_y, other_h] = other;

@@ -1,45 +1,45 @@
-//! What may happen to a frame on its way: a layer of its own, on top of any link, that counts everything it does.
+//! Frame faults on any link: loss, corruption, duplication and reordering, with a counter for each.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Probability of each fault, per frame, 0 to 0.9. They are drawn independently, so several may hit one frame.
+/// Probability of each fault per frame, 0 to 0.9. Faults are independent: several may affect one frame.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
     /// The frame never arrives.
     pub loss: f64,
-    /// One to eight of its bytes arrive changed, the delimiter among them perhaps.
+    /// Frame corruption: one to eight bytes change; the delimiter may be among them.
     pub corrupt: f64,
-    /// It arrives twice.
+    /// The frame arrives twice.
     pub duplicate: f64,
-    /// It arrives late enough for others to overtake it.
+    /// The frame arrives so late that later frames may overtake it.
     pub reorder: f64,
 }
 
-/// How often each fault was injected.
+/// Counts of the injected faults.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Injected {
-    /// Frames that never arrived.
+    /// Lost frames.
     pub lost: u64,
-    /// Frames that arrived changed.
+    /// Corrupted frames.
     pub corrupted: u64,
-    /// Frames that arrived twice.
+    /// Duplicated frames.
     pub duplicated: u64,
-    /// Frames that were held back.
+    /// Delayed frames.
     pub reordered: u64,
 }
 
-/// One arrival of a frame.
+/// Arrival of a frame at a receiver.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Arrival {
-    /// The bytes, as they arrive.
+    /// Received bytes.
     pub bytes: Vec<u8>,
-    /// How many frame times later than usual.
+    /// Extra delay in frame times.
     pub late: u64,
 }
 
 impl Faults {
-    /// Everything at once, as a bad day has it.
+    /// High rates of all four faults at once.
     pub const BAD_DAY: Self = Self {
         loss: 0.3,
         corrupt: 0.15,
@@ -47,12 +47,12 @@ impl Faults {
         reorder: 0.1,
     };
 
-    /// Whether nothing can happen.
+    /// Returns true if all probabilities are 0.
     pub fn none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// What becomes of `frame`: none, one or two arrivals.
+    /// Draws the faults of `frame`. Returns no, one or two arrivals.
     pub fn inject(
         &self,
         frame: &[u8],

@@ -1,38 +1,38 @@
-//! What a run looks like from outside, change by change.
+//! Recorded state changes and transmissions of the relays, for an animation.
 
 use uav_relay::{Instant, Placement, Side};
 
-/// A relay looks different from here on.
+/// Changed state of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
-    /// When.
+    /// Time of the change.
     pub at: Instant,
-    /// Which relay, from 1.
+    /// Relay number, from 1.
     pub relay: u16,
-    /// Whether it is switched on.
+    /// True while the relay is switched on.
     pub is_on: bool,
-    /// Where it is told to fly, if anywhere; one that is switched off stays where it was told last.
+    /// Setpoint, if any; a relay that is switched off keeps its last one.
     pub place: Option<Placement>,
-    /// Frames that were put on any link so far.
+    /// Frames sent on all links so far.
     pub messages: u64,
 }
 
-/// A relay has handed over a frame.
+/// Transmission of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Sent {
-    /// When.
+    /// Time of the transmission.
     pub at: Instant,
-    /// Which relay, from 1.
+    /// Relay number, from 1.
     pub relay: u16,
-    /// Toward which side; `None` where all in range hear it.
+    /// Direction of the transmission; `None` on a shared channel.
     pub to: Option<Side>,
 }
 
-/// A run, from its beginning to its end.
+/// Film of a whole run.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Film {
-    /// How relays changed, in order.
+    /// State changes, in order of time.
     pub shots: Vec<Shot>,
-    /// What they said, in order.
+    /// Transmissions, in order of time.
     pub sent: Vec<Sent>,
 }

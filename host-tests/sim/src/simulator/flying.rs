@@ -1,4 +1,4 @@
-//! Which relays of a run fly an agreement, and which of them could be parts of one chain.
+//! Relays of a run that hold an agreement, and the groups that they form.
 
 use std::collections::BTreeMap;
 
@@ -6,31 +6,31 @@ use uav_relay::{Phase, Relay, ViewId};
 
 use super::drones::Point;
 
-/// What a run knows of a relay at a moment.
+/// Observed state of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Seen {
-    /// Whether it is on.
+    /// True if the relay is switched on.
     pub is_on: bool,
-    /// What it does.
+    /// Phase of the relay.
     pub phase: Phase,
-    /// Its view.
+    /// Current view.
     pub view: ViewId,
-    /// Whether it may hold what was agreed on in it, by its own clock.
+    /// True while the relay's lease is valid by its own clock.
     pub leased: bool,
-    /// How many relays that has.
+    /// Number of relays in the view.
     pub relays: u16,
-    /// Its place among them, from 1.
+    /// Index of the relay in the view, from 1.
     pub index: u16,
-    /// Version of the mission that it flies.
+    /// Version of its mission.
     pub version: u16,
-    /// The target that it holds its place for.
+    /// Target SIR of its position, linear.
     pub target: Option<f32>,
-    /// Where it was told to fly: x, y and altitude, m.
+    /// Setpoint: x, y and altitude, m.
     pub place: Option<Point>,
 }
 
 impl Seen {
-    /// What `relay` shows.
+    /// Captures the state of `relay`.
     pub fn of(relay: &Relay, is_on: bool) -> Self {
         let point = |place: uav_relay::Placement| [place.x_m, place.y_m, place.altitude_m];
         Self {
@@ -46,22 +46,20 @@ impl Seen {
         }
     }
 
-    /// The view that it is in.
     fn part_of(&self) -> (ViewId, u16) {
         (self.view, self.relays)
     }
 
-    /// Whether it flies an agreement.
+    /// Returns true if the relay is on, holds a lease and has a setpoint.
     fn flies(&self) -> bool {
         self.is_on && self.leased && self.place.is_some()
     }
 }
 
-/// How many separate groups fly an agreement of their own.
+/// Returns the number of groups that each hold an agreement of their own.
 ///
-/// A group are the relays of one view whose leases have not run out. Relays of one view that claim the same place in it are of two
-/// groups. Relays that a partition has separated, and that still hold what they agreed together, are one group: they are parts of one
-/// chain.
+/// A group consists of the relays of one view with valid leases. Relays of one view that claim the same index belong to different
+/// groups. Relays separated by a partition that still hold their common agreement are one group.
 pub fn groups(seen: &[Seen]) -> usize {
     let mut views: BTreeMap<(ViewId, u16), BTreeMap<u16, usize>> = BTreeMap::new();
     for one in seen.iter().filter(|one| one.flies()) {
@@ -72,7 +70,7 @@ pub fn groups(seen: &[Seen]) -> usize {
     claims.sum()
 }
 
-/// Whether all relays of some view hold their places for the same target.
+/// Returns true if all relays of some view hold their positions for the same target.
 pub fn has_agreed(seen: &[Seen]) -> bool {
     seen.iter().filter(|one| one.is_on).any(|one| {
         let same = |other: &&Seen| {

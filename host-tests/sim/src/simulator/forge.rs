@@ -1,4 +1,4 @@
-//! Forged frames: what somebody can make who knows the format, the mission and all that was ever said, but not the key.
+//! Forged frames of an attacker that knows the format, the mission and all frames sent, but not the key.
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
@@ -15,28 +15,28 @@ use uav_relay::{
 };
 use uav_relay::{View, ViewId};
 
-/// The network that every simulated relay belongs to.
+/// Network number of every simulated relay.
 pub(super) use uav_relay_scenario::deployment::NETWORK;
 
-/// Flags in the second word of a frame: a tag follows, the body is a handshake.
+/// Header flags: a tag follows; the body is a handshake.
 const SIGNED: u8 = 0x10;
 const HELLO: u8 = 0x20;
 
-/// Bytes of the CRC.
 const CHECK: usize = 4;
 
-/// Bytes of the body of a handshake.
 const HELLO_BODY: usize = 17;
 
-/// Where a forged frame says it comes from, and where it goes.
+/// Claimed sender and destination of a forged frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Way {
     pub(super) from: u16,
     pub(super) to: u16,
 }
 
-/// A frame of a kind drawn at random: a lie without a tag, one with a guessed tag, a recorded frame with one byte altered and
-/// its CRC made good, a handshake with a guessed tag, or the handshake of a relay that has another key.
+/// Returns a frame forged by a random method.
+///
+/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a valid CRC,
+/// handshake with a guessed tag, handshake of a relay with another key.
 pub(super) fn forge(
     mission: &Mission,
     way: Way,
@@ -62,7 +62,7 @@ pub(super) fn forge(
     }
 }
 
-/// One byte after the first eight of the header is another: of the counter, the body or the tag.
+/// Changes one byte after the header's first eight: of the counter, the body or the tag.
 fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(HEADER - 2..plain.len().max(HEADER));
     if let Some(byte) = plain.get_mut(at) {
@@ -71,14 +71,13 @@ fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     plain
 }
 
-/// A message without a tag that is well-formed, of this mission, and wrong: made up, or a pass that was heard, twisted.
+/// Returns a well-formed, untagged false message: a twisted recorded pass or a new message.
 fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let twisted = heard.and_then(|plain| twisted(plain, rng));
     twisted.unwrap_or_else(|| made_up(mission, way, rng))
 }
 
-/// A sweep, a gathering or an answer to one that was heard, from the same relay to the same, as if it were of one of the next passes and said
-/// something else.
+/// Returns a recorded pass or reply with false values and a similar number; `None` for other messages.
 fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
     let (header, message) = frame::decode(&whole).ok()?;
@@ -86,7 +85,7 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let message = match message {
         Message::Sweep(mut sweep) => {
             sweep.number = later(sweep.number, rng);
-            // A lot would be noticed at the end of the chain; a little is agreed to.
+            // The end of the chain would notice large changes; small ones pass.
             let share = if rng.random() {
                 rng.random_range(0.2..1.2)
             } else {
@@ -117,7 +116,7 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     Some(frame.get(..len)?.to_vec())
 }
 
-/// A message that needs nothing to have been heard.
+/// Returns a false message that needs no recorded frame.
 fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
     let mission_id = MissionId { version: 0, digest };
@@ -188,7 +187,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     frame.get(..len).unwrap_or_default().to_vec()
 }
 
-/// A mission that looks newer than `mission`, with the interferer somewhere else; `None` in a field, where nothing is uploaded.
+/// Returns a newer-looking mission with another interferer position; `None` in a field, where uploads do not exist.
 fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     let config = mission.config();
     let at = mission.interferer()?;
@@ -204,7 +203,7 @@ fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     Upload::new(mission, rng.random_range(1..=3), config).ok()
 }
 
-/// A handshake whose nonces and tag are random.
+/// Returns a handshake with random nonces and tag.
 fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut plain = unsealed(&made_up(mission, way, rng)).unwrap_or_default();
     plain.truncate(HEADER);
@@ -218,7 +217,7 @@ fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u
     sealed(plain)
 }
 
-/// What a relay with another key says first: a handshake with the right tag, for the wrong key. Empty if it is alone.
+/// Returns the first handshake of a relay with another key; empty if it has no neighbour.
 fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>, SetupError> {
     let settings = Settings {
         wiring: Wiring::Shared,
@@ -235,14 +234,14 @@ fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>
     let mut relay = Relay::new(*mission, identity, settings, rng.random(), Instant::ZERO)?;
     let mut frame = [0; MAX_FRAME];
     let mut said = Vec::new();
-    // One handshake to each neighbour; the last is as good as the first.
+    // One handshake per neighbour; the last one is used.
     while let Some(transmit) = relay.poll_transmit(Instant::ZERO, &mut frame) {
         said = frame.get(..transmit.len).unwrap_or_default().to_vec();
     }
     Ok(said)
 }
 
-/// The node that a frame is for; `None` if it is no frame.
+/// Returns the destination node of a frame; `None` for an invalid frame.
 pub(super) fn destination(bytes: &[u8]) -> Option<u16> {
     let plain = unsealed(bytes)?;
     let [_, _, low, high, ..] = *plain.first_chunk::<HEADER>()?;
@@ -258,14 +257,13 @@ fn header(way: Way, rng: &mut ChaCha8Rng) -> Header {
     }
 }
 
-/// Sets flags in a header.
 fn flag(plain: &mut [u8], flags: u8) {
     if let Some(byte) = plain.get_mut(3) {
         *byte |= flags;
     }
 }
 
-/// A frame without COBS and CRC; `None` if it is none.
+/// Removes COBS and the CRC; `None` for an invalid frame.
 fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut deframer = Deframer::new();
     for &byte in bytes {
@@ -279,7 +277,7 @@ fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
     None
 }
 
-/// A frame with its CRC, COBS and delimiter. At most 249 bytes go in.
+/// Appends the CRC, encodes with COBS and appends the delimiter. Accepts at most 249 bytes.
 fn sealed(plain: Vec<u8>) -> Vec<u8> {
     let plain = with_check(plain);
     let mut bytes = Vec::with_capacity(plain.len() + 2);
@@ -291,7 +289,6 @@ fn sealed(plain: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// A frame with its CRC.
 fn with_check(mut plain: Vec<u8>) -> Vec<u8> {
     plain.extend(CRC_32C.checksum(&plain).to_le_bytes());
     plain

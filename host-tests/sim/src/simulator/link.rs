@@ -1,20 +1,20 @@
-//! One direction of a serial link: bytes take their time, one frame after the other.
+//! One direction of a serial link: frames are sent one after the other at the baud rate.
 
 use uav_relay::Duration;
 use uav_relay::Instant;
 use uav_relay::wire::frame::MAX_SWEEP;
 
-/// What a link is like.
+/// Parameters of a link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LinkSpec {
-    /// Bits per second; a byte takes ten of them. At least 300.
+    /// Bits per second, at least 300; a byte takes ten bits.
     pub baud: u32,
-    /// From the last bit sent to the last bit received.
+    /// Delay from the last bit sent to the last bit received.
     pub latency: Duration,
 }
 
 impl Default for LinkSpec {
-    /// 115 200 baud and 2 ms, as a telemetry radio at short range has.
+    /// 115 200 baud and 2 ms, as of a telemetry radio at short range.
     fn default() -> Self {
         Self {
             baud: 115_200,
@@ -24,27 +24,27 @@ impl Default for LinkSpec {
 }
 
 impl LinkSpec {
-    /// How long `bytes` bytes occupy the line.
+    /// Returns the transmission time of `bytes` bytes.
     pub fn line_time(&self, bytes: usize) -> Duration {
         let bits = 10_000_000_u64.saturating_mul(bytes as u64);
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// The longest a sweep takes from one relay to the next, and a millisecond for computing.
+    /// Returns the longest time of a sweep message per hop, with 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)
     }
 }
 
-/// A line, and until when it is busy.
+/// Serial line with the time until which it is busy.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
     free: Instant,
 }
 
 impl Line {
-    /// Sends `bytes` bytes as soon as the line is free; when they have arrived.
+    /// Sends `bytes` bytes once the line is free. Returns the arrival time.
     pub fn send(&mut self, now: Instant, bytes: usize, spec: &LinkSpec) -> Instant {
         self.free = self.free.max(now) + spec.line_time(bytes);
         self.free + spec.latency

@@ -1,10 +1,12 @@
-//! Which relays can be in one chain: a chain goes in the order of their numbers, and each two in a row have to hear each other.
+//! Longest possible chains: relays in ascending order, each linked with the next.
 
-/// The most chains that are named: with many relays that hear nobody in between there are more than anyone wants to look at.
+/// Largest number of chains returned; sparse links can allow far more.
 const MOST: usize = 1_000;
 
-/// The longest chains of the relays `on` (from 0, in order), of which `links` says who is linked with a later one: how long, and all of them
-/// (a thousand at most) that only relays of `with` are in.
+/// Returns the length of the longest chains, and those chains whose members all satisfy `with`.
+///
+/// `on` lists the relays in ascending order, from 0; `links` returns true for two linked relays, the lower one first. At most
+/// 1000 chains are returned.
 pub fn longest(
     on: &[usize],
     links: impl Fn(usize, usize) -> bool,
@@ -77,7 +79,7 @@ mod tests {
         let (length, ways) = longest(&on, links, |_| true);
         assert_eq!(length, 7);
         assert_eq!(ways, [[0, 1, 2, 4, 5, 6, 7], [0, 1, 3, 4, 5, 6, 7]]);
-        // Relay 2 has no place: whoever is in the chain, it is not.
+        // Relay 2 has no position, so only the chain without it qualifies.
         let (length, ways) = longest(&on, links, |at| at != 2);
         assert_eq!((length, ways), (7, vec![vec![0, 1, 3, 4, 5, 6, 7]]));
     }
@@ -93,14 +95,14 @@ mod tests {
             longest(&on, parts, |_| true),
             (5, vec![vec![3, 4, 5, 6, 7]])
         );
-        // Five in a row are out of reach.
+        // The five missing relays in a row leave a gap beyond radio range.
         assert_eq!(longest(&[0, 1, 7], near, |_| true).1, [[0, 1]]);
     }
 
     #[test]
     fn however_many_ways_there_are_only_some_are_looked_at() {
         let on: Vec<usize> = (0..60).collect();
-        // Twenty times three: of each three any one.
+        // Twenty groups of three; each chain takes any one relay of each group.
         let links = |one: usize, other: usize| other / 3 == one / 3 + 1;
         let (length, ways) = longest(&on, links, |_| true);
         assert_eq!(length, 20);

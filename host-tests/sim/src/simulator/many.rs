@@ -1,4 +1,4 @@
-//! The same run with many seeds, on all cores.
+//! Parallel runs of one setup with many seeds.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -9,11 +9,10 @@ use super::chain::run;
 use super::outcome::Outcome;
 use super::setup::Setup;
 
-/// Runs `setup` once with each of `seeds`, as many at a time as the machine has cores, and hands each outcome to `of`. What that gives
-/// comes back in the order of the seeds.
+/// Runs `setup` with each of `seeds` on all cores and maps each outcome with `of`. The results keep the order of the seeds.
 ///
 /// # Errors
-/// [`SetupError`] where a relay refuses a profile or a setting.
+/// [`SetupError`] if a relay rejects its profile or settings.
 pub fn run_seeds<T: Send>(
     setup: &Setup,
     seeds: impl IntoIterator<Item = u64>,

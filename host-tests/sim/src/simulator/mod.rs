@@ -1,25 +1,25 @@
-//! A chain of relays on a virtual clock: every relay runs the on-board code, every byte goes through a simulated link.
+//! Simulated relay chain on a virtual clock: on-board code and simulated links.
 //!
-//! | file | one idea |
+//! | file | contents |
 //! | --- | --- |
 //! | [`link`] | one direction of a serial link: baud rate, latency |
-//! | [`medium`] | one half-duplex radio channel that all share |
-//! | [`faults`], [`bursts`] | what may happen to a frame on its way; losses in runs |
-//! | [`deaf`] | a relay that does not hear another one |
-//! | [`attack`], [`forge`] | what an attacker does, and the frames it makes up |
-//! | [`queue`] | what happens when, in order |
-//! | [`film`] | what a run looks like from outside, change by change |
-//! | [`record`] | the frames that were put on the air, for a capture |
-//! | [`setup`], [`outcome`] | what a chain is run with, and what came of it |
-//! | [`sky`] | interferers that nobody told the relays of |
-//! | [`drones`] | drones that fly to where they are told, and know where they are only nearly |
-//! | [`fleet`] | drones with an autopilot each, and their pilots |
-//! | [`flying`] | groups of relays with an agreement of their own |
-//! | [`longest`] | which relays can be in one chain |
-//! | [`optima`], [`optimum`] | where exactly these relays would be if nothing had happened |
-//! | [`watch`] | how much of the time the chain is right |
+//! | [`medium`] | one half-duplex radio channel shared by all nodes |
+//! | [`faults`], [`bursts`] | frame faults (loss, corruption, ...); bursts of losses |
+//! | [`deaf`] | one-way link failures |
+//! | [`attack`], [`forge`] | the attacker, and the frames that it forges |
+//! | [`queue`] | the event queue |
+//! | [`film`] | state changes and transmissions of the relays, for an animation |
+//! | [`record`] | transmitted frames, for a capture file |
+//! | [`setup`], [`outcome`] | inputs and results of a run |
+//! | [`sky`] | interferers that the relays must find by measuring |
+//! | [`drones`] | simple drone dynamics with position errors |
+//! | [`fleet`] | drones with simulated autopilots and pilots |
+//! | [`flying`] | groups of relays that hold an agreement |
+//! | [`longest`] | longest possible chains of the relays that are on |
+//! | [`optima`], [`optimum`] | reference positions from an undisturbed run |
+//! | [`watch`] | availability of the chain over time |
 //! | [`many`] | the same run with many seeds |
-//! | [`chain`] | the relays, connected, run until they hold their places |
+//! | [`chain`] | the event loop that connects the relays |
 
 pub mod attack;
 pub mod bursts;

@@ -1,4 +1,4 @@
-//! Whether relays hold the places that they would have if nothing had ever happened.
+//! Comparison of the relays' positions with those of an undisturbed run.
 
 use std::collections::HashMap;
 
@@ -8,16 +8,16 @@ use super::drones::{Point, apart};
 use super::outcome::{Ending, Outcome};
 use super::setup::Setup;
 
-/// Places that are no farther apart are the same, m.
+/// Largest distance of positions that count as equal, m.
 const SAME_M: f64 = 1e-3;
 
-/// The places of a chain, `None` if it has none.
+/// Positions of a chain; `None` if it did not settle.
 pub type Places = Option<Vec<Point>>;
 
-/// Runs a chain to its end; `None` where a relay refuses its settings.
+/// Function that runs a chain to its end; `None` if a relay rejects its settings.
 pub type Run = fn(Setup) -> Option<Outcome>;
 
-/// The places that were asked for so far: by who is in the chain, and by the version of the mission.
+/// Cache of reference positions, by the members of the chain and the version of the mission.
 #[derive(Debug)]
 pub struct Optima {
     run: Run,
@@ -25,7 +25,7 @@ pub struct Optima {
 }
 
 impl Optima {
-    /// None yet; `run` finds them.
+    /// Empty cache; `run` computes missing entries.
     pub fn new(run: Run) -> Self {
         Self {
             run,
@@ -33,7 +33,7 @@ impl Optima {
         }
     }
 
-    /// Whether the relays `nodes` (from 1) of a run of `setup` have the places that the mission of `version` has for exactly them.
+    /// Returns true if `places` are the reference positions of relays `nodes` (from 1) and this mission.
     pub fn is_met(
         &mut self,
         setup: &Setup,
@@ -56,7 +56,7 @@ impl Optima {
     }
 }
 
-/// A chain of just `nodes` that nothing happens to, with the mission of `version`; `None` where there is no such mission.
+/// Returns a fault-free setup with only `nodes` and the mission of `version`; `None` if the mission or the count is invalid.
 pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
     let uploaded = setup
         .uploads
@@ -85,7 +85,7 @@ pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
     Some(clean)
 }
 
-/// Where the relays of a run settled.
+/// Returns the final positions of a settled run.
 pub fn places_of(outcome: &Outcome) -> Places {
     let point = |place: Placement| [place.x_m, place.y_m, place.altitude_m].map(f64::from);
     let places = outcome.relays.iter().map(|relay| relay.setpoint.map(point));

@@ -1,4 +1,4 @@
-//! What came of a simulated chain.
+//! Outcome of a simulated run.
 
 use std::collections::BTreeMap;
 
@@ -13,222 +13,222 @@ use super::flying::Seen;
 use super::medium::AirCounts;
 use super::sky::Stand;
 
-/// Something worth a line in the story of a run.
+/// Kind of a log entry about a relay; "the other node" is [`Moment::other`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Turning {
-    /// A relay went silent.
+    /// The relay went silent.
     Silent,
-    /// It was switched on again.
+    /// The relay was switched on again.
     Booted,
-    /// It lost its neighbour at that side.
+    /// The relay lost its neighbour at that side.
     Lost(Side),
-    /// It heard a neighbour at that side again, or another one.
+    /// The relay received its lost neighbour, or a new one, at that side.
     Found(Side),
-    /// It agreed to a new view: its number, its place there, how many relays there are, and what they fly.
+    /// The relay accepted a new view.
     Reformed {
         /// Number of the view.
         view: u32,
-        /// The relay's place, from 1 at Tx.
+        /// Index of the relay in the view, from 1 at Tx.
         index: u16,
-        /// How many relays.
+        /// Number of relays in the view.
         relays: u16,
-        /// Version of the mission that they fly.
+        /// Version of the mission.
         version: u16,
     },
-    /// Its part of the chain is too small to go on.
+    /// The relay's part of the chain has no quorum.
     Cut,
-    /// It is not certain any more that all hold what was agreed on.
+    /// The relay's lease expired.
     Lapsed,
-    /// The other one says that it does not hear it.
+    /// The other node reports that it does not receive the relay.
     Unheard,
-    /// The other one flies another mission.
+    /// The other node has a different mission.
     Stranger,
-    /// The other one signs with another key.
+    /// The other node signs with a different key.
     OtherKey,
-    /// The other one's epoch went back.
+    /// The other node's epoch went back.
     OldEpoch,
-    /// The number of the other one, or its own, is used twice.
+    /// The number of the relay or of the other node is used twice.
     Namesake,
-    /// It took its place in an agreement.
+    /// The relay accepted its position in an agreement.
     Converged,
-    /// No target can be met.
+    /// The leader found that no target can be met.
     Infeasible,
-    /// From here on it and those before it do not hear those after it.
+    /// A partition begins between the relay and the next one.
     Parted,
-    /// They hear each other again.
+    /// The partition between the relay and the next one ends.
     Healed,
-    /// From here on it does not hear the other one.
+    /// The relay stops receiving the other node.
     Deaf,
-    /// It hears it again.
+    /// The relay receives the other node again.
     Hears,
-    /// The ground begins to upload a mission of this version: the transmitter as relay 0, the receiver as the one after the last.
+    /// A ground station offers a mission of this version; Tx counts as relay 0, Rx as the relay after the last.
     Offered(u16),
-    /// It holds a newer mission, of this version.
+    /// The relay stored an uploaded mission of this version.
     Uploaded(u16),
-    /// It flies it, with all others that were counted.
+    /// The relay adopted the mission of this version, together with all members of its view.
     Adopted(u16),
-    /// Its autopilot flies to its places from now on.
+    /// The relay's setpoint controls its drone from now on.
     Engaged,
-    /// Its pilot flies, or its autopilot by itself.
+    /// The relay's setpoint no longer controls its drone: the pilot, or the autopilot alone, flies it.
     Released,
-    /// Nobody knows where its drone is.
+    /// The position of the relay's drone is unknown.
     Blind,
-    /// Its autopilot was switched off and on.
+    /// The autopilot of the relay's drone was restarted.
     Restarted,
-    /// It believes something else of the interference than before.
+    /// The relay's estimate of the interference changed.
     Believes,
-    /// What is heard is not of one source.
+    /// The measurements do not fit a single interferer.
     Unclear,
-    /// The other one hears something else than all the others.
+    /// The other node's measurements contradict those of all others.
     Off,
 }
 
-/// A turning and whose it was.
+/// Log entry of a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moment {
-    /// When.
+    /// Time of the entry.
     pub at: Instant,
-    /// Which relay, from 1.
+    /// Relay number, from 1.
     pub relay: u16,
-    /// What.
+    /// Kind of the entry.
     pub what: Turning,
-    /// The neighbour that was lost or found, the relay that is not heard, or the one that is told of, from 1.
+    /// Node that the entry is about, from 1: a lost or found neighbour, a relay that is not received, ...
     pub other: Option<u16>,
-    /// The target that the relay holds its place for, linear.
+    /// Target SIR of the relay's position, linear.
     pub target: Option<f32>,
-    /// Passes that it has begun so far.
+    /// Sweeps that the relay has begun so far.
     pub sweeps: u32,
 }
 
-/// How a run ended.
+/// Reason for the end of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
-    /// Every relay holds its place, for the same target.
+    /// Every relay holds its position for the same target.
     Settled,
     /// The leader found that no target can be met.
     Infeasible,
-    /// Relays went silent, and every neighbour of theirs has noticed.
+    /// Relays went silent, and all their neighbours have noticed.
     Broken,
-    /// No part of the chain is large enough to go on without the others.
+    /// Each part of the chain lacks a quorum.
     Cut,
-    /// It went on for as long as it was meant to ([`Setup::soak`](super::setup::Setup::soak)).
+    /// The planned end ([`Setup::soak`](super::setup::Setup::soak), or of the measurements) was reached.
     Soaked,
-    /// The deadline, or the limit on the work of a run.
+    /// The deadline or the event limit was reached.
     OutOfTime,
 }
 
-/// One relay when the run has ended.
+/// Final state of a relay.
 #[derive(Clone, Debug)]
 pub struct RelayEnd {
-    /// Where it was told to fly, if anywhere.
+    /// Setpoint, if any.
     pub setpoint: Option<Placement>,
-    /// The target it holds that place for.
+    /// Target SIR of that setpoint, linear.
     pub target: Option<f32>,
-    /// What no chain has, as the leader found.
+    /// Upper bound on the SIR of any chain, linear, at the leader.
     pub bound: Option<f32>,
-    /// What it brought along.
+    /// Profile of the relay.
     pub profile: Profile,
-    /// Its counters.
+    /// Counters of the relay.
     pub stats: Stats,
-    /// When it went silent, if it did and was not switched on again.
+    /// Time of its failure; `None` if it is on.
     pub killed: Option<Instant>,
-    /// Its place in the chain as it knows it, from 1 at Tx, of how many, and the number of that view.
+    /// Index of the relay in its view, from 1 at Tx.
     pub index: u16,
-    /// How many relays there are.
+    /// Number of relays in the view.
     pub relays: u16,
     /// Number of the view.
     pub view: u32,
-    /// Version of the mission that it flies.
+    /// Version of its mission.
     pub version: u16,
-    /// What it believes of the interference.
+    /// Interference estimate of the relay.
     pub believed: Told,
-    /// Between which sites it flies that, if not between those that it was loaded with.
+    /// Sites of the relay's mission; `None` for those loaded before take-off.
     pub sites: Option<Sites>,
-    /// What it showed.
+    /// Observed state.
     pub seen: Seen,
 }
 
-/// What a run was like over its whole time.
+/// Statistics over the whole run.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Watched {
-    /// When all relays of a view held their places for the first time.
+    /// Time of the first agreement: all relays of a view hold their positions.
     pub first_agreement: Option<Instant>,
-    /// The share of the time since then in which all relays that can be in one chain (a longest one) held its optimum; 0 without an
-    /// agreement.
+    /// Share of the time since then in which a longest possible chain held its optimum; 0 without an agreement.
     pub availability: Option<f64>,
-    /// The longest time since then in which they did not.
+    /// Longest continuous time since then without that.
     pub longest_wrong: Option<Duration>,
-    /// The most separate groups that flew an agreement of their own at once.
+    /// Largest number of groups that held separate agreements at the same time.
     pub most_flying: usize,
-    /// The least distance that two relays ever had, m.
+    /// Smallest distance of two relays, m.
     pub least_separation_m: Option<f64>,
 }
 
-/// What came of a run.
+/// Outcome of a run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// How it ended.
+    /// Reason for the end of the run.
     pub ending: Ending,
-    /// The relays, from relay 1 on.
+    /// Final states of the relays, from relay 1.
     pub relays: Vec<RelayEnd>,
-    /// SIR of the chain after each round of Algorithm 2, linear; the first is that before any.
+    /// SIR of the chain before the first and after each round of Algorithm 2, linear.
     pub rounds: Vec<f32>,
     /// Forward passes along the chain.
     pub sweeps: u32,
-    /// Frames put on any link.
+    /// Frames sent on all links.
     pub messages: u64,
-    /// Bytes put on any link.
+    /// Bytes sent on all links.
     pub bytes: u64,
-    /// When the run ended.
+    /// End time of the run.
     pub ended: Instant,
-    /// What was done to frames.
+    /// Injected faults.
     pub injected: Injected,
-    /// What became of an attacker's frames.
+    /// Classification of the attacker's frames.
     pub struck: Struck,
-    /// Who misses whom: by the index from 1 of the one that noticed and the side, since when.
+    /// Neighbours missing at the end: observer's index (from 1) and side, with the time of the loss.
     pub noticed: BTreeMap<(u16, Side), Instant>,
-    /// The story of the run.
+    /// Log of the run.
     pub moments: Vec<Moment>,
-    /// When two drones were nearest to each other, where their flight was simulated.
+    /// Closest approach of two drones, if their flight was simulated.
     pub nearest: Option<Nearest>,
-    /// The same of drones with an autopilot that no pilot had.
+    /// Closest approach of two drones with autopilots, neither in its pilot's hands.
     pub nearest_lent: Option<Nearest>,
-    /// Least of the distance of two drones with an autopilot that no pilot had, less the lesser of the separation and their distance when
-    /// both were handed over last, m; infinite where there were none.
+    /// Smallest separation margin, m, of two drones that no pilot flies; infinite if there were none.
+    ///
+    /// The margin is the distance less the smaller of the required separation and the distance at their last hand-over.
     pub margin_m: f64,
-    /// When that was.
+    /// Closest approach with that margin.
     pub margin_at: Option<Nearest>,
-    /// Targets that an autopilot was told for more than a second after it had said that none may be sent. Anything but 0 is a bug.
+    /// Targets that an autopilot received well after it reported a state in which none may be sent. Nonzero is a bug.
     pub stray_targets: u64,
-    /// Where the drones with an autopilot are in the end, along the line of the mission that their relays fly, and whether these fly them.
+    /// Final positions of the drones with autopilots along their relay's line; true if the relay flies it.
     pub fleet: Vec<(Point, bool)>,
-    /// Setpoints that were outside their limits, ever. Anything but 0 is a bug.
+    /// Setpoints outside their limits. Nonzero is a bug.
     pub unsafe_setpoints: u64,
-    /// What happened on the air, where relays shared it.
+    /// Counters of the shared channel.
     pub air: AirCounts,
-    /// What the run was like over its whole time; of a soak, and of relays on a shared channel.
+    /// Statistics over the whole run, for soaks and shared channels.
     pub watched: Option<Watched>,
-    /// Where the relays were, each time that they measured.
+    /// Snapshots of the positions at each measurement.
     pub stands: Vec<Stand>,
-    /// What it looked like, where [`Setup::film`](super::setup::Setup::film) was set.
+    /// Film of the run, if [`Setup::film`](super::setup::Setup::film) was set.
     pub film: Option<Film>,
 }
 
 impl Outcome {
-    /// The least distance that two drones ever had, m; infinite where their flight was not simulated.
+    /// Returns the smallest distance of two drones, m; infinite if their flight was not simulated.
     pub fn nearest_m(&self) -> f64 {
         self.nearest
             .map_or(f64::INFINITY, |nearest| nearest.apart_m)
     }
 
-    /// Where the relays were told to fly, to the bit: x, y and altitude; `None` for one that was told nothing.
+    /// Returns the bit patterns of the setpoints (x, y, altitude); `None` for a relay without one.
     pub fn bits(&self) -> Vec<Option<[u32; 3]>> {
         let bits = |place: Placement| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits);
         let places = self.relays.iter().map(|relay| relay.setpoint);
         places.map(|place| place.map(bits)).collect()
     }
 
-    /// The newest mission that the ground has begun to upload, by its version.
+    /// Returns the newest mission version that the ground has offered.
     pub fn offered(&self) -> Option<u16> {
         let versions = self.moments.iter().filter_map(|moment| match moment.what {
             Turning::Offered(version) => Some(version),

@@ -1,4 +1,4 @@
-//! What happens when, in order: a virtual clock that jumps from one happening to the next.
+//! Event queue of the virtual clock.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,51 +8,50 @@ use uav_relay::{Instant, Port};
 use super::attack::Strike;
 use super::medium::AirEvent;
 
-/// Something that happens to one relay.
+/// Event of a relay or of the whole run.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Happening {
-    /// Bytes arrive.
+    /// Bytes arrive at the relay.
     Bytes {
-        /// Where.
+        /// Receiving port.
         port: Port,
-        /// What.
+        /// Received bytes.
         bytes: Vec<u8>,
     },
-    /// It may have something to do.
+    /// The relay's timer expires.
     Wake,
-    /// Bytes arrive on the ground.
+    /// Bytes arrive at a ground station.
     Heard {
-        /// What.
+        /// Received bytes.
         bytes: Vec<u8>,
     },
-    /// The ground may have something to do.
+    /// A ground station's timer expires.
     Ask,
-    /// An upload begins; its number stands in place of the relay's.
+    /// An upload begins; the relay index is the upload's number.
     Upload,
-    /// All drones fly on for a step.
+    /// Time step of all drones.
     Fly,
-    /// Its drone's autopilot is switched off and on.
+    /// The autopilot of the relay's drone restarts.
     Restart,
-    /// It goes silent.
+    /// The relay goes silent.
     Kill,
-    /// It is switched on again.
+    /// The relay is switched on again.
     Boot,
-    /// A partition begins or ends, or a relay ceases to hear another one or hears it again.
+    /// A partition or a one-way link failure begins or ends.
     Part,
-    /// Something is due on the shared channel; the relay is of no account.
+    /// An event of the shared channel; the relay index is unused.
     Air(AirEvent),
-    /// All relays measure the interference where they are.
+    /// Interference measurement of all relays.
     Listen,
-    /// The attacker sends a frame to one of the relays.
+    /// The attacker sends a frame to a relay.
     Strike(Strike),
 }
 
-/// One happening, at its time. Equal times keep the order in which they were put in.
+/// Queued event. Events of the same time keep their order of insertion.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Entry {
     at: Instant,
     order: u64,
-    /// Which relay, counted from 0.
     relay: usize,
     happening: Happening,
 }
@@ -69,7 +68,7 @@ impl PartialOrd for Entry {
     }
 }
 
-/// The happenings to come.
+/// Pending events.
 #[derive(Debug, Default)]
 pub struct Queue {
     entries: BinaryHeap<Reverse<Entry>>,
@@ -77,7 +76,7 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// Puts in that `happening` happens to `relay` (from 0) at `at`.
+    /// Schedules `happening` for `relay` (from 0) at `at`.
     pub fn put(&mut self, at: Instant, relay: usize, happening: Happening) {
         self.entries.push(Reverse(Entry {
             at,
@@ -88,7 +87,7 @@ impl Queue {
         self.order += 1;
     }
 
-    /// The next happening: when, to which relay, what.
+    /// Removes the next event and returns its time, relay and kind.
     pub fn take(&mut self) -> Option<(Instant, usize, Happening)> {
         let Reverse(entry) = self.entries.pop()?;
         Some((entry.at, entry.relay, entry.happening))

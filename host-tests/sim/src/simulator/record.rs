@@ -1,35 +1,35 @@
-//! The frames that were put on the air, in the order in which they ended.
+//! Recorded frames, ordered by the end of their transmission.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use uav_relay::Instant;
 
-/// Where a frame was sent.
+/// Link of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Link {
-    /// On the channel that all share.
+    /// The shared channel.
     Shared,
-    /// On the link from this node to the one after it; Tx is node 0.
+    /// The link between this node and the next one; Tx is node 0.
     After(u16),
 }
 
-/// A frame that was put on the air.
+/// Transmitted frame.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct OnAir {
-    /// When its last bit was sent.
+    /// Time of its last bit.
     pub at: Instant,
-    /// Frames that end at the same time are in the order in which they were handed over.
+    /// Order of transmission, for frames that end at the same time.
     order: u64,
-    /// Where.
+    /// Link of the frame.
     pub link: Link,
-    /// The frame as it was sent.
+    /// Bytes as sent.
     pub bytes: Vec<u8>,
-    /// What became of it on the way; empty if it has arrived at all that hear it, as it was sent and in time.
+    /// Faults on the path; empty if all receivers got the frame intact and in time.
     pub note: String,
 }
 
-/// The frames that nobody has taken yet.
+/// Recorded frames that were not read yet.
 #[derive(Debug, Default)]
 pub struct Record {
     frames: BinaryHeap<Reverse<OnAir>>,
@@ -37,7 +37,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// One more.
+    /// Adds a frame.
     pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
         self.frames.push(Reverse(OnAir {
             at,
@@ -49,7 +49,7 @@ impl Record {
         self.order += 1;
     }
 
-    /// Those that have ended by `until`, each of them once.
+    /// Removes and returns the frames that ended by `until`.
     pub fn take(&mut self, until: Instant) -> Vec<OnAir> {
         let mut over = Vec::new();
         while let Some(Reverse(next)) = self.frames.peek()

@@ -1,4 +1,4 @@
-//! What a simulated chain is run with.
+//! Setup of a simulated chain.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,113 +15,112 @@ use super::link::LinkSpec;
 use super::medium::access::{self, Access};
 use super::sky::Sky;
 
-/// A time in which relays 1 to `after` and the others do not hear each other.
+/// Period in which relays 1 to `after` and the others do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
-    /// The last relay of the first part, from 1.
+    /// Last relay of the first part, from 1.
     pub after: u16,
-    /// When it begins.
+    /// Start time.
     pub from: Instant,
-    /// When it ends, if it does.
+    /// End time; `None` if the partition is permanent.
     pub until: Option<Instant>,
 }
 
 impl Partition {
-    /// Whether relays `one` and `other` (from 1) cannot hear each other at `now`.
+    /// Returns true if relays `one` and `other` (from 1) are on different sides at `now`.
     pub fn parts(&self, one: u16, other: u16, now: Instant) -> bool {
         let during = now >= self.from && self.until.is_none_or(|until| now < until);
         during && (one <= self.after) != (other <= self.after)
     }
 }
 
-/// A mission that is uploaded in the run.
+/// Mission upload during the run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct UploadSpec {
-    /// Where: the transmitter is upstream of the chain, the receiver downstream.
+    /// Sending end: upstream for the transmitter, downstream for the receiver.
     pub end: Side,
-    /// When.
+    /// Start time.
     pub at: Instant,
-    /// What.
+    /// Uploaded mission.
     pub upload: Upload,
 }
 
-/// What a link or a channel carries, and for how many.
+/// Capacity and sharing of a link or channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Channel {
     /// Bits per second.
     pub baud: u32,
-    /// Relays that share it at one place at most: all that one relay hears, and itself. One where a relay has a line of its own.
+    /// Largest number of relays within range at one point, including the relay itself; 1 for separate lines.
     pub in_range: usize,
-    /// What a frame costs beside its bytes, in bytes.
+    /// Overhead of a frame, bytes.
     pub overhead: usize,
 }
 
-/// The stream of random numbers that keys are drawn from.
+/// Random-number stream of the keys.
 const KEYS: u64 = 1;
 
-/// What to run.
+/// Setup of a run.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// The mission of every relay.
+    /// Mission of every relay.
     pub mission: Mission,
-    /// What relays hold of their own, by index from 1.
+    /// Individual profiles, by index from 1.
     pub profiles: Vec<(u16, Profile)>,
-    /// Relays that keep to their altitude when altitudes are chosen.
+    /// Relays that keep their altitude when altitudes are planned.
     pub held: Vec<u16>,
-    /// What every relay is set to; `hop_time`, `hold_altitude`, `profile` and, with `auth`, the key and the epoch are filled in.
+    /// Settings of every relay; `hop_time`, `hold_altitude`, `profile` and, with `auth`, the key and the epoch are filled in.
     pub settings: Settings,
-    /// The links.
+    /// Parameters of the links.
     pub link: LinkSpec,
-    /// What happens to frames on them.
+    /// Frame faults.
     pub faults: Faults,
-    /// Relays that go silent: index from 1, and when.
+    /// Relays that go silent: index from 1 and time.
     pub kills: Vec<(u16, Instant)>,
-    /// Relays that are switched on again, with nothing left of what they knew but an upload: index from 1, and when.
+    /// Relays that reboot: index from 1 and time. They keep only persisted state: uploads and the acceptor record.
     pub boots: Vec<(u16, Instant)>,
-    /// Times in which one part of the chain does not hear the other.
+    /// Partitions of the chain.
     pub partitions: Vec<Partition>,
-    /// Whether frames carry tags: with a key drawn from the seed, and an epoch that counts the starts of a relay.
+    /// True to sign frames, with a key drawn from the seed and an epoch that counts a relay's starts.
     pub auth: bool,
-    /// Missions that are uploaded in flight; without `auth` nothing is.
+    /// Mission uploads during the run; none take place without `auth`.
     pub uploads: Vec<UploadSpec>,
-    /// Relays that do not keep what was uploaded when they are switched off: index from 1.
+    /// Relays that do not persist uploads across a reboot: index from 1.
     pub forgetful: Vec<u16>,
-    /// What an attacker does, if there is one.
+    /// Attack on the chain, if any.
     pub attack: Option<Attack>,
-    /// How the drones fly, where that is simulated, too.
+    /// Flight of simple drones, if simulated.
     pub flight: Option<FlightSpec>,
-    /// The same with an autopilot each, in place of it.
+    /// Flight of drones with autopilots; replaces `flight`.
     pub fleet: Option<FleetSpec>,
-    /// On a shared channel: how many relays away a relay is heard.
+    /// Radio range in relays, on a shared channel.
     pub radio_reach: usize,
-    /// On a shared channel: how the radios come by it.
+    /// Channel access of the radios, on a shared channel.
     pub access: Access,
-    /// Mean length of a run of losses, frames: 1 for losses that are independent, else at least
-    /// [`Bursts::shortest`](super::bursts::Bursts::shortest) of `faults.loss`.
+    /// Mean burst of losses, frames: 1 if independent, else at least [`Bursts::shortest`](super::bursts::Bursts::shortest).
     pub burst: f64,
-    /// Relays that do not hear another one for a time.
+    /// Failures of single link directions.
     pub deaf: Vec<Deaf>,
-    /// What the relays hear, where they are to find it out.
+    /// Interference that the relays measure, if they have to find it.
     pub sky: Option<Sky>,
-    /// The run goes on until then whatever has come of it before, and is judged all the time.
+    /// Fixed end of the run; the chain is judged all the time.
     pub soak: Option<Instant>,
-    /// After this time frames get through, if there is one.
+    /// Time from which frames are no longer lost or damaged.
     pub faults_end: Option<Instant>,
-    /// Whether the frames on the air are kept for [`Chain::frames`](super::chain::Chain::frames).
+    /// True to record frames for [`Chain::frames`](super::chain::Chain::frames).
     pub record: bool,
-    /// Whether what it looks like is kept, for [`Outcome::film`](super::outcome::Outcome::film).
+    /// True to record [`Outcome::film`](super::outcome::Outcome::film).
     pub film: bool,
     /// Seed of every random draw.
     pub seed: u64,
-    /// The run ends at this time at the latest.
+    /// Latest end of the run.
     pub deadline: Instant,
 }
 
 impl Setup {
-    /// How many relays away a relay is heard on a shared channel, unless a run says otherwise.
+    /// Default radio range in relays, on a shared channel.
     pub const RADIO_REACH: usize = 4;
 
-    /// A faultless run of `mission` with the default settings, links and seed 1.
+    /// Fault-free run of `mission` with default settings, default links and seed 1.
     pub fn new(mission: Mission) -> Self {
         Self {
             mission,
@@ -153,12 +152,12 @@ impl Setup {
         }
     }
 
-    /// The same on one ideal channel: frames are in nobody's way ([`Access::Ideal`]).
+    /// Run on one ideal channel without collisions ([`Access::Ideal`]).
     pub fn on_shared_channel(mission: Mission) -> Self {
         Self::on_air(mission, Access::Ideal)
     }
 
-    /// The same on one channel that the radios come by as `access` says.
+    /// Run on one shared channel with the given access method.
     pub fn on_air(mission: Mission, access: Access) -> Self {
         let mut setup = Self::new(mission);
         setup.settings.wiring = Wiring::Shared;
@@ -166,14 +165,14 @@ impl Setup {
         setup
     }
 
-    /// Has the run go on until `until`, judged all the time.
+    /// Runs until `until` and judges the chain all the time.
     pub fn soaked(mut self, until: Instant) -> Self {
         self.soak = Some(until);
         self.deadline = until;
         self
     }
 
-    /// What a timing has to be made of: what the link carries, and how many share it.
+    /// Returns the channel parameters from which timings are derived.
     pub fn channel(&self) -> Channel {
         let near = match self.settings.wiring {
             Wiring::Pair => 1,
@@ -193,7 +192,7 @@ impl Setup {
         }
     }
 
-    /// What the relays that share a channel put on it; `None` where nobody is in another's way.
+    /// Returns the load of the shared channel; `None` if senders do not interfere with each other.
     pub fn load(&self) -> Option<ChannelLoad> {
         let shared = self.settings.wiring == Wiring::Shared && self.access != Access::Ideal;
         let Channel {
@@ -205,7 +204,7 @@ impl Setup {
         })
     }
 
-    /// How long a sweep takes from one relay to the next, and a millisecond for computing.
+    /// Returns the longest time of a sweep message per hop, with 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
         self.load().map_or(self.link.hop_time(), |load| {
@@ -213,7 +212,7 @@ impl Setup {
         })
     }
 
-    /// How a relay that is switched on for the `start`th time, from 1, proves who it is.
+    /// Returns the key and the epoch of a relay at its `start`th start, from 1; `None` without `auth`.
     pub fn proof(&self, start: u32) -> Option<Auth> {
         self.secret().map(|secret| Auth {
             key: Key::new(secret),
@@ -221,9 +220,9 @@ impl Setup {
         })
     }
 
-    /// The bytes of the key, where frames carry tags.
+    /// Returns the key's bytes; `None` without `auth`.
     pub fn secret(&self) -> Option<[u8; 32]> {
-        // Not the generator of the run: a chain with tags draws what one without them does.
+        // Separate generator, so that signing does not change the run's other draws.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(KEYS);
         self.auth.then(|| rng.random())

@@ -1,4 +1,4 @@
-//! What the relays of a run hear: interferers that nobody tells them of.
+//! Interference that the relays of a run measure, from interferers that their mission does not contain.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -8,61 +8,61 @@ use uav_relay::{Duration, Instant, Placement, Sample};
 
 use uav_relay_scenario::scene::{Place, Scene};
 
-/// What is heard, and when.
+/// Interferers and measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sky {
-    /// The true interferers, where they are at time 0.
+    /// True interferers at time 0.
     pub scene: Scene,
-    /// How fast all of them move, m/s along the line and to its right.
+    /// Common velocity of the interferers, m/s along the line and to its right.
     pub velocity_mps: [f64; 2],
-    /// Independent samples in one measurement.
+    /// Independent samples per measurement.
     pub samples: u32,
-    /// Standard deviation of a place's own error, dB.
+    /// Standard deviation of the shadowing at a position, dB.
     pub shadow_db: f64,
-    /// How often every relay measures.
+    /// Time between two measurements of a relay.
     pub period: Duration,
-    /// Whether it measures once at a place, and then no more.
+    /// True to measure only once at each position.
     pub once: bool,
-    /// What relays are handed instead of what is heard where they are, once, at the first measurement: index from 1, and what.
+    /// Samples that replace all measurements, handed over at the first one: relay index from 1, sample.
     pub handed: Vec<(u16, Sample)>,
-    /// Receivers that say something else.
+    /// Broken receivers.
     pub broken: Vec<Broken>,
-    /// When the ends begin to measure, and when they stop.
+    /// Start and end of the measurements at the transmitter and the receiver.
     pub ends_during: [Instant; 2],
-    /// Whether the transmitter and the receiver measure, too: with keys they say it on the air, without them the receiver has a wire to the
-    /// last relay.
+    /// True if both ends measure, too. With keys they send the result by radio; without, the last relay has a wire to the
+    /// receiver.
     pub ends: bool,
-    /// The run goes on until then.
+    /// End of the run.
     pub until: Instant,
-    /// Seed of the shadows.
+    /// Seed of the shadowing.
     pub seed: u64,
 }
 
-/// A receiver that says something else than it hears.
+/// Broken receiver that reports wrong powers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Broken {
-    /// Whose: index from 1, 0 for the transmitter, one more than there are relays for the receiver.
+    /// Node number: relay index from 1, 0 for the transmitter, N + 1 for the receiver.
     pub node: u16,
-    /// What it says.
+    /// Kind of the error.
     pub says: Says,
-    /// Since when.
+    /// Start of the error.
     pub since: Instant,
 }
 
-/// What a broken receiver says.
+/// Error of a broken receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Says {
-    /// So many times what it hears.
+    /// Factor on the true power.
     Times(f64),
-    /// Always this, W.
+    /// Constant power, W.
     Always(f64),
 }
 
-/// Places nearer than this have the same shadow, m.
+/// Size of a cell with common shadowing, m.
 const SHADOW_M: f64 = 5.0;
 
 impl Sky {
-    /// A thousand samples a second, without shadows, for ten minutes.
+    /// Measurements of 1000 samples once a second, without shadowing, for ten minutes.
     pub const fn of(scene: Scene) -> Self {
         Self {
             scene,
@@ -80,7 +80,7 @@ impl Sky {
         }
     }
 
-    /// The interferers as they are at `now`.
+    /// Returns the scene with the interferers' positions at `now`.
     pub fn scene_at(&self, now: Instant) -> Scene {
         let seconds = now.as_micros() as f64 * 1e-6;
         let mut scene = self.scene.clone();
@@ -92,7 +92,7 @@ impl Sky {
         scene
     }
 
-    /// What relay `index` (from 1) measures at `at`, W.
+    /// Draws the power that relay `index` (from 1) measures at `at`, W.
     pub(super) fn heard_w(
         &self,
         scene: &Scene,
@@ -105,7 +105,7 @@ impl Sky {
         self.said_w(scene, index, now, true_w, rng)
     }
 
-    /// What the receiver of `node` makes of an interference of `true_w`, W.
+    /// Draws the power that `node` reports for a true interference of `true_w`, W.
     fn said_w(
         &self,
         scene: &Scene,
@@ -123,7 +123,6 @@ impl Sky {
         }
     }
 
-    /// What the receiver of a chain of `relays` measures, W.
     pub(super) fn receiver_w(
         &self,
         scene: &Scene,
@@ -135,24 +134,22 @@ impl Sky {
         self.said_w(scene, relays + 1, now, true_w, rng)
     }
 
-    /// What the transmitter measures, W.
     pub(super) fn transmitter_w(&self, scene: &Scene, now: Instant, rng: &mut ChaCha8Rng) -> f64 {
         self.said_w(scene, 0, now, scene.interference_on_ground_w(0.0), rng)
     }
 
-    /// Whether the ends measure now.
     pub(super) fn ends_measure(&self, now: Instant) -> bool {
         let [from, until] = self.ends_during;
         self.ends && now >= from && now < until
     }
 
-    /// The mean of so many exponential samples with a mean of 1.
+    /// Draws the mean of `samples` exponential variables with mean 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
     }
 
-    /// A standard normal number of the place's own.
+    /// Returns the standard normal shadowing value of the cell of `at`.
     #[expect(clippy::cast_possible_truncation, reason = "a number of a cell")]
     fn shadow(&self, at: Place) -> f64 {
         use rand::SeedableRng as _;
@@ -168,19 +165,19 @@ fn decibel(db: f64) -> f64 {
     libm::pow(10.0, db / 10.0)
 }
 
-/// Where the relays stand at some time.
+/// Snapshot of the relays at a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stand {
-    /// When.
+    /// Time of the snapshot.
     pub at: Instant,
-    /// The relays that are on, by index from 1. A relay that went silent is not among them.
+    /// Living relays, by index from 1.
     pub nodes: Vec<u16>,
-    /// Of each of them that has a place: where its drone is, or where it was told to be where drones are not simulated.
+    /// Position of each living relay that has one: its drone's, or its setpoint if drones are not simulated.
     pub places: Vec<Placement>,
-    /// Where they were told to be, if all were.
+    /// Setpoints; `None` unless every relay has one.
     pub goals: Option<Vec<Placement>>,
-    /// What the first relay believes.
+    /// Interference estimate of relay 1.
     pub believed: Told,
-    /// How many agreements there have been on other places than before.
+    /// Number of agreements on new positions so far.
     pub agreements: u32,
 }

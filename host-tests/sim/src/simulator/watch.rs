@@ -1,4 +1,4 @@
-//! How much of the time the chain is right, how many groups fly at once, and how near relays come to each other.
+//! Statistics over time: availability of the chain, simultaneous groups, and smallest distance of relays.
 
 use uav_relay::{Duration, Instant};
 
@@ -7,12 +7,12 @@ use super::flying::{self, Seen};
 use super::optima::{Optima, Run};
 pub use super::outcome::Watched;
 
-/// What has been seen of a run so far.
+/// Running statistics.
 #[derive(Debug)]
 pub struct Watch {
     pub(super) seen: Vec<Seen>,
     pub(super) optima: Optima,
-    /// Where each relay was told to fly last, whatever has become of it since.
+    /// Last setpoint of each relay.
     stood: Vec<Option<Point>>,
     until: Instant,
     first: Option<Instant>,
@@ -25,7 +25,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Begins to watch these relays; `run` finds what they are held against.
+    /// Starts with the given states; `run` computes the reference positions.
     pub fn new(seen: Vec<Seen>, run: Run) -> Self {
         Self {
             stood: vec![None; seen.len()],
@@ -42,7 +42,7 @@ impl Watch {
         }
     }
 
-    /// Time goes on to `now`, with all as it was seen last.
+    /// Advances the time to `now` with unchanged states.
     pub fn go_on(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
@@ -58,7 +58,7 @@ impl Watch {
         }
     }
 
-    /// Relay `at` (from 0) is seen; whether anything about it is new.
+    /// Updates the state of relay `at` (from 0). Returns true if it changed.
     pub fn see(&mut self, at: usize, seen: Seen) -> bool {
         let Some(known) = self.seen.get_mut(at) else {
             return false;
@@ -88,7 +88,7 @@ impl Watch {
         }
     }
 
-    /// All that has changed at this moment was seen: what does it come to?
+    /// Evaluates the states after all changes at `now`.
     pub fn take_in(&mut self, now: Instant) {
         self.most_flying = self.most_flying.max(flying::groups(&self.seen));
         if self.first.is_none() && flying::has_agreed(&self.seen) {
@@ -96,7 +96,7 @@ impl Watch {
         }
     }
 
-    /// From now on the chain is right, or not.
+    /// Sets if the chain is at its optimum from now on.
     pub fn judge(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);
@@ -104,7 +104,7 @@ impl Watch {
         self.is_right = is_right;
     }
 
-    /// What it came to by `now`; with `flown_m`, the least distance of drones that were simulated.
+    /// Returns the statistics up to `now`; `flown_m` is the smallest distance of simulated drones.
     pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
         self.go_on(now);
         let share = self.first.map_or(0.0, |first| {

@@ -1,6 +1,4 @@
-//! The chain from above, below the view from the side: the room beside the line, and the interferers where they stand.
-//!
-//! y is to the right of x, so it grows downward.
+//! Top view of the chain, the room beside the line and the interferers; y (right of x) points downward.
 
 use super::axis::{self, Frame, Scale};
 use super::canvas::Canvas;
@@ -8,17 +6,16 @@ use super::labels::{Area, Labels, width};
 use super::picture::{ABOVE, BOTTOM, LEFT, Picture, RIGHT, Room, TOP, length};
 use super::{hops, nodes, sources};
 
-/// The plot, edge by edge: as high as fits, below the axis of the view from the side.
+/// Edges of the plot, below the axis of the side view.
 const PLOT_TOP: f64 = BOTTOM + 52.0;
 const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
-/// Height of the words.
 const SIZE: f64 = 10.0;
 
-/// Interferers farther aside than this many times the room, or where there is none than the line is long, are told of at the edge of the plot.
+/// Limit of the plot for interferers, in half-widths of the room; farther ones are drawn at its edge.
 const FARTHEST: f64 = 2.0;
 
-/// Draws the view; `side` has the scale along the line.
+/// Draws the top view; `side` provides the scale along the line.
 pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room) {
     let xs = picture.nodes.iter().map(|(x, _)| *x);
     let ys = room.y_m.iter().copied().chain(std::iter::repeat(f64::NAN));
@@ -49,7 +46,7 @@ pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &
         nodes::label(canvas, &mut labels, &frame, &seen);
         return;
     }
-    // What has a halo may stand on an edge, what has none may not.
+    // Labels with a halo may cover an edge; labels without one may not.
     for edge in edges {
         labels.take_line([(LEFT, edge), (RIGHT, edge)]);
     }
@@ -57,7 +54,7 @@ pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &
     label(canvas, &mut labels, edges);
 }
 
-/// The scale aside: it holds the room, all relays, and the interferers that are not too far.
+/// Returns the vertical scale for the room, all relays, and the interferers within the limit.
 fn upright(seen: &Picture, room: &Room) -> Scale {
     let (mut low, mut high) = (room.least_m.min(0.0), room.most_m.max(0.0));
     let reach = if room.is_line() {
@@ -75,7 +72,6 @@ fn upright(seen: &Picture, room: &Room) -> Scale {
     Scale::new((low - margin, high + margin), (PLOT_TOP, PLOT_BOTTOM))
 }
 
-/// Draws Tx and Rx with their names outside the chain.
 fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) {
     for (name, x, side) in [("Tx", 0.0, -1.0), ("Rx", distance, 1.0)] {
         let (x, y) = frame.at((x, 0.0));
@@ -88,7 +84,7 @@ fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) 
     }
 }
 
-/// Says what the dashed lines are: below the left edge or above the right one, at either end.
+/// Labels the dashed edges at a free position near either end.
 fn label(canvas: &mut Canvas, labels: &mut Labels, [left, right]: [f64; 2]) {
     let words = "edges of the room for relays";
     let size = (width(words, SIZE) + 4.0, SIZE + 1.0);

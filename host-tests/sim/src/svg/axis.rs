@@ -1,38 +1,37 @@
-//! Scales from metres to the picture, and axes with round numbers.
+//! Scales from metres to picture coordinates, and axes with round ticks.
 
 use super::canvas::{Canvas, Point};
 
-/// A straight map from a quantity to a coordinate of the picture.
+/// Linear map from a quantity to a picture coordinate.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     from: (f64, f64),
     to: (f64, f64),
 }
 
-/// Both scales of a plot: along the line, and up from the ground or, seen from above, aside.
+/// Scales of a plot: along the line, and the height or, in the top view, the lateral offset.
 pub(super) struct Frame {
     pub(super) x: Scale,
     pub(super) h: Scale,
 }
 
 impl Scale {
-    /// `from` must not be empty.
     pub(super) const fn new(from: (f64, f64), to: (f64, f64)) -> Self {
         Self { from, to }
     }
 
-    /// Where a quantity is drawn; what is beyond the scale, at its end.
+    /// Returns the coordinate of a quantity, limited to the scale's ends.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.from.0) / (self.from.1 - self.from.0)).clamp(0.0, 1.0);
         self.to.0 + share * (self.to.1 - self.to.0)
     }
 
-    /// Whether a quantity is on the scale.
+    /// Returns true if a quantity is on the scale.
     pub(super) fn holds(&self, value: f64) -> bool {
         (self.from.0..=self.from.1).contains(&value)
     }
 
-    /// Round quantities within the scale, at most `most` of them or so, and how many decimals they need.
+    /// Returns about `most` round ticks and their number of decimals.
     fn ticks(&self, most: f64) -> (Vec<f64>, usize) {
         let step = round_step((self.from.1 - self.from.0) / most);
         let first = (self.from.0 / step).ceil();
@@ -56,18 +55,18 @@ impl Frame {
     }
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is at least `least`.
 pub(super) fn round_step(least: f64) -> f64 {
     let power = 10.0_f64.powf(least.log10().floor());
     let steps = [1.0, 2.0, 5.0].map(|digit| digit * power);
-    // A hair's breadth less, because the power of ten is itself rounded.
+    // The tolerance allows for the rounding of the power of ten.
     steps
         .into_iter()
         .find(|step| *step >= 0.999_999 * least)
         .unwrap_or(10.0 * power)
 }
 
-/// Draws grid, axes, ticks and the axes' names; `upright` is that of the vertical one.
+/// Draws the grid and the axes; `upright` is the name of the vertical axis.
 pub(super) fn draw(canvas: &mut Canvas, frame: &Frame, upright: &str) {
     let (left, right) = frame.x.to;
     let (low, high) = frame.h.to;

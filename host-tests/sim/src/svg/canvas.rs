@@ -1,8 +1,8 @@
-//! SVG markup: shapes and text with the few styles that the picture has.
+//! SVG markup: shapes and text in the styles of the picture.
 
 use core::fmt::Write as _;
 
-/// Every style in one place; one sans-serif family, so that nothing has to be embedded.
+/// Style sheet with a single sans-serif family, so that no font has to be embedded.
 const STYLE: &str = "\
 text{font-family:Helvetica,Arial,'DejaVu Sans',sans-serif;font-size:10px;fill:#222;text-anchor:middle}\
 .title{font-size:13px;font-weight:bold}.subtitle{font-size:12px}.axis{font-size:11px}\
@@ -14,10 +14,9 @@ line,path{fill:none;stroke:#222;stroke-width:1px}\
 .ground{fill:#222}.source{fill:#cc79a7;stroke:#222;stroke-width:.8px}\
 .before{fill:#fff;stroke:#cc79a7;stroke-width:.8px;stroke-dasharray:2 1.5}.faint{fill:#888}";
 
-/// A point of the picture, in its units, y downward.
+/// Point in picture units; y points downward.
 pub(super) type Point = (f64, f64);
 
-/// An SVG document that grows shape by shape.
 pub(super) struct Canvas {
     out: String,
 }
@@ -32,7 +31,7 @@ impl Canvas {
         canvas
     }
 
-    /// What the whole picture shows, then its style and its light background.
+    /// Writes the title, the style sheet and the white background.
     pub(super) fn describe(&mut self, words: &str) {
         let words = escape(words);
         self.put(format_args!(
@@ -55,7 +54,7 @@ impl Canvas {
         ));
     }
 
-    /// A line of its own colour and width, dashed or not, with a tooltip.
+    /// Draws a line with its own colour and width, optionally dashed, with a tooltip.
     pub(super) fn hop(
         &mut self,
         [(x1, y1), (x2, y2)]: [Point; 2],
@@ -72,7 +71,6 @@ impl Canvas {
         ));
     }
 
-    /// An edge of the room beside the line.
     pub(super) fn edge(&mut self, (x1, y1): Point, (x2, y2): Point) {
         let [x1, y1, x2, y2] = [x1, y1, x2, y2].map(short);
         self.put(format_args!(
@@ -81,7 +79,7 @@ impl Canvas {
         ));
     }
 
-    /// A sample of a hop's line, in the legend.
+    /// Draws a sample of a hop's line in the legend.
     pub(super) fn swatch(&mut self, (x, y): Point, length: f64, (colour, width): (&str, f64)) {
         let [x, y, end, width] = [x, y, x + length, width].map(short);
         self.put(format_args!(
@@ -90,13 +88,11 @@ impl Canvas {
         ));
     }
 
-    /// A closed shape through some points.
     pub(super) fn shape(&mut self, points: &[Point], class: &str) {
         let outline = outline(points);
         self.put(format_args!("<path class=\"{class}\" d=\"{outline}\"/>\n"));
     }
 
-    /// A closed shape with a tooltip.
     pub(super) fn marked(&mut self, points: &[Point], class: &str, tip: &str) {
         let (outline, tip) = (outline(points), escape(tip));
         self.put(format_args!(
@@ -104,7 +100,7 @@ impl Canvas {
         ));
     }
 
-    /// A relay, with a tooltip: the only use of a circle, so that there are as many circles as relays in each view.
+    /// Draws a relay with a tooltip. Only relays are circles, so tests can count them.
     pub(super) fn relay(
         &mut self,
         (x, y): Point,
@@ -120,7 +116,7 @@ impl Canvas {
         ));
     }
 
-    /// The sign of a relay in the legend: round like a relay, but not one.
+    /// Draws a relay symbol for the legend, as a path instead of a circle.
     pub(super) fn disc(&mut self, (x, y): Point, radius: f64, class: &str) {
         let [x, y, r] = [x - radius, y, radius].map(short);
         let turn = short(2.0 * radius);
@@ -137,7 +133,7 @@ impl Canvas {
         ));
     }
 
-    /// A symbol, its index, and what follows.
+    /// Writes a symbol with a subscript and further text.
     pub(super) fn subscripted(
         &mut self,
         (x, y): Point,
@@ -152,7 +148,7 @@ impl Canvas {
         ));
     }
 
-    /// Text that reads upward.
+    /// Writes text that reads upward.
     pub(super) fn upward(&mut self, (x, y): Point, class: &str, words: &str) {
         let [x, y] = [x, y].map(short);
         let words = escape(words);
@@ -167,7 +163,7 @@ impl Canvas {
     }
 }
 
-/// Path data that runs through some points and back.
+/// Returns the path data of a closed polygon.
 fn outline(points: &[Point]) -> String {
     let mut data = String::new();
     for (index, (x, y)) in points.iter().enumerate() {
@@ -177,7 +173,7 @@ fn outline(points: &[Point]) -> String {
     data + "Z"
 }
 
-/// A coordinate to a hundredth of a unit, which no eye can tell from more; never NaN.
+/// Rounds a coordinate to hundredths; non-finite values become 0.
 fn short(value: f64) -> f64 {
     let hundredths = (100.0 * value).round();
     // The addition turns -0 into 0.
@@ -188,7 +184,7 @@ fn short(value: f64) -> f64 {
     }
 }
 
-/// Text as XML holds it: markup escaped, and what XML 1.0 cannot hold replaced.
+/// Escapes text for XML; characters that XML 1.0 excludes are replaced.
 fn escape(words: &str) -> String {
     let mut out = String::with_capacity(words.len());
     for c in words.chars() {

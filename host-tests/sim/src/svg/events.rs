@@ -1,24 +1,23 @@
-//! What happened to the chain, as a strip below the picture: one sign for each event, evenly spaced, whenever it was.
+//! Strip of events below the picture: evenly spaced, not to scale in time.
 
 use super::canvas::Canvas;
 use super::picture::{Picture, WIDTH, bottom};
 
-/// Height of the strip.
 const STRIP: f64 = 84.0;
 
-/// From the rest of the picture down to the line of events.
+/// Distance from the picture's bottom to the event line.
 const LINE: f64 = 48.0;
 
-/// From either edge to the first and the last event.
+/// Distance of the first and the last event from the edges.
 const MARGIN: f64 = 52.0;
 
-/// Events that there is room for.
+/// Largest number of events shown.
 const MOST: usize = 8;
 
-/// Characters of one event's words that there is room for.
+/// Largest number of characters per event.
 const LONGEST: usize = 18;
 
-/// Height of the strip of this picture: none where nothing happened.
+/// Returns the strip's height; 0 without events.
 pub(super) fn height(picture: &Picture) -> f64 {
     if picture.events.is_empty() {
         0.0
@@ -27,7 +26,6 @@ pub(super) fn height(picture: &Picture) -> f64 {
     }
 }
 
-/// Draws the strip, if anything happened.
 pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     if picture.events.is_empty() {
         return;
@@ -40,7 +38,7 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     let gaps = (events.len() as f64 - 1.0).max(1.0);
     for (place, (time, words)) in events.iter().enumerate() {
         let x = MARGIN + place as f64 * (WIDTH - 2.0 * MARGIN) / gaps;
-        // Neighbours stand below and above the line in turn.
+        // Labels alternate below and above the line.
         let (first, second) = if place % 2 == 0 {
             (line + 16.0, line + 27.0)
         } else {
@@ -52,7 +50,7 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     }
 }
 
-/// Time and words of the events, those in the middle of too many in one.
+/// Returns times and texts of the events; the middle ones are merged if there are too many.
 fn shown(events: &[(f64, String)]) -> Vec<(String, String)> {
     let mut shown: Vec<(String, String)> = events
         .iter()

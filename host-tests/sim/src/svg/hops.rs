@@ -1,12 +1,11 @@
-//! The hops: lines coloured by how far their SIR is above the worst one's, and their SIR in dB beside them.
+//! Hops as lines, coloured by their SIR margin over the worst hop, with their SIR in dB.
 
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
 use super::picture::{Picture, decibels, length, placed, worst};
 
-/// Colours by dB above the worst hop, up to so many dB. Four of Okabe and Ito's, told apart by every kind of eye;
-/// the worst hops are also the widest lines, for prints without colour.
+/// Hop classes: dB above the worst hop, colour (Okabe-Ito), width (for colourless prints), legend.
 pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (0.1, "#d55e00", 3.2, "< 0.1 dB"),
     (1.0, "#e69f00", 2.4, "< 1 dB"),
@@ -14,23 +13,20 @@ pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (f64::INFINITY, "#0072b2", 2.4, "≥ 6 dB"),
 ];
 
-/// A hop whose SIR is unknown.
 const UNKNOWN: (&str, f64) = ("#999999", 2.4);
 
-/// Height of a number, in units of the picture.
 const SIZE: f64 = 10.0;
 
-/// From a line to its number: more than the radius of a relay, so that a number may stand over one.
+/// Distance of a number from its line, more than a relay's radius.
 const GAP: f64 = 4.6;
 
-/// Where along a hop its number may stand, and how far above (or, if negative, below) the nearest row.
+/// Candidate positions of a number: share of the hop's length, and distance above (negative: below).
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
-/// With more hops than this the numbers are thinned out instead of stacked.
+/// Largest number of hops with stacked numbers; more are thinned out.
 const FEW: usize = 21;
 
-/// One hop as it is drawn.
 pub(super) struct Hop {
     number: usize,
     line: [Point; 2],
@@ -39,7 +35,7 @@ pub(super) struct Hop {
     silent: bool,
 }
 
-/// The hops between the nodes that have a place.
+/// Returns the hops between the relays that have a position.
 pub(super) fn of(picture: &Picture, frame: &Frame) -> Vec<Hop> {
     let worst = worst(picture).and_then(decibels);
     let last = picture.nodes.len() + 1;
@@ -49,12 +45,12 @@ pub(super) fn of(picture: &Picture, frame: &Frame) -> Vec<Hop> {
     let ends = placed(picture).chain([(last, (length(picture), 0.0))]);
     let mut hops = Vec::new();
     let mut before = (0, (0.0, 0.0), 0);
-    // Those that are not in the chain any more are passed by.
+    // Relays outside the chain are skipped.
     let out = &picture.left_out;
     for (node, place) in ends.filter(|(node, _)| !out.contains(node)) {
         let passed = out.iter().filter(|other| (1..node).contains(other));
         let number = node.saturating_sub(passed.count());
-        // Past a relay without a place no line is known.
+        // The hops beside a relay without a position are unknown.
         if number == before.0 + 1 {
             let decibels = picture.hop_sir.get(number - 1).copied().and_then(decibels);
             let colour = decibels.zip(worst).map_or(UNKNOWN, |(here, worst)| {
@@ -76,7 +72,7 @@ pub(super) fn of(picture: &Picture, frame: &Frame) -> Vec<Hop> {
     hops
 }
 
-/// Draws the lines, the worst hops last so that nothing hides them.
+/// Draws the lines; the worst hops last, on top.
 pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     let mut order: Vec<&Hop> = hops.iter().collect();
     order.sort_by(|a, b| a.colour.1.total_cmp(&b.colour.1));
@@ -94,7 +90,7 @@ pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     }
 }
 
-/// Writes as many SIRs as there is room for: the worst hop's first, then the two ends', then the rest in turn.
+/// Writes the SIRs for which there is room: the worst hop's first, then the two ends', then the others.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     let last = hops.last().map_or(0, |hop| hop.number);
     let lowest = hops.iter().filter_map(|hop| hop.decibels).reduce(f64::min);
@@ -102,7 +98,7 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     let mut worst_seen = false;
     let mut order: Vec<(u8, &Hop)> = Vec::new();
     for hop in hops {
-        // Where every hop is as bad as the next, the first one stands for all of them.
+        // Of several equally bad hops, only the first has priority.
         let worst = !worst_seen
             && hop
                 .decibels
@@ -115,10 +111,10 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     order.sort_by_key(|(rank, hop)| (*rank, hop.number));
     for (_, hop) in order {
         let Some(value) = hop.decibels else { continue };
-        // Adding zero turns the -0 that rounding may leave into 0.
+        // The addition turns -0 into 0.
         let words = format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
         let size = (width(&words, SIZE) + 3.0, SIZE);
-        // In a dense chain the numbers stand in one row, well apart, and each points to its hop.
+        // In a dense chain the numbers are in one row, each with a line to its hop.
         let in_row = dense && hop.number != 1 && hop.number != last;
         let places = if in_row {
             places(hop, size, &[0.5], &[4.0])
@@ -136,12 +132,12 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     }
 }
 
-/// Places for a hop's number, the best first: at each share of its length, on each side, each side so far off.
+/// Returns candidate positions of a hop's number, the best first, each with its anchor on the hop.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);
     let span = run.hypot(rise).max(1e-9);
-    // Across the line and upward; for an upright line, to the right.
+    // Normal of the line, pointing upward; to the right for a vertical line.
     let across = (rise / span, -run / span);
     let clear = f64::midpoint(across.0.abs() * width, across.1.abs() * height) + GAP;
     let mut places = Vec::new();
@@ -155,14 +151,14 @@ fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> V
     places
 }
 
-/// Ties a number to a hop much shorter than itself.
+/// Draws a line from a number to its hop if the hop is much shorter than the number.
 fn leader(canvas: &mut Canvas, hop: &Hop, from: Point, to: Point, (width, height): Point) {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     if (x2 - x1).hypot(y2 - y1) > width || dx.hypot(dy) < 1e-9 {
         return;
     }
-    // Up to the edge of the number, not under it.
+    // The line ends at the edge of the number.
     let share = 1.0
         - f64::min(
             width / 2.0 / dx.abs().max(1e-9),

@@ -1,18 +1,17 @@
-//! Finding room: a label is placed where it covers nothing, or not at all.
+//! Label placement: a label is drawn only where it covers nothing.
 
 use super::canvas::Point;
 
-/// Lines have a width too.
+/// Half of the assumed line width.
 const HALF_LINE: f64 = 1.6;
 
-/// An upright rectangle.
 #[derive(Clone, Copy)]
 pub(super) struct Area {
     low: Point,
     high: Point,
 }
 
-/// What is already drawn in the plot.
+/// Occupied areas and lines of the plot.
 pub(super) struct Labels {
     plot: Area,
     taken: Vec<Area>,
@@ -41,7 +40,7 @@ impl Area {
             && self.high.1 <= other.high.1
     }
 
-    /// Whether a line passes through: what is left of it after cutting at each edge in turn.
+    /// Returns true if a line crosses the area (clipping at each edge).
     fn crossed(&self, [from, to]: &[Point; 2]) -> bool {
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         let sides = [
@@ -66,7 +65,7 @@ impl Area {
 }
 
 impl Labels {
-    /// An empty plot with these corners.
+    /// Empty plot with these corners.
     pub(super) const fn inside(low: Point, high: Point) -> Self {
         Self {
             plot: Area { low, high },
@@ -75,22 +74,22 @@ impl Labels {
         }
     }
 
-    /// Notes that something stands here, whatever stood there before.
+    /// Marks an area as occupied.
     pub(super) fn take(&mut self, area: Area) {
         self.taken.push(area);
     }
 
-    /// Notes that a line runs here.
+    /// Marks a line as occupied.
     pub(super) fn take_line(&mut self, line: [Point; 2]) {
         self.lines.push(line);
     }
 
-    /// Whether a line would run through nothing but other lines.
+    /// Returns true if a line crosses no occupied area.
     pub(super) fn clear(&self, line: &[Point; 2]) -> bool {
         !self.taken.iter().any(|area| area.crossed(line))
     }
 
-    /// Takes the area and tells so, if it lies in the plot and covers nothing.
+    /// Occupies the area if it is inside the plot and free. Returns true on success.
     pub(super) fn try_take(&mut self, area: Area) -> bool {
         let free = area.inside(&self.plot)
             && !self.taken.iter().any(|other| area.meets(other))
@@ -102,7 +101,7 @@ impl Labels {
     }
 }
 
-/// Width of a text, by an average letter of a wide sans-serif face; better too wide than too narrow.
+/// Estimates the width of a text from a wide sans-serif font's average; rather too wide than too narrow.
 pub(super) fn width(words: &str, size: f64) -> f64 {
     words.chars().count() as f64 * 0.62 * size
 }

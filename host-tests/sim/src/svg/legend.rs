@@ -1,11 +1,10 @@
-//! What the colours and signs mean.
+//! Legend of colours and symbols.
 
 use super::canvas::Canvas;
 use super::hops::CLASSES;
 use super::nodes::cross;
 use super::picture::{Picture, bottom};
 
-/// Draws the legend below the plot.
 pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     let row = bottom(picture) - 27.0;
     canvas.text((24.0, row + 3.6), "start", "Hop SIR above the worst hop's:");

@@ -1,7 +1,7 @@
-//! A picture of the chain from the side, and from above where there is room or an interferer beside the line, as one self-contained SVG file.
+//! Picture of the chain as a self-contained SVG file.
 //!
-//! The markup is written here by hand: it is a handful of shapes, the order and the digits of every attribute stay
-//! ours (the same run gives the same bytes), and a crate would bring nothing but a second vocabulary.
+//! A side view; and a top view if relays may leave the line or an interferer is beside it. The markup is written by hand, without
+//! a crate: there are few shapes, and the same run gives the same bytes.
 
 mod above;
 mod axis;
@@ -22,8 +22,7 @@ pub use picture::{Others, Picture, Room, room};
 
 /// Draws the chain as an SVG document.
 ///
-/// Numbers beside hops (their SIR in dB) and relays are thinned out until none covers another; every hop and relay
-/// carries its own as a tooltip. The work grows with the square of N at most.
+/// Overlapping numbers are omitted; every hop and relay has its number in a tooltip. The work is at most quadratic in N.
 #[must_use]
 pub fn draw(picture: &Picture) -> String {
     let frame = frame(picture);
@@ -50,12 +49,12 @@ pub fn draw(picture: &Picture) -> String {
     canvas.finish()
 }
 
-/// The scales: x holds the chain and every interferer near enough, h starts at the ground and leaves room for numbers.
+/// Returns the scales: x contains the chain and all near interferers, h starts at the ground.
 fn frame(picture: &Picture) -> Frame {
     let distance = length(picture);
     let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);
     for (_, (x, h)) in placed(picture) {
-        // A relay far off the line is a bug elsewhere, and must not squeeze the rest into a dot.
+        // Limit x so that a relay far off the line (a bug elsewhere) does not shrink the rest to a dot.
         let x = x.clamp(-distance, 2.0 * distance);
         (low, high, top) = (low.min(x), high.max(x), top.max(h));
     }
@@ -65,7 +64,7 @@ fn frame(picture: &Picture) -> Frame {
         }
     }
     let margin = 0.07 * (high - low);
-    // Above the highest relay: its numbers, and what is said of far interferers.
+    // Room above the highest relay for its numbers and for the text about far interferers.
     let share = 1.0 - (46.0 + sources::headroom(picture)) / (BOTTOM - TOP);
     let top = if top > 0.0 { top / share } else { 1.0 };
     Frame {
@@ -74,7 +73,7 @@ fn frame(picture: &Picture) -> Frame {
     }
 }
 
-/// The title's words, also those that a screen reader says.
+/// Returns the text of the title, also used by screen readers.
 fn summary(picture: &Picture) -> String {
     let sir = worst(picture).map_or_else(|| "unknown".to_owned(), both_units);
     format!(
@@ -84,7 +83,7 @@ fn summary(picture: &Picture) -> String {
     )
 }
 
-/// How many relays there are, and of how many.
+/// Formats the number of relays; with the remaining ones if some have left the chain.
 fn count(picture: &Picture) -> String {
     let all = picture.nodes.len();
     if picture.left_out.is_empty() {
@@ -95,7 +94,6 @@ fn count(picture: &Picture) -> String {
     }
 }
 
-/// An SIR both linear and in dB.
 fn both_units(sir: f64) -> String {
     let linear = if (1e-3..1e5).contains(&sir) {
         format!("{sir:.4}")

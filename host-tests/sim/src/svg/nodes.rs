@@ -5,10 +5,9 @@ use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
 use super::picture::{Picture, is_gone, length, placed};
 
-/// Height of a relay's number.
 const SIZE: f64 = 9.0;
 
-/// Draws Tx and Rx, standing on the ground with their names outside the chain.
+/// Draws Tx and Rx on the ground with their names outside the chain.
 pub(super) fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) {
     for (name, x, side) in [("Tx", 0.0, -1.0), ("Rx", distance, 1.0)] {
         let (x, y) = frame.at((x, 0.0));
@@ -20,14 +19,14 @@ pub(super) fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, dist
     }
 }
 
-/// Radius of a relay's circle: small enough for its hops to show between the circles.
+/// Returns the radius of a relay's circle, small enough to leave the hops visible.
 pub(super) fn radius(picture: &Picture, frame: &Frame) -> f64 {
     let hops = picture.nodes.len() as f64 + 1.0;
     let spacing = (frame.x.at(length(picture)) - frame.x.at(0.0)) / hops;
     (0.22 * spacing).clamp(0.5, 4.0)
 }
 
-/// Draws the relays; `upright` is what the vertical axis shows.
+/// Draws the relays; `upright` is the name of the vertical axis.
 pub(super) fn relays(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -62,13 +61,12 @@ pub(super) fn relays(
     }
 }
 
-/// Crosses something out.
 pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
     canvas.line((x - arm, y - arm), (x + arm, y + arm), "cross");
     canvas.line((x - arm, y + arm), (x + arm, y - arm), "cross");
 }
 
-/// Numbers the relays: all of a short chain, every fifth, tenth and so on of a long one, and those crossed out.
+/// Numbers the relays: all in a short chain, every fifth, tenth and so on in a long one, and the lost ones.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));

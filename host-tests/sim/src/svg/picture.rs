@@ -1,59 +1,59 @@
-//! What a picture shows, and where in it the plot is.
+//! Contents of a picture, and the layout of its plots.
 
 use uav_relay::Mission;
 
-/// Size of the picture in its own units; at half a page wide the smallest text is still about 5 pt.
+/// Size in picture units; at half a page width the smallest text is about 5 pt.
 pub(super) const WIDTH: f64 = 480.0;
 pub(super) const HEIGHT: f64 = 330.0;
 
-/// The plot inside it, edge by edge: room for the title, the vertical axis, and the legend.
+/// Edges of the plot, inside the title, the vertical axis and the legend.
 pub(super) const LEFT: f64 = 54.0;
 pub(super) const RIGHT: f64 = WIDTH - 14.0;
 pub(super) const TOP: f64 = 46.0;
 pub(super) const BOTTOM: f64 = HEIGHT - 80.0;
 
-/// How much higher the view from above makes the picture.
+/// Additional height of a picture with a top view.
 pub(super) const ABOVE: f64 = 232.0;
 
-/// What is shown of a chain of N relays.
+/// Contents of a picture of N relays.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Picture {
-    /// How the places were found, for the title; any text.
+    /// Planning method, for the title; any text.
     pub title_method: String,
-    /// Distance from Tx to Rx, in metres, above 0.
+    /// Distance from Tx to Rx, m, above 0.
     pub distance_m: f64,
-    /// Every interferer: transmit power in watts, place along x and offset y on the ground, both in metres.
+    /// Interferers: transmit power, W, position x and offset y on the ground, m.
     pub interferers: Vec<(f64, f64, f64)>,
-    /// Those that are not there: drawn faint, where the plot holds them.
+    /// Former or estimated interferers, drawn faint if they are in the plot's range.
     pub others: Vec<(f64, f64, f64)>,
-    /// What these are.
+    /// Kind of the interferers in `others`.
     pub others_are: Others,
-    /// The relays from Tx to Rx: place along x and altitude, both in metres. One that is not finite is left out.
+    /// Relays from Tx to Rx: x and altitude, m; non-finite positions are omitted.
     pub nodes: Vec<(f64, f64)>,
-    /// Where relays may stand beside the line: the chain is drawn from above, too.
+    /// Room beside the line; adds a top view.
     pub room: Option<Room>,
-    /// Linear SIR of every hop, one more than there are relays in the chain, above 0; any other value is drawn grey and without a number.
+    /// Linear SIR of every hop from Tx to Rx; values that are not finite and positive are drawn grey.
     pub hop_sir: Vec<f64>,
-    /// The relays that went silent, each 1 to N: they are crossed out, and their hops are dashed.
+    /// Silent relays, each 1 to N: crossed out, with dashed hops.
     pub lost: Vec<usize>,
-    /// The relays that are not in the chain any more, each 1 to N: they are crossed out, and the hops pass them by.
+    /// Relays outside the chain, each 1 to N: crossed out, without hops.
     pub left_out: Vec<usize>,
-    /// What happened to the chain: when, s, and in a few words. In order.
+    /// Events in order: time, s, and a short description.
     pub events: Vec<(f64, String)>,
 }
 
-/// Interferers that are not there.
+/// Kind of interferers that are not actually present.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Others {
-    /// Those of the mission that was flown before.
+    /// Interferers of the previous mission.
     #[default]
     Before,
-    /// The one that the relays believe in.
+    /// Interferer estimated by the relays.
     Believed,
 }
 
 impl Others {
-    /// What stands beside the marker.
+    /// Returns the label of the marker.
     pub(super) const fn word(self) -> &'static str {
         match self {
             Self::Before => "before",
@@ -61,7 +61,7 @@ impl Others {
         }
     }
 
-    /// What the marker says of itself.
+    /// Returns the tooltip of the marker.
     pub(super) const fn tip(self) -> &'static str {
         match self {
             Self::Before => "interferer of the mission before",
@@ -70,26 +70,27 @@ impl Others {
     }
 }
 
-/// The room beside the line, and who stands where in it; y is to the right of x as seen from above, in metres.
+/// Permitted range beside the line, and the relays' y, m, positive to the right of x in the top view.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Room {
-    /// Its left edge, 0 or less.
+    /// Left edge, m, 0 or less.
     pub least_m: f64,
-    /// Its right edge, 0 or more.
+    /// Right edge, m, 0 or more.
     pub most_m: f64,
-    /// y of each relay, from Tx to Rx.
+    /// Lateral offset y of each relay, from Tx to Rx, m.
     pub y_m: Vec<f64>,
 }
 
 impl Room {
-    /// Returns true if relays are to stay on the line: then the view from above is there for the interferers.
+    /// Returns true if relays must stay on the line; the top view then only shows the interferers.
     pub(super) const fn is_line(&self) -> bool {
         self.least_m == 0.0 && self.most_m == 0.0
     }
 }
 
-/// Returns the room beside the line in `mission`, with relays at these y, m. `None` where there is none and no interferer is beside the line
-/// either: from the side each would seem to be below the chain.
+/// Returns the room beside the line in `mission` with relays at `y_m`.
+///
+/// `None` if there is none and no near interferer is beside the line: then a top view would add nothing.
 pub fn room(
     mission: &Mission,
     y_m: impl IntoIterator<Item = f64>,
@@ -106,7 +107,7 @@ pub fn room(
     })
 }
 
-/// Where the legend ends.
+/// Returns the bottom of the legend.
 pub(super) fn bottom(picture: &Picture) -> f64 {
     if picture.room.is_some() {
         HEIGHT + ABOVE
@@ -115,7 +116,7 @@ pub(super) fn bottom(picture: &Picture) -> f64 {
     }
 }
 
-/// The distance from Tx to Rx, or 1 m where it makes no sense: a picture has to have a width.
+/// Returns the distance from Tx to Rx; 1 m if it is not finite and positive, to keep a width.
 pub(super) fn length(picture: &Picture) -> f64 {
     let distance = picture.distance_m;
     if distance.is_finite() && distance > 0.0 {
@@ -125,7 +126,7 @@ pub(super) fn length(picture: &Picture) -> f64 {
     }
 }
 
-/// The relays that have a place, each with its number.
+/// Returns the relays that have a position, with their numbers.
 pub(super) fn placed(picture: &Picture) -> impl Iterator<Item = (usize, (f64, f64))> {
     let nodes = picture.nodes.iter().copied();
     (1..)
@@ -133,12 +134,11 @@ pub(super) fn placed(picture: &Picture) -> impl Iterator<Item = (usize, (f64, f6
         .filter(|(_, (x, h))| x.is_finite() && h.is_finite())
 }
 
-/// An SIR in dB, if it is one that has a logarithm.
+/// Converts an SIR to dB; `None` unless it is finite and positive.
 pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
-/// The SIR of the chain's worst hop, linear.
 pub(super) fn worst(picture: &Picture) -> Option<f64> {
     let sirs = picture
         .hop_sir
@@ -148,12 +148,12 @@ pub(super) fn worst(picture: &Picture) -> Option<f64> {
     sirs.reduce(f64::min)
 }
 
-/// Whether a relay is crossed out.
+/// Returns true if the relay is silent or outside the chain.
 pub(super) fn is_gone(picture: &Picture, number: usize) -> bool {
     picture.lost.contains(&number) || picture.left_out.contains(&number)
 }
 
-/// Returns true if the x axis is stretched to hold an interferer: it is no more than a fifth of the distance off the chain.
+/// Returns true if `x` is at most a fifth of the distance beyond the chain; the x axis then includes it.
 pub(super) fn near(x: f64, distance: f64) -> bool {
     x >= -0.2 * distance && x <= 1.2 * distance
 }

@@ -1,24 +1,24 @@
-//! The interferers: on the ground when they are abreast of the chain or nearly so, else arrows toward them.
+//! Interferers: markers on the ground if they are beside the chain, else arrows toward them.
 
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
 use super::picture::{LEFT, Others, Picture, RIGHT, TOP, length, near};
 
-/// Height of the words, and from one line of them to the next.
+/// Font size and line spacing of the labels.
 const SIZE: f64 = 10.0;
 const LINE: f64 = 12.0;
 
-/// More markers than this on the ground are told of together: so many words would fill the plot.
+/// Largest number of markers with individual labels; more get a common one.
 const CROWD: usize = 8;
 
-/// Lines that far interferers may fill above the chain.
+/// Largest number of lines about far interferers.
 const FAR_LINES: usize = 4;
 
-/// Power in watts, x and y in metres.
+/// Power, W, with x and y, m.
 type Source = (f64, f64, f64);
 
-/// The interferers that the plot of a chain of this length holds, and those beyond it.
+/// Splits the interferers into those within the plot's range and those beyond it.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
     all.iter()
@@ -27,13 +27,13 @@ fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
         .partition(|(_, x, _)| near(*x, distance))
 }
 
-/// Height kept free above the chain for the words about far interferers.
+/// Returns the height above the chain reserved for text about far interferers.
 pub(super) fn headroom(picture: &Picture) -> f64 {
     let (_, far) = sorted(&picture.interferers, length(picture));
     far.len().min(FAR_LINES) as f64 * LINE
 }
 
-/// Draws the markers, and the arrows with their words.
+/// Draws the markers of near interferers, and arrows with text for far ones.
 pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (inside, far) = sorted(&picture.interferers, length(picture));
     beyond(canvas, labels, &far);
@@ -46,17 +46,15 @@ pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pict
     }
 }
 
-/// The corners of a marker.
 fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
 }
 
-/// Power and place in words.
 fn whole((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
-/// Where the plot holds interferers that are not there; those of the mission before as far as no marker of the present one covers them.
+/// Returns the former or estimated interferers to draw, with coordinates; present markers hide former ones.
 fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));
@@ -70,7 +68,6 @@ fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     .collect()
 }
 
-/// Draws the markers of interferers that are not there.
 pub(super) fn others(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let ground = frame.h.at(0.0);
     for (at, source) in gone(picture, frame) {
@@ -80,7 +77,6 @@ pub(super) fn others(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pi
     }
 }
 
-/// Says what they are, where there is room.
 pub(super) fn label_others(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -97,7 +93,7 @@ pub(super) fn label_others(
     }
 }
 
-/// Writes what is known of the interferers on the ground, once everything else there has its place.
+/// Labels the interferers on the ground, after everything else there.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (mut inside, _) = sorted(&picture.interferers, length(picture));
     let ground = frame.h.at(0.0);
@@ -136,7 +132,7 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
             .map(|line| width(line, SIZE))
             .fold(0.0, f64::max)
             + 4.0;
-        // A neighbour on one side only: lean away from it.
+        // With a neighbour on one side only, shift the label to the other side.
         let crowded = |side: f64| {
             xs.iter()
                 .any(|other| (0.1..wide).contains(&(side * (other - at))))
@@ -152,10 +148,10 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
     }
 }
 
-/// Interferers as they are seen from above: the place of each, and what is to be said of it.
+/// Markers in the top view: position, label and style.
 pub(super) type Seen = Vec<(Point, String, &'static str)>;
 
-/// Draws the markers at their places; those farther aside than the plot, or along x, at its edge.
+/// Draws the markers of the top view; those outside the range are at the plot's edge.
 pub(super) fn from_above(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -187,7 +183,7 @@ pub(super) fn from_above(
     seen
 }
 
-/// Says what they are, as far as there is room.
+/// Labels the markers of the top view where there is room.
 pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &Seen) {
     for ((x, y), words, class) in seen {
         let wide = width(words, SIZE) + 4.0;
@@ -205,7 +201,7 @@ pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &
     }
 }
 
-/// Two lines above a marker, as low as there is room, tied to it when they are not next to it.
+/// Writes two lines above a marker, as low as possible, with a connecting line if they are apart.
 fn words(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -250,7 +246,7 @@ fn words(
     }
 }
 
-/// One line each at the top of the plot, with an arrow to the side where the interferer is.
+/// Writes a line for each far interferer at the top of the plot, with an arrow toward it.
 fn beyond(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
     let shown = if far.len() > FAR_LINES {
         FAR_LINES - 1
@@ -289,7 +285,7 @@ fn beyond(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
     }
 }
 
-/// A quantity to four digits or so, without needless zeros.
+/// Formats a quantity with about four digits and without trailing zeros.
 fn plain(value: f64) -> String {
     let size = value.abs();
     if size > 0.0 && !(1e-2..1e6).contains(&size) {

@@ -1,4 +1,4 @@
-//! At the least data rate that is allowed relays in one range agree and hold what they agreed on.
+//! Agreement and availability at the lowest permitted data rate.
 
 use uav_relay_sim::simulator::many::run_seeds;
 use uav_relay_sim::simulator::medium::Access;
@@ -6,7 +6,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Relays with tags that all hear each other, by carrier sense at the least data rate, over ten minutes.
+/// Ten-minute soak of signed relays, all in one range, with CSMA at the lowest permitted data rate.
 fn at_least_baud(relays: u16, loss: f64) -> Setup {
     let mut setup = Setup::on_air(close(relays), Access::Csma);
     setup.auth = true;
@@ -62,7 +62,7 @@ fn fifty_agree_and_hold_even_where_30_percent_are_lost() {
     agree_and_hold(50, 0.3, 4);
 }
 
-/// They agree, and ask each other so often afterwards that the channel is full: this does not hold yet.
+/// Known failure: after the agreement the relays' own requests fill the channel.
 #[test]
 #[ignore = "fails"]
 fn a_hundred_agree_and_hold_even_where_30_percent_are_lost() {

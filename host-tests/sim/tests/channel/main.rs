@@ -1,4 +1,4 @@
-//! What a channel that relays share can carry: how many relays agree on it and hold what they agreed on, and by how many messages.
+//! Capacity of a shared channel: how many relays agree and stay in agreement, and with how many messages.
 //!
 //! `-- --ignored --nocapture` prints the tables of long chains.
 #![allow(
@@ -15,7 +15,7 @@ use uav_relay::{Instant, Mission};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
 
-/// The paper's chain of so many relays, which may stand 0.1 m apart.
+/// Returns the paper's mission for `relays` relays with a minimum separation of 0.1 m.
 fn close(relays: u16) -> Mission {
     let scenario = Scenario {
         min_separation_m: 0.1,

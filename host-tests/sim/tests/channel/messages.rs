@@ -1,4 +1,4 @@
-//! How many messages it takes until a chain has agreed.
+//! Number of messages until a chain agrees.
 
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
@@ -9,14 +9,14 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Claims to its number that a relay sends until then, and as many echoes.
+/// Returns the largest number of index claims and echoes that a relay sends until `ended`.
 fn most_claims(ended: Instant) -> u64 {
     let ms = ended.as_micros() / 1_000;
     let first = (1..=6).filter(|k| 250 * ((1 << k) - 1) <= ms);
     2 * (first.count() as u64 + ms / 15_000)
 }
 
-/// Without faults one sweep goes to the end and back, whatever the length of the way.
+/// Checks that one sweep to the end and back suffices without faults, for any number of relays.
 #[test]
 fn without_faults_one_sweep_is_enough() {
     for relays in [2, 8, 50, 100, 200, 300, 600, 1_000] {
@@ -34,10 +34,10 @@ fn without_faults_one_sweep_is_enough() {
     }
 }
 
-/// How much faster than N log N the median of 25 relays may grow.
+/// Allowed growth of the medians relative to N log N, compared with 25 relays.
 const MOST: f64 = 1.5;
 
-/// 30 % lost, 15 % changed, 10 % twice, 10 % late: neither the time nor the messages grow faster than N log N.
+/// Checks growth like N log N with 30 % loss, 15 % corruption, 10 % duplicates and 10 % delays.
 #[test]
 fn on_a_bad_day_time_and_messages_grow_as_n_log_n() {
     println!("| N | links | settled | time, median | worst | messages, median | most |");

@@ -1,4 +1,4 @@
-//! How relays share the air, and what a soak says of a run.
+//! Options of the shared channel, and reports of soaks.
 
 use serde_json::Value;
 
@@ -91,7 +91,7 @@ fn losses_in_runs_have_the_mean_share_that_was_asked_for() {
     for burst in ["1", "20"] {
         let report = json(&[&soaked[..], &["--burst", burst]].concat());
         let lost = report["faults"]["lost"].as_f64().unwrap();
-        // The ideal channel: relays 1 to 8 have 4, 5, 6, 7, 7, 6, 5 and 4 others in range, and send much the same.
+        // On the ideal channel relays 1 to 8 have 4, 5, 6, 7, 7, 6, 5, 4 receivers and send about equally often.
         let received = report["messages"].as_f64().unwrap() * 5.5;
         assert!((lost / received - 0.3).abs() < 0.06, "{burst}: {report}");
     }

@@ -1,4 +1,4 @@
-//! `--capture`: all that is put on the air, with virtual times.
+//! Captures of all transmitted frames with virtual times (`--capture`).
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,7 +9,6 @@ use pcap_file::pcapng::{Block, PcapNgReader};
 
 use super::{chain, json, refusal};
 
-/// A frame of a capture.
 struct Frame {
     interface: String,
     at: Duration,
@@ -48,7 +47,7 @@ fn read(file: &Path) -> Vec<Frame> {
     frames
 }
 
-/// A run with `arguments` and a capture: its report and its frames.
+/// Runs with `arguments` and a capture. Returns the report and the frames.
 fn captured(arguments: &[&str]) -> (serde_json::Value, Vec<Frame>) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("air.pcapng");
@@ -103,7 +102,7 @@ fn a_capture_of_the_shared_channel_has_what_was_sent_and_the_attacker_too() {
     assert_eq!(with("the attacker's own"), 20);
     assert_eq!(with("the attacker's, sent again"), 10);
     let sent = usize::try_from(report["air"]["sent"].as_u64().unwrap()).unwrap();
-    // What is still being sent at the end is not on the air as a whole.
+    // Transmissions that are unfinished at the end are not captured.
     assert!((sent - 4..=sent).contains(&(frames.len() - 30)), "{sent}");
     let missed = |frame: &Frame| frame.comment.contains("did not hear it");
     assert!(frames.iter().any(missed));
@@ -148,7 +147,7 @@ fn a_capture_that_cannot_be_written_is_refused_before_the_run() {
     }
 }
 
-/// The capture in Wireshark, with the dissector of the repository. Without `tshark` this fails and says what to type.
+/// Decodes the capture in Wireshark with the repository's dissector. Fails without `tshark`, with installation instructions.
 #[test]
 fn tshark_names_every_frame_of_a_capture() {
     let folder = tempfile::tempdir().unwrap();
@@ -189,7 +188,7 @@ fn tshark_names_every_frame_of_a_capture() {
         let shown: Vec<&str> = shown.lines().map(str::trim).collect();
         assert!(shown.len() > 10 && shown.len() as u64 <= report["messages"].as_u64().unwrap());
         for line in &shown {
-            // A name, and nothing of a refusal after it.
+            // A message name without a rejection.
             assert!(
                 line.chars().all(char::is_alphabetic) && !line.is_empty(),
                 "{line}"

@@ -1,4 +1,4 @@
-//! The first command of a newcomer: cargo shows its progress, and builds nothing that `cargo chain` does not need.
+//! First use of the commands: cargo shows its progress, and `cargo chain` builds only what it needs.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,7 +10,7 @@ fn root() -> &'static Path {
         .unwrap()
 }
 
-/// A build without a line for a minute looks like a hang.
+/// A build without output for a minute looks like a hang.
 #[test]
 fn no_command_hides_cargos_progress() {
     let text = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();
@@ -28,7 +28,6 @@ fn no_command_hides_cargos_progress() {
     }
 }
 
-/// The crates that `cargo chain` compiles, each with its version.
 #[test]
 fn the_simulator_builds_without_the_crates_of_other_tools() {
     let output = Command::new(env!("CARGO"))

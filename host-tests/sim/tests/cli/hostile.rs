@@ -1,10 +1,9 @@
-//! Relays that go silent, parts that do not hear each other, attackers: what `cargo chain` says of them.
+//! Reports of failures, partitions and attacks.
 
 use serde_json::Value;
 
 use super::{chain, json};
 
-/// What the report of a chain that has lost relays has beside the contract.
 #[test]
 fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
     let folder = tempfile::tempdir().unwrap();
@@ -27,7 +26,7 @@ fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
     assert_eq!(indices(&report["lost"]), [4]);
     assert_eq!(report["lost"][0]["why"], "silent");
     assert!(report["lost"][0]["x_m"].as_f64().unwrap() > 0.0);
-    // What is left is a chain of seven, and as good as one from the start.
+    // The remaining chain equals a chain of seven relays from the start.
     let seven = json(&["--uavs", "7"]);
     for key in ["sir", "rx_sir", "target"] {
         assert_eq!(report[key], seven[key], "{key}");
@@ -40,7 +39,7 @@ fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
         .map(|key| one[key].as_f64().unwrap());
     assert_eq!(times[0], 20.0);
     assert!(
-        // The one side notices up to a pulse's period of 2.5 s after the other.
+        // The two sides notice the loss up to one lease renewal period (2.5 s) apart.
         times.is_sorted() && times[1] <= 35.0 && times[3] - times[1] < 3.5,
         "{times:?}"
     );
@@ -72,7 +71,7 @@ fn the_story_of_a_loss_is_told_in_a_line_for_each_thing_that_happened() {
         " s  relays 3 and 5 found each other",
         " s  formed anew: 7 relays, view ",
         " s  converged: 7 relays, SIR 2.312",
-        // The last sign of life came of a pulse, up to 5 s before; it is noticed by the first question after 15 s.
+        // The last frame of relay 4, a lease renewal, is up to 5 s old; the first probe after 15 s detects the loss.
         ", relay 4 lost: noticed after 1",
     ] {
         assert!(text.contains(line), "{line} in {text}");
@@ -107,7 +106,7 @@ fn of_two_parts_the_larger_goes_on_until_they_meet_again() {
     assert_eq!(healed["sir"], json(&[])["sir"]);
 }
 
-/// By the quorum rule one of two goes on only if it is the leader.
+/// Quorum of one: of two relays, only the leader may go on alone.
 #[test]
 fn too_few_hold_their_places_and_the_status_is_1() {
     let output = chain(&["--json", "--uavs", "2", "--kill", "1@20"]);
@@ -148,7 +147,7 @@ fn with_tags_an_attacker_changes_nothing() {
     }
 }
 
-/// Without tags frames of an attacker are taken, and the report does not hide what they do.
+/// Relays without tags accept an attacker's frames, and the report shows the consequences.
 #[test]
 fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     let attacked = [
@@ -161,7 +160,7 @@ fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
         "--no-auth",
         "--json",
     ];
-    // It may not even settle: then there is a report all the same, and the status says so.
+    // The chain may not settle; then the report has an error, and the exit status is 1.
     let output = chain(&attacked);
     assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -171,7 +170,7 @@ fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     for kind in ["forged", "replayed"] {
         assert!(attack[kind]["taken"].as_u64().unwrap() > 10, "{attack}");
     }
-    // But no offer of another mission is: for that it takes a tag.
+    // Forged offers of another mission are rejected: they need a tag.
     assert!(
         attack["forged"]["counted"]["unsigned"].as_u64().unwrap() > 0,
         "{attack}"

@@ -1,4 +1,4 @@
-//! What relays that listen are simulated with.
+//! Scenarios and reports of relays that measure the interference.
 
 use super::{chain, json, refusal};
 
@@ -28,7 +28,7 @@ fn what_is_heard_comes_from_an_interferer() {
     assert!(json(&options)["sir"].is_number());
 }
 
-/// A lost relay is no part of the chain: the SIR and the optimum are those of the relays that are left.
+/// The SIR and the optimum are those of the remaining relays.
 #[test]
 fn a_lost_relay_does_not_count() {
     let options = [
@@ -47,7 +47,7 @@ fn a_lost_relay_does_not_count() {
     assert!((true_sir / worst - 1.0).abs() < 0.01, "{report}");
     assert!(share > 0.99 && share < 1.01, "{report}");
     assert!((true_sir / of("optimum_sir") - share).abs() < 1e-6);
-    // The relays that are left have the optimum of five, and not of six.
+    // The optimum is that of five relays, not six.
     let five = json(&["--uavs", "5"]);
     let optimum = five["sir"].as_f64().unwrap();
     assert!((of("optimum_sir") / optimum - 1.0).abs() < 1e-3, "{report}");

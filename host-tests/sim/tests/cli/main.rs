@@ -1,4 +1,4 @@
-//! `cargo chain` as a person and a program meet it: its options, its JSON, its exit statuses.
+//! Command-line interface of `cargo chain`: options, JSON and exit statuses.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -40,7 +40,7 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The exit status and the one line on standard error.
+/// Returns the exit status and the single line on standard error.
 fn refusal(arguments: &[&str]) -> (i32, String) {
     let output = chain(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
@@ -107,7 +107,7 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
     assert_eq!(table.lines().count(), 1 + 8 + 1 + 2, "{table}");
 }
 
-/// Where there is room beside the line the table says y, and `altitude` is another name for `joint`.
+/// Checks the y column of the table, and `altitude` as an alias of `joint`.
 #[test]
 fn the_table_has_y_where_there_is_room_beside_the_line() {
     let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
@@ -202,14 +202,10 @@ fn wrong_options_are_named_with_their_value_and_range() {
     }
 }
 
-/// A scenario of the repository.
 fn example(name: &str) -> String {
     format!("{}/../../examples/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// What is asked of `joint` and `adjust`, through the tool itself.
-/// A step that is larger than the best there is steps over it, which is no proof that there is nothing.
-/// With one interferer `adjust` and `joint` draw the chain they choose; a field is drawn without an interferer.
 #[test]
 fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     let folder = tempfile::tempdir().unwrap();
@@ -225,7 +221,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     );
     assert_eq!(report["best_sir"].as_f64(), Some(0.0));
 
-    // Without a scenario the option is what is wrong, and the JSON says so all the same.
+    // Without a scenario the option is wrong; the JSON has the same message.
     let output = chain(&["--json", "--uavs", "1000"]);
     assert_eq!(output.status.code(), Some(2));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -250,7 +246,7 @@ fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
     );
     let silences = report["silences"].as_array().unwrap();
     assert_eq!(silences.len(), 2);
-    // By the first question after 15 s: they are at most 10 s / 16 apart, and an eighth more.
+    // Detected by the first probe after 15 s; probes are at most 10 s / 16 apart, plus an eighth.
     let latest_s = 15.0 + 10.0 / 16.0 * 1.125;
     assert!(
         silences
@@ -260,7 +256,6 @@ fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
     );
 }
 
-/// One interferer stands for several; what that does to the places is the planner's to say.
 #[test]
 fn a_relay_that_is_described_and_not_there_is_refused() {
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenario.toml");

@@ -1,11 +1,11 @@
-//! Missions that are uploaded in flight: what `cargo chain` makes of the options, and what it says of the runs.
+//! Options and reports of missions that are uploaded in flight.
 
 use roxmltree::Document;
 use serde_json::Value;
 
 use super::{chain, example, json, refusal};
 
-/// The default scenario with the interferer at x = 800 m, y = -300 m, as a chain takes off with it.
+/// Runs the default scenario with the interferer at x = 800 m, y = -300 m from the start.
 fn from_the_start(folder: &tempfile::TempDir, more: &[&str]) -> Value {
     let file = folder.path().join("moved.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 800\ny_m = -300\n";
@@ -33,7 +33,7 @@ fn whats(report: &Value, what: &str) -> usize {
     moments.filter(|moment| moment["what"] == what).count()
 }
 
-/// By wires and by radio, from either end, over good links and bad ones.
+/// Covers wires and radio, both ends, and good and bad links.
 #[test]
 fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -118,7 +118,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
     }
 }
 
-/// Versions are numbered by time, not by the order of the options, and the last one is flown.
+/// Versions are numbered by time, not by the order of the options.
 #[test]
 fn of_two_uploads_the_later_one_is_flown() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ fn of_two_uploads_the_later_one_is_flown() {
     assert_eq!(versions, [1, 2]);
 }
 
-/// Every parameter that can be changed: to what a scenario file with it says.
+/// An upload of every parameter gives the result of a scenario file with the same values.
 #[test]
 fn every_key_is_that_of_a_scenario_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -156,12 +156,12 @@ fn every_key_is_that_of_a_scenario_file() {
     let upload = "5:distance_m=900,altitude_m=60,altitude_min_m=40,altitude_max_m=120,lateral_min_m=-30,lateral_max_m=40,min_separation_m=5,tx_w=70,uav_w=2,power_w=60,x_m=300,y_m=200,tolerance=0.01";
     let report = json(&[&["--upload", upload], &shared[..]].concat());
     assert_eq!(places(&report), places(&expected));
-    // A band of one altitude goes with it.
+    // A band of a single altitude follows the common altitude.
     let report = json(&["--upload", "5:altitude_m=60"]);
     assert_eq!(report["relays"][0]["h_m"].as_f64(), Some(60.0));
 }
 
-/// A relay that is switched on again flies what was uploaded, whether it has stored that or learns it from its neighbours.
+/// A rebooted relay flies the uploaded mission, from its own storage or from its neighbours.
 #[test]
 fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     let folder = tempfile::tempdir().unwrap();
@@ -183,7 +183,7 @@ fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     }
 }
 
-/// A relay is lost before, while and after a mission is uploaded.
+/// A relay is lost before, during and after an upload.
 #[test]
 fn the_relays_that_are_left_fly_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -366,7 +366,7 @@ fn wrong_uploads_are_named_with_what_is_allowed() {
     }
 }
 
-/// Drones that hover where they are to be, along the line that there is then.
+/// The drones hover at their positions along the new line.
 #[test]
 fn drones_fly_to_a_receiver_that_moves() {
     let site = example("site.toml");
@@ -385,7 +385,7 @@ fn drones_fly_to_a_receiver_that_moves() {
         assert!(drone["flown"].as_bool().unwrap(), "{drone}");
         assert!(drone["off_m"].as_f64().unwrap() < 1.0, "{drone}");
     }
-    // As a chain that takes off with the distance of the new sites.
+    // The positions equal those of a chain that starts with the distance of the new sites.
     let longer = json(&[
         "--uavs",
         "4",

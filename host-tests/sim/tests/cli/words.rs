@@ -1,11 +1,10 @@
-//! The words of `cargo chain` for wrong options: one line on standard error that says what is wrong and what is right, and status 2.
+//! Error messages for invalid options: one line that names the allowed values, and exit status 2.
 
 use std::io::Read as _;
 use std::process::{Command, Stdio};
 
 use super::{example, json, refusal};
 
-/// All of these are refused by exactly this line.
 #[test]
 fn what_is_wrong_is_named_with_what_is_allowed() {
     let whole = |option: &str, value: &str, range: &str| {
@@ -56,7 +55,6 @@ fn what_is_wrong_is_named_with_what_is_allowed() {
     }
 }
 
-/// Nothing is ignored without a word: what an option needs is named.
 #[test]
 fn an_option_that_would_be_ignored_is_refused() {
     let field = example("field.toml");
@@ -147,7 +145,7 @@ fn an_option_that_would_be_ignored_is_refused() {
     );
 }
 
-/// The same options where they are of use.
+/// Checks the same options where they have an effect.
 #[test]
 fn an_option_that_is_of_use_is_taken() {
     for arguments in [
@@ -164,7 +162,7 @@ fn an_option_that_is_of_use_is_taken() {
     }
 }
 
-/// A refusal names a key of a scenario to who has one.
+/// Errors name keys of a scenario only if the user gave one.
 #[test]
 fn who_has_a_scenario_is_told_its_keys() {
     let output = super::chain(&["--scenario", &example("scenario.toml"), "--uavs", "999"]);
@@ -175,7 +173,7 @@ fn who_has_a_scenario_is_told_its_keys() {
     assert_eq!(most["uavs"], 250);
 }
 
-/// A mission that was adopted is not said to be not adopted, whatever came after it.
+/// A mission that was adopted is never reported as not adopted.
 #[test]
 fn what_was_adopted_is_not_denied() {
     for (arguments, is_denied) in [
@@ -196,7 +194,7 @@ fn what_was_adopted_is_not_denied() {
     }
 }
 
-/// A reader that has gone is no panic, whose status would be 101.
+/// A closed output pipe causes no panic (exit status 101).
 #[test]
 fn whoever_does_not_listen_changes_no_status() {
     let several = example("several.toml");
@@ -207,7 +205,7 @@ fn whoever_does_not_listen_changes_no_status() {
         (&["--uavs", "0"], 2),
         (&["--epsilon", "1"], 2),
         (&["--uavs", "2", "--kill", "1@20"], 1),
-        // With notes on standard error.
+        // This scenario prints notes on standard error.
         (&["--uavs", "3", "--scenario", &several], 0),
     ] {
         for closed in [[true, false], [false, true], [true, true]] {

@@ -1,15 +1,14 @@
-//! How long it takes until a chain flies without a relay that has died.
+//! Recovery time after the death of a relay.
 
 use super::*;
 
-/// Relay 4 of eight dies then.
+/// Time at which relay 4 of eight dies, s.
 const DIES_S: u64 = 20;
 
-/// How long it was not right from then on, s: what the death has cost, and anything else. `None` where it does not hold the places of those
-/// that are left in the end.
+/// Returns the time without a correct chain after the death, s; `None` unless the remaining relays hold their positions.
 fn recovery(outcome: &Outcome) -> Option<f64> {
     let left = || outcome.relays.iter().filter(|relay| relay.killed.is_none());
-    // They may be forming anew, with the same relays, when the run ends.
+    // The remaining relays may be forming another view when the run ends.
     let same = left().all(|relay| relay.relays == 7);
     let watched = outcome.watched?;
     let first = seconds(watched.first_agreement?);
@@ -17,7 +16,7 @@ fn recovery(outcome: &Outcome) -> Option<f64> {
     same.then_some(wrong + (first - DIES_S as f64).max(0.0))
 }
 
-/// The loss, in how many of the seeds it was not got over, the median and the worst of the others, s.
+/// Returns the loss, the number of seeds without recovery, and the median and worst recovery times, s.
 fn losing(loss: f64, seeds: u64) -> (f64, usize, f64, f64) {
     let setups: Vec<Setup> = (1..=seeds)
         .map(|seed| {
@@ -45,7 +44,7 @@ fn without_losses_a_death_is_got_over_within_a_minute() {
     assert!(worst < 60.0, "{worst}");
 }
 
-/// Some seeds are not got over yet: they are printed.
+/// Prints the seeds that do not recover.
 #[test]
 #[ignore = "prints a table"]
 fn deaths_on_bad_channels() {

@@ -1,11 +1,11 @@
-//! Two cuts that heal, one after the other or both at once: all come back into one chain.
+//! Two partitions that heal, together or one after the other: all relays return to one chain.
 
 use uav_relay_sim::simulator::outcome::Turning;
 use uav_relay_sim::simulator::setup::Partition;
 
 use super::*;
 
-/// After the last healing all are in one view within so long, s.
+/// Time limit from the last healing to a common view, s.
 const MOST_S: f64 = 120.0;
 
 fn cut(after: u16, from: u64, until: u64) -> Partition {
@@ -16,7 +16,7 @@ fn cut(after: u16, from: u64, until: u64) -> Partition {
     }
 }
 
-/// All pairs of different places of eight relays, both cuts at once and the second one later.
+/// Returns all pairs of different partitions of eight relays, simultaneous and staggered.
 fn cases() -> Vec<Setup> {
     let mut all = Vec::new();
     for one in 1..8 {
@@ -31,7 +31,7 @@ fn cases() -> Vec<Setup> {
     all
 }
 
-/// When after `healed` all eight were in one view first, if they ever are.
+/// Returns the first time after `healed` at which all eight relays are in one view.
 fn joined(outcome: &Outcome, healed: Instant) -> Option<Instant> {
     let mut views = [(0, 8); 8];
     for moment in &outcome.moments {

@@ -1,7 +1,7 @@
-//! What may happen to a chain on the air, at random and one after the other: links cut, links that hear one way only, losses, relays that die.
+//! Faults on the air, one by one and at random: partitions, one-way links, losses, deaths.
 //!
-//! `COUNT` and `SEED` in the environment take so many, and other, random runs. With `-- --ignored --nocapture` the tables of long
-//! runs are printed.
+//! `COUNT` and `SEED` in the environment set the number and the first seed of random runs. `-- --ignored --nocapture` prints the
+//! tables of long runs.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -27,14 +27,13 @@ use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// The chain of `cargo chain --uavs N`.
+/// Returns the mission of `cargo chain --uavs N`.
 fn paper(relays: u16) -> Mission {
     mission::mission(&Scenario::default(), relays, 1e-4)
         .unwrap()
         .0
 }
 
-/// So many relays by CSMA.
 fn by_radio(relays: u16, baud: u32) -> Setup {
     let mut setup = Setup::on_air(paper(relays), Access::Csma);
     setup.link.baud = baud;
@@ -49,12 +48,12 @@ fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }
 
-/// A number of the environment, or the usual one.
+/// Returns a number from the environment, or the default.
 fn number(name: &str, usual: u64) -> u64 {
     env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Runs all of `setups` on all cores; what `of` makes of each outcome, in order.
+/// Runs all `setups` on all cores. Returns the results of `of` in order.
 fn run_all<T: Send>(setups: &[Setup], of: impl Fn(&Setup, Outcome) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let work = || {
@@ -76,7 +75,6 @@ fn run_all<T: Send>(setups: &[Setup], of: impl Fn(&Setup, Outcome) -> T + Sync) 
     all.into_iter().map(|(_, one)| one).collect()
 }
 
-/// The one in the middle and the worst.
 fn median_and_worst(mut all: Vec<f64>) -> (f64, f64) {
     all.sort_by(f64::total_cmp);
     let middle = all.get(all.len() / 2).copied();

@@ -1,4 +1,4 @@
-//! Links between neighbours that hear one way only.
+//! One-way links between neighbours.
 
 use uav_relay::Phase;
 use uav_relay_sim::simulator::deaf::Deaf;
@@ -7,11 +7,11 @@ use uav_relay_sim::simulator::outcome::Turning;
 
 use super::*;
 
-/// Runs go on so long, s, and nothing changes in the last of it.
+/// Duration of a run, and of the stable period at its end, s.
 const ALL_S: u64 = 400;
 const STILL_S: u64 = 120;
 
-/// Four and eight relays, every pair of neighbours, either direction, with tags and without, from the start and from 20 s on.
+/// Returns all one-way links in chains of 4 and 8 relays, with and without tags, from 0 s and from 20 s.
 fn cases(seed: u64) -> Vec<Setup> {
     let mut all = Vec::new();
     for relays in [4, 8] {
@@ -33,7 +33,7 @@ fn cases(seed: u64) -> Vec<Setup> {
     all
 }
 
-/// What is wrong with how a run ended, if anything is.
+/// Describes the error in the final state, if any.
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.seen).collect();
     let agreements = groups(&seen);

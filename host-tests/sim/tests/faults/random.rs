@@ -1,4 +1,4 @@
-//! At random: whatever happens, no two groups fly agreements of their own.
+//! Random sequences of faults: never more than one group holds an agreement.
 
 use std::fmt::Write as _;
 
@@ -11,17 +11,17 @@ use uav_relay_sim::simulator::setup::Partition;
 
 use super::*;
 
-/// So long something may happen, s.
+/// Period in which faults begin, s.
 const EVENTS_S: u64 = 240;
 
-/// So long a run goes on, s.
+/// Duration of a run, s.
 const ALL_S: u64 = 360;
 
 fn during(rng: &mut ChaCha8Rng) -> Instant {
     Instant::from_millis(rng.random_range(0..1_000 * EVENTS_S))
 }
 
-/// For some seconds, up to two minutes, or for good.
+/// Draws a period of up to 10 s, of 5 s to 2 min, or without an end.
 fn spell(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     let from = during(rng);
     let span = match rng.random_range(0..4) {
@@ -32,7 +32,7 @@ fn spell(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     (from, span.map(|span| from + Duration::from_millis(span)))
 }
 
-/// Three to ten relays, some cuts, one-way links, losses, deaths and reboots.
+/// Draws three to ten relays with partitions, one-way links, losses, deaths and reboots.
 fn sequence(seed: u64) -> Setup {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let relays = rng.random_range(3..=10);
@@ -66,7 +66,7 @@ fn sequence(seed: u64) -> Setup {
             });
         }
     }
-    // Of its own, so that a sequence without them is what it is.
+    // Separate generator, so that the reboots do not change the other draws.
     let mut boots = ChaCha8Rng::seed_from_u64(seed);
     boots.set_stream(1);
     let mut alive: Vec<u16> = (1..=relays).collect();
@@ -82,7 +82,7 @@ fn sequence(seed: u64) -> Setup {
     setup.soaked(at(ALL_S))
 }
 
-/// The same run at the command line.
+/// Returns the equivalent command line.
 fn command(setup: &Setup) -> String {
     let until =
         |until: Option<Instant>| until.map_or(String::new(), |at| format!("-{}", seconds(at)));
@@ -125,7 +125,6 @@ fn command(setup: &Setup) -> String {
     line
 }
 
-/// Runs `count` sequences from `first` on, and says which have two groups that fly at once.
 fn fly(first: u64, count: u64) {
     judge(&(first..first + count).map(sequence).collect::<Vec<_>>());
 }
@@ -159,7 +158,7 @@ fn whatever_happens_one_group_flies_at_most() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
-/// A view that only the last relay had accepted was followed by one without those that had voted for it, and held their lease.
+/// Regression test: a view accepted only by the last relay was followed by one without its leased voters.
 #[test]
 fn what_was_decided_and_not_heard_of_ends_no_lease() {
     let mut sequence = sequence(6_450);

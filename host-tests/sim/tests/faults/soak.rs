@@ -1,10 +1,10 @@
-//! How much of the time a chain is right on a channel that loses much.
+//! Availability of a chain on channels with high loss.
 
 use uav_relay_sim::simulator::many::run_seeds;
 
 use super::*;
 
-/// Eight relays with tags by CSMA at 57 600 baud.
+/// Returns a setup of eight signed relays with CSMA at 57 600 baud.
 fn losing(loss: f64, burst: f64) -> Setup {
     let mut setup = by_radio(8, 57_600);
     setup.auth = true;
@@ -13,7 +13,7 @@ fn losing(loss: f64, burst: f64) -> Setup {
     setup
 }
 
-/// The loss, the mean length of a run of them (1 where they are independent), and the least availability that is asked for.
+/// Loss, mean burst length (1 for independent losses), and required availability.
 const ASKED: [(f64, f64, f64); 4] = [
     (0.5, 1.0, 0.999),
     (0.7, 1.0, 0.97),
@@ -21,7 +21,7 @@ const ASKED: [(f64, f64, f64); 4] = [
     (0.5, 20.0, 0.85),
 ];
 
-/// What a number of seeds came to: every availability, and every first agreement, s.
+/// Results of several seeds: availabilities and times of the first agreement, s.
 struct Soaked {
     shares: Vec<(u64, f64)>,
     firsts: Vec<f64>,

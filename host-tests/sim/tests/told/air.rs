@@ -1,4 +1,4 @@
-//! Relays on one channel, frame by frame: what the simulator has no scenario for.
+//! Frame-level simulation of relays on one channel, for cases that the simulator does not cover.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,7 +9,7 @@ use uav_relay::{
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission::mission as of_scenario;
 
-/// How long a frame takes.
+/// Time step and duration of a frame, ms.
 const STEP_MS: u64 = 10;
 
 pub(crate) const KEY: [u8; 32] = [7; 32];
@@ -21,18 +21,18 @@ pub(crate) fn auth(key: [u8; 32], epoch: u32) -> Option<Auth> {
 
 pub(crate) struct Air {
     pub(crate) relays: Vec<Relay>,
-    /// Those that are switched off.
+    /// True for relays that are switched off.
     pub(crate) off: Vec<bool>,
     pub(crate) ground: Option<Ground>,
-    /// Share of frames that each hearer loses.
+    /// Share of frames that each receiver loses.
     pub(crate) loss: f64,
     pub(crate) now: Instant,
-    /// What was told, and by which relay, counted from 0.
+    /// Events, with the index (from 0) of the relay that raised them.
     pub(crate) told: Vec<(usize, Event)>,
-    /// Frames of the ground, and whether they get through.
+    /// Withheld frames of the ground; `withheld` selects them.
     pub(crate) recorded: Vec<Vec<u8>>,
     pub(crate) withheld: fn(&[u8]) -> bool,
-    /// On their way: by which sender, the ground as the last.
+    /// Frames on the air with the sender's index, `usize::MAX` for other senders.
     flying: Vec<(usize, Vec<u8>)>,
     rng: ChaCha8Rng,
 }
@@ -53,7 +53,7 @@ impl Air {
         }
     }
 
-    /// A chain of `mission`, with keys and epochs as `auth` has them by index from 1.
+    /// Returns a chain with keys and epochs from `auth`, by index from 1.
     pub(crate) fn of(mission: &Mission, auth: impl Fn(u16) -> Option<Auth>, loss: f64) -> Self {
         let relays = (1..=mission.relays())
             .map(|index| relay(mission, index, auth(index), Instant::ZERO))
@@ -61,7 +61,6 @@ impl Air {
         Self::new(relays, loss, 1)
     }
 
-    /// Another relay is on the air.
     pub(crate) fn join(&mut self, relay: Relay) -> usize {
         self.relays.push(relay);
         self.off.push(false);
@@ -122,12 +121,12 @@ impl Air {
         }
     }
 
-    /// Somebody sends `bytes`.
+    /// Sends `bytes` as an unknown sender.
     pub(crate) fn play(&mut self, bytes: &[u8]) {
         self.flying.push((usize::MAX, bytes.to_vec()));
     }
 
-    /// Who was told `event`, and how often.
+    /// Returns the relay index of each occurrence of `event`.
     pub(crate) fn told(&self, event: Event) -> Vec<usize> {
         let told = self.told.iter().filter(|(_, told)| *told == event);
         told.map(|(by, _)| *by).collect()
@@ -148,7 +147,6 @@ pub(crate) fn relay(mission: &Mission, index: u16, auth: Option<Auth>, now: Inst
     Relay::new(*mission, identity, settings(auth), seed, now).unwrap()
 }
 
-/// The paper's chain of `relays`.
 pub(crate) fn mission(relays: u16) -> Mission {
     of_scenario(&Scenario::default(), relays, 1e-4).unwrap().0
 }

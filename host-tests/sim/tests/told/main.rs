@@ -1,4 +1,4 @@
-//! What an operator is told: the node and the cause.
+//! Events for the operator name the node and the cause.
 
 #![allow(
     clippy::unwrap_used,
@@ -32,7 +32,7 @@ fn of(outcome: &Outcome, what: fn(Turning) -> bool) -> Vec<(u16, Option<u16>)> {
         .collect()
 }
 
-/// A dead drone is lost, and whoever is found in its place bears its own number.
+/// A dead relay is reported by its number; its replacement is reported by its own.
 #[test]
 fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
@@ -52,7 +52,7 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     );
 }
 
-/// Relay 3 does not hear relay 2: that one hears it, and has to be told why the two are no neighbours.
+/// Relay 3 does not receive relay 2; relay 2 receives relay 3 and must be told why they are no neighbours.
 #[test]
 fn a_relay_that_is_not_heard_is_told_by_whom() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
@@ -69,7 +69,7 @@ fn a_relay_that_is_not_heard_is_told_by_whom() {
     );
 }
 
-/// No frame that is lost on the way is taken for a deaf node, a false key or an old epoch.
+/// Lost and corrupted frames never cause reports of deaf nodes, wrong keys or old epochs.
 #[test]
 fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
     for seed in 1..=3 {
@@ -93,7 +93,7 @@ fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
     }
 }
 
-/// Two of five are too few. They go on asking, and are told once.
+/// Two of five relays have no quorum. They keep requesting a view but report this once.
 #[test]
 fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));

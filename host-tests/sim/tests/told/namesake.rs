@@ -1,4 +1,4 @@
-//! A number that is used twice.
+//! Duplicate relay numbers.
 
 use crate::air::mission;
 use uav_relay::{Event, Relay};
@@ -7,13 +7,13 @@ use crate::air::{Air, KEY, auth, relay};
 
 const TAKEN: Event = Event::IndexTaken { node: 3 };
 
-/// A chain of five flies; another relay 3 is switched on.
+/// Returns a flying chain of five with a second relay 3 that has just been switched on, and its index.
 fn joined(loss: f64, seed: u64) -> (Air, usize) {
     let mission = mission(5);
     let begun = uav_relay::Instant::ZERO;
     let relays = (1..=5).map(|index| relay(&mission, index, None, begun));
     let mut air = Air::new(relays.collect(), loss, seed);
-    // The other one comes at any time between two passes.
+    // The second relay appears at a varying time between two passes.
     air.run(90 + seed % 7);
     assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
     assert!(air.told(TAKEN).is_empty());
@@ -25,7 +25,7 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// `COUNT` chains at each share of lost frames.
+/// Runs `COUNT` chains for each loss rate.
 #[test]
 fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() {
     for loss in [0.0, 0.3, 0.5] {
@@ -70,7 +70,7 @@ fn the_later_one_takes_part_once_the_other_is_gone() {
     }
 }
 
-/// Switched on at once: at no time do both have a set-point for long, and in the end one flies and the other is silent.
+/// Two relays with the same number start together: in the end one flies and the other is passive.
 #[test]
 fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
     for seed in 0..6 {
@@ -93,7 +93,7 @@ fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
     }
 }
 
-/// With a key the neighbours believe the one with the larger epoch; the other one becomes passive and reports it.
+/// Signed duplicates: the larger epoch wins; the other relay becomes passive and reports the duplicate.
 #[test]
 fn with_a_key_the_one_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
@@ -114,7 +114,7 @@ fn with_a_key_the_one_with_the_larger_epoch_stays() {
     }
 }
 
-/// Who lacks the key can have it told, and nothing more: nobody stands down.
+/// An attacker without the key can cause a report, but no relay becomes passive.
 #[test]
 fn forged_frames_have_nobody_stand_down() {
     let mission = mission(3);

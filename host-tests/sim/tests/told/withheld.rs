@@ -1,4 +1,4 @@
-//! An offer that was withheld in a live session and is played later.
+//! Offers that are withheld in a live session and replayed later.
 
 use crate::air::mission;
 use uav_relay::MAX_FRAME;
@@ -22,7 +22,7 @@ fn moved(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// An offer is by far the longest thing that the ground says.
+/// Offers are by far the longest frames of the ground.
 const fn is_offer(bytes: &[u8]) -> bool {
     bytes.len() > MAX_FRAME - 24
 }
@@ -37,7 +37,7 @@ fn station(base: &Mission, epoch: u32) -> Ground {
     )
 }
 
-/// Four relays, and the offers of version 1 that were caught on their way to them.
+/// Returns four relays, and the withheld offers of version 1.
 fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     let mut air = Air::of(base, |_| auth(KEY, 1), loss);
     air.run(60);
@@ -51,14 +51,13 @@ fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     (air, offers)
 }
 
-/// The ground begins to upload version 1.
 fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
     let mut ground = station(base, epoch);
     ground.upload(air.now, moved(base, 1)).unwrap();
     air.ground = Some(ground);
 }
 
-/// The ground's offers are caught on their way, and its operator thinks better of it. Later they are played.
+/// An attacker withholds the ground's offers and replays them after the upload was given up.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same() {
     let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;
@@ -85,7 +84,7 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
             "wait {wait}"
         );
         assert!(stale(&air) > before, "it is counted");
-        // The next day.
+        // A new session of the ground station uploads the same mission.
         air.withheld = |_| false;
         begin_upload(&mut air, &base, 2);
         let mut seconds = 0;
@@ -101,7 +100,7 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
     }
 }
 
-/// The same offer is taken if it comes within the time: it is the time that tells.
+/// The same offer is accepted within the time limit: only the delay matters.
 #[test]
 fn an_offer_that_comes_at_once_is_taken() {
     let base = mission(4);

@@ -1,4 +1,4 @@
-//! A block with sites: the autopilot is told where to fly, once its pilot lets it.
+//! Block with sites: the autopilot gets targets, once its pilot engages it.
 
 use relay_app::drone::Refused;
 use uav_relay::flight::course::CourseError;
@@ -9,13 +9,13 @@ use crate::bench::{Bench, SITES, alone, block_alone, refused_with_autopilot};
 use crate::ram::Ram;
 use crate::vehicle::Vehicle;
 
-/// How far apart two places are, m.
 fn apart(a: Placement, b: Placement) -> f32 {
     let apart = [a.x_m - b.x_m, a.y_m - b.y_m, a.altitude_m - b.altitude_m];
     apart.map(|part| part * part).iter().sum::<f32>().sqrt()
 }
 
-/// On the ground nothing is told, in the pilot's hands its own place; then it is led to the place of its relay, no faster than allowed.
+/// A drone on the ground gets no target, in its pilot's hands its own position. Engaged it flies to its relay's position.
+/// speed limit.
 #[test]
 fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     let start = Placement::on_line(100.0, 20.0);
@@ -34,7 +34,7 @@ fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     let mut before = start;
     for _ in 0..150 {
         bench.run(1_000);
-        // 5 m/s.
+        // Speed limit 5 m/s.
         for place in std::mem::take(&mut bench.vehicle().told) {
             assert!(apart(place, before) < 1.2, "{before:?}, then {place:?}");
             before = place;
@@ -47,7 +47,7 @@ fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     assert!(apart(start, expected) > 50.0, "a way to fly");
     assert!(apart(place, expected) < 0.1, "{place:?}, not {expected:?}");
 
-    // The pilot takes it, and carries it away: nothing leads it back.
+    // The pilot takes over and moves the drone: no target leads it back.
     bench.vehicle().granted = false;
     bench.run(2_000);
     bench.vehicle().place.x_m += 60.0;
@@ -74,7 +74,6 @@ fn sites_of_another_mission_are_refused() {
     );
 }
 
-/// The autopilot's port takes nothing from the neighbours' ones.
 #[test]
 fn a_chain_agrees_beside_an_autopilot() {
     let mut bench = Bench::with(Vehicle::new(Placement::on_line(100.0, 20.0)));

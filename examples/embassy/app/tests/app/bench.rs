@@ -1,4 +1,4 @@
-//! A drone that runs the application among relays that do not: relay 1, with a wire to relay 2 of 2, or by radio with 2 and 3 of 3.
+//! Test bench: a drone with the application as relay 1, wired to relay 2 of 2, or by radio with relays 2 and 3 of 3.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -29,10 +29,9 @@ use crate::vehicle::Vehicle;
 
 pub(crate) const KEY: [u8; 32] = [7; 32];
 
-/// The clock is one for all tests.
+/// Lock of the mock clock, which all tests share.
 static CLOCK: Mutex<()> = Mutex::new(());
 
-/// One direction of a wire.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipe(Rc<RefCell<VecDeque<u8>>>);
 
@@ -41,7 +40,7 @@ impl ErrorType for Pipe {
 }
 
 impl Read for Pipe {
-    /// Whoever waits is polled again in the next millisecond anyway.
+    /// Needs no waker, because the bench polls every millisecond.
     async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.take(into) {
             0 => Poll::Pending,
@@ -63,7 +62,7 @@ impl Write for Pipe {
 }
 
 impl Pipe {
-    /// As many bytes as there are, and room for.
+    /// Takes as many bytes as are available and fit.
     pub(crate) fn take(&self, into: &mut [u8]) -> usize {
         let mut bytes = self.0.borrow_mut();
         let count = bytes.len().min(into.len());
@@ -74,7 +73,6 @@ impl Pipe {
     }
 }
 
-/// A driver enable that nobody looks at.
 struct Enable;
 
 impl PinType for Enable {
@@ -91,14 +89,13 @@ impl OutputPin for Enable {
     }
 }
 
-/// What an application is polled to.
 type Running = Pin<Box<dyn Future<Output = Result<Infallible, Refused>>>>;
 
 pub(crate) struct Bench {
     wiring: Wiring,
     others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// From the drone, and to it.
+    /// Bytes from the drone, and to it.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,
@@ -114,7 +111,6 @@ fn numbers() -> ChannelNumbers {
     }
 }
 
-/// What relay `index` of `relays` flies.
 fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
     let common = Profile {
         altitude_m: 20.0,
@@ -151,24 +147,24 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
     }
 }
 
-/// The block of relay 1; with an epoch it has a key.
+/// Returns the block of relay 1 of 2, with a key if there is an epoch.
 pub(crate) fn block(epoch: Option<u32>, sites: Option<Sites>) -> Block {
     let secret = epoch.map(|epoch| Secret { key: KEY, epoch });
     write(&config(2, 1, sites), &numbers(), secret, None)
 }
 
-/// The block of relay 1 of 3, with a key.
+/// Returns the block of relay 1 of 3, with a key.
 pub(crate) fn block_of_three() -> Block {
     let secret = Secret { key: KEY, epoch: 1 };
     write(&config(3, 1, None), &numbers(), Some(secret), None)
 }
 
-/// The block of the only relay between these sites.
+/// Returns the block of a single relay between these sites.
 pub(crate) fn block_alone(sites: Sites) -> Block {
     write(&config(1, 1, Some(sites)), &numbers(), None, None)
 }
 
-/// Where the only relay between these sites belongs.
+/// Returns the setpoint of a single relay between these sites.
 pub(crate) fn alone(sites: Sites) -> Placement {
     let said = config(1, 1, Some(sites));
     let now = Instant::ZERO;
@@ -179,7 +175,7 @@ pub(crate) fn alone(sites: Sites) -> Placement {
     relay.setpoint().unwrap()
 }
 
-/// Sites that are as far apart as the mission says.
+/// Sites at the mission's distance.
 pub(crate) const SITES: Sites = Sites {
     ends: [
         [474_000_000, 85_400_000, 420_000],
@@ -188,12 +184,11 @@ pub(crate) const SITES: Sites = Sites {
     speed_m_s: 0.0,
 };
 
-/// What becomes of a board that has to be refused, and has no port to an autopilot.
+/// Returns the reason why a board without a port to an autopilot is refused.
 pub(crate) fn refused(board: Board<Ram>) -> Refused {
     why(board, None)
 }
 
-/// The same with such a port.
 pub(crate) fn refused_with_autopilot(board: Board<Ram>) -> Refused {
     why(board, Some((Pipe::default(), Pipe::default())))
 }
@@ -212,11 +207,10 @@ fn why(board: Board<Ram>, autopilot: Option<(Pipe, Pipe)>) -> Refused {
 }
 
 thread_local! {
-    /// When the watchdog was fed.
+    /// Times at which the watchdog was fed.
     pub(crate) static FED: RefCell<Vec<Instant>> = const { RefCell::new(Vec::new()) };
 }
 
-/// The watchdog's.
 fn feed() -> impl FnMut() {
     || FED.with_borrow_mut(|fed| fed.push(EmbassyClock.now()))
 }
@@ -231,12 +225,12 @@ fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)
 }
 
 impl Bench {
-    /// The neighbour alone, on its first epoch.
+    /// Creates the bench with the neighbour alone, on its first epoch.
     pub(crate) fn new() -> Self {
         Self::wired(Wiring::Pair, 2)
     }
 
-    /// Two others by radio, on their first epochs.
+    /// Creates the bench with two other relays by radio, on their first epochs.
     pub(crate) fn radio() -> Self {
         Self::wired(Wiring::Shared, 3)
     }
@@ -267,7 +261,7 @@ impl Bench {
         }
     }
 
-    /// Switches the drone on, or off and on. What was on the wires then is gone.
+    /// Restarts the drone. Bytes on the wires are lost.
     pub(crate) fn boot(&mut self, board: Board<Ram>) {
         for wire in &self.wire {
             wire.0.borrow_mut().clear();
@@ -287,7 +281,6 @@ impl Bench {
         });
     }
 
-    /// The same with a vehicle at the application's third port.
     pub(crate) fn with(vehicle: Vehicle) -> Self {
         Self {
             vehicle: Some(vehicle),
@@ -299,12 +292,11 @@ impl Bench {
         self.vehicle.as_mut().unwrap()
     }
 
-    /// Switches it off.
     pub(crate) fn switch_off(&mut self) {
         self.drone = None;
     }
 
-    /// So many milliseconds pass; what the neighbour was told meanwhile.
+    /// Runs for `millis` milliseconds; returns the neighbour's events meanwhile.
     pub(crate) fn run(&mut self, millis: u32) -> Vec<Event> {
         self.events.clear();
         let mut cx = Context::from_waker(Waker::noop());
@@ -321,7 +313,7 @@ impl Bench {
         self.events.clone()
     }
 
-    /// So many milliseconds pass in which its task does not come to the end of a turn.
+    /// Runs for `millis` milliseconds while the drone's task hangs.
     pub(crate) fn hang(&mut self, millis: u32) {
         for _ in 0..millis {
             MockDriver::get().advance(embassy_time::Duration::from_millis(1));
@@ -359,7 +351,7 @@ impl Bench {
         }
     }
 
-    /// Frames that the neighbour did not believe.
+    /// Returns the number of frames that the neighbour rejected for their signature.
     pub(crate) fn disbelieved(&self) -> u32 {
         let stats = self.others[0].stats();
         stats.unsigned + stats.forged + stats.replayed

@@ -1,4 +1,4 @@
-//! A block with a key: frames are signed, by an epoch that rises at every start.
+//! Block with a key: frames are signed, with an epoch that increases at every start.
 
 use relay_app::board::Board;
 use relay_app::drone::Refused;
@@ -11,10 +11,9 @@ use uav_relay_kept::nor::Nor;
 use crate::bench::{Bench, SITES, block, refused};
 use crate::ram::Ram;
 
-/// So long a neighbour is missed before it is lost, ms.
+/// Silence after which a neighbour is lost, with a margin, ms.
 const LOST: u32 = 25_000;
 
-/// The epoch that stands in the flash.
 fn epoch(flash: &Ram) -> Option<u32> {
     let storage = flash.storage();
     let flash = Nor::new(storage.flash, storage.epochs);
@@ -28,7 +27,7 @@ fn its_epoch_rises_at_every_start_and_its_neighbour_believes_it_each_time() {
     let mut bench = Bench::new();
     for start in 1..=4 {
         bench.boot(flash.board(&block(Some(1), None), start));
-        // Who comes back often is heard for longer before he is taken in again.
+        // A relay that returns often is observed for longer before it is readmitted.
         let told = bench.run(60_000);
         assert!(told.contains(&Event::Converged), "start {start}: {told:?}");
         assert_eq!(epoch(&flash), Some(start));
@@ -40,8 +39,8 @@ fn its_epoch_rises_at_every_start_and_its_neighbour_believes_it_each_time() {
     assert_eq!(bench.disbelieved(), 0);
 }
 
-/// A start that somebody may have recorded is refused: one of an older epoch, and one of the same epoch and seed. (With another seed it is a
-/// duplicate of what it was, which the library's tests have.)
+/// Rejects a start that may be a replay: an older epoch, or the same epoch and seed. (The same epoch with another seed is a
+/// duplicate index, which the library's tests cover.)
 #[test]
 fn one_that_forgets_its_epoch_is_not_believed() {
     for (epoch, seed) in [(1, 2), (2, 1)] {
@@ -70,7 +69,7 @@ fn a_block_may_raise_the_epoch_and_never_lowers_it() {
     }
 }
 
-/// More starts than a sector has room for, with sectors of two lengths.
+/// Runs more starts than a sector has room for, with sectors of two lengths.
 #[test]
 fn the_epoch_rises_through_full_sectors() {
     let flash = Ram::blank();

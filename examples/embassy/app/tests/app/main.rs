@@ -1,4 +1,4 @@
-//! The application on a PC: in-memory UARTs, a flash in RAM, and a clock that stands until it is told to go on.
+//! Tests of the application on a PC: in-memory UARTs, a flash in RAM, and a mock clock.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

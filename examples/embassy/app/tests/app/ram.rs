@@ -1,4 +1,4 @@
-//! A flash in RAM that outlives a reboot: bits only fall, but for an erase.
+//! Flash in RAM that survives a reboot. Writes only clear bits; an erase sets them.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -19,7 +19,7 @@ impl Ram {
         Self(Rc::new(RefCell::new(vec![0xFF; 16 * UNIT as usize])))
     }
 
-    /// The board that is switched on with this flash: its block is in the first unit.
+    /// Returns a board with this flash, and writes its block to the first unit.
     pub(crate) fn board(&self, block: &Block, seed: u32) -> Board<Self> {
         self.0.borrow_mut()[..block.len()].copy_from_slice(block);
         Board::new(seed, self.storage())

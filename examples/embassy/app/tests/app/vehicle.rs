@@ -1,4 +1,4 @@
-//! A drone with a PX4 at the end of a UART: it hovers, or flies to the last target in its mode.
+//! Drone with a PX4 at a UART: it hovers, or flies to the last target in OFFBOARD.
 
 use embedded_io_async::Write as _;
 use uav_relay::flight::axis::Axis;
@@ -8,24 +8,23 @@ use uav_relay::{Geodetic, Placement};
 
 use crate::bench::{Pipe, SITES};
 
-/// How far it flies in a millisecond, m.
 const STEP_M: f32 = 0.008;
 
 pub(crate) struct Vehicle {
-    /// To the relay, and from it.
+    /// Bytes to the relay, and from it.
     uart: [Pipe; 2],
     axis: Axis,
     millis: u32,
     sequence: u8,
     waiting: Vec<u8>,
     pub(crate) place: Placement,
-    /// Armed, and in the air.
+    /// True if armed and in the air.
     pub(crate) flies: bool,
-    /// In OFFBOARD; otherwise the pilot has the sticks.
+    /// True in OFFBOARD; otherwise the pilot has the sticks.
     pub(crate) granted: bool,
-    /// Lines for the operator.
+    /// Received lines for the operator.
     pub(crate) texts: Vec<String>,
-    /// Targets that it was told since somebody looked.
+    /// Received targets, until a test clears them.
     pub(crate) told: Vec<Placement>,
 }
 
@@ -45,13 +44,11 @@ impl Vehicle {
         }
     }
 
-    /// The relay's reader and writer.
     pub(crate) fn port(&self) -> (Pipe, Pipe) {
         let [to, from] = self.uart.clone();
         (to, from)
     }
 
-    /// A millisecond passes.
     pub(crate) fn step(&mut self) {
         self.millis += 1;
         self.hear();
@@ -124,7 +121,7 @@ impl Vehicle {
                 self.texts.push(String::from_utf8(text.to_vec()).unwrap());
             }
             if frame[7..HEADER] == id::TIMESYNC.to_le_bytes()[..3] {
-                // The question goes back, with a time of its own.
+                // Answers with the request's time stamp, and a time of its own.
                 let mut answer = vec![0; 16];
                 answer[0] = 1;
                 let asked = &frame[HEADER + 8..end - CHECKSUM];

@@ -1,4 +1,4 @@
-//! What a relay has said in votes on views, by radio: it stands by it after a reboot.
+//! Votes on views, by radio: they survive a reboot.
 
 use uav_relay::ViewRecord;
 use uav_relay_kept::nor::Nor;
@@ -7,7 +7,6 @@ use uav_relay_kept::views::{WORDS, log, record};
 use crate::bench::{Bench, block_of_three};
 use crate::ram::Ram;
 
-/// The last record in the flash, of this block.
 fn newest(flash: &Ram) -> Option<ViewRecord> {
     let storage = flash.storage();
     let check = u32::from_le_bytes(*block_of_three().last_chunk().unwrap());
@@ -15,13 +14,12 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     log.newest::<WORDS>().and_then(|kept| record(&kept))
 }
 
-/// The view that it has promised itself to: what `ViewRecord::to_bytes` has behind the format, the mission, the view agreed on and whether
-/// it is one of that.
+/// Returns the promised view in a record: 4 bytes from offset 10 of `ViewRecord::to_bytes`.
 fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// The two others fly on without it, and take it in again: each time it votes.
+/// The two others fly on without the drone and readmit it: it votes each time.
 #[test]
 fn no_promise_is_forgotten_over_reboots() {
     let flash = Ram::blank();

@@ -1,4 +1,4 @@
-//! The watchdog: it is fed while the relay's ports and timers are served, and not otherwise.
+//! Watchdog: fed only while the relay's ports and timers are served.
 
 use uav_relay::{Duration, Event};
 use uav_relay_chip::reset::Reset;
@@ -19,10 +19,10 @@ fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
     for pair in fed.windows(2) {
         assert_eq!(pair[1].since(pair[0]), Duration::from_millis(500));
     }
-    // A turn that does not end, for longer than the watchdog waits.
+    // A turn hangs for longer than the watchdog's timeout.
     bench.hang(12_000);
     assert!(FED.with_borrow(Vec::is_empty));
-    // The watchdog restarts the chip: it rejoins before its neighbour has given it up.
+    // The watchdog restarts the chip; the relay rejoins before its neighbour has lost it.
     let board = Ram::blank().board(&block(Some(2), None), 2);
     bench.boot(board.reset_by(Reset::Watchdog));
     let told = bench.run(30_000);
@@ -31,7 +31,6 @@ fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
-/// The operator reads it on the ground station.
 #[test]
 fn the_operator_is_told_that_it_restarted_the_relay() {
     for (reset, told) in [(Reset::Watchdog, true), (Reset::Power, false)] {

@@ -1,4 +1,4 @@
-//! The file that `--capture` asks for: what is put on the air.
+//! Capture file of `--capture`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::record::{Link, OnAir};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// A capture of a run. Its clock is the virtual one.
+/// Capture of a run, with virtual times.
 pub(crate) struct AirCapture {
     file: PathBuf,
     capture: Capture<BufWriter<File>>,
@@ -22,9 +22,9 @@ pub(crate) struct AirCapture {
 }
 
 impl AirCapture {
-    /// Begins `file` for a run of `setup`.
+    /// Creates `file` for a run of `setup`.
     pub(crate) fn begin(file: &Path, setup: &Setup) -> Result<Self, Failure> {
-        // The key is of this run alone, and drawn from its seed: it is no secret.
+        // The key is not secret: it is drawn from the seed, for this run only.
         let key = setup.secret().map_or_else(String::new, |key| {
             key.iter().fold(", key ".to_owned(), |mut text, byte| {
                 _ = write!(text, "{byte:02x}");
@@ -44,7 +44,7 @@ impl AirCapture {
         })
     }
 
-    /// Takes in what was put on the air by now, or with the last bit of everything.
+    /// Writes the frames that have ended by now, or all frames if `to_the_end` is true.
     pub(crate) fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
         let until = if to_the_end {
             uav_relay::Instant::from_micros(u64::MAX)

@@ -1,4 +1,4 @@
-//! `cargo chain`: simulated relays, each running the on-board code, find their places over simulated serial links.
+//! `cargo chain`: simulated relays run the on-board code and find their positions over simulated links.
 
 mod capture;
 mod progress;
@@ -71,7 +71,6 @@ fn run(options: &Options) -> Result<(), Failure> {
     show(options, &report)
 }
 
-/// Runs the chain to its end, and has the capture follow it there.
 fn fly(
     run: &Prepared<'_>,
     setup: Setup,
@@ -84,7 +83,7 @@ fn fly(
     Ok(chain.finish())
 }
 
-/// Runs the chain, with a progress line on a terminal once it takes longer than a second.
+/// Runs the chain until it settles, with a progress line.
 fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
     let mut line = Progress::begin();
     while !chain.step(20_000) {
@@ -100,7 +99,7 @@ fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(),
     Ok(())
 }
 
-/// Prints the report; what it says went wrong is the failure.
+/// Prints the report; an error in it is returned as the failure.
 fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     command::print(&if options.json {
         command::json(report)?

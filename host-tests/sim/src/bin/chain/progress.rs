@@ -1,18 +1,17 @@
-//! The progress line of a run that takes longer than a second, on a terminal.
+//! Progress line on a terminal.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};
 
-/// A run that is shorter has no line.
+/// Run time before the line is shown.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// The line is written again after this time.
+/// Update interval of the line.
 const EVERY: Duration = Duration::from_millis(100);
 
-/// Erases the terminal line, from its beginning.
 const ERASE: &str = "\r\u{1b}[K";
 
-/// A line on standard error that is overwritten; erased at the end of the run.
+/// Progress line on standard error, erased at the end of the run.
 pub(crate) struct Progress {
     started: Instant,
     shown: Option<Instant>,
@@ -28,7 +27,7 @@ impl Progress {
         }
     }
 
-    /// Shows `text`, where it is time to.
+    /// Shows `text` if an update is due.
     pub(crate) fn show(&mut self, text: impl FnOnce() -> String) {
         let elapsed = self.started.elapsed();
         let is_due = self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
@@ -47,7 +46,7 @@ impl Drop for Progress {
     }
 }
 
-/// A terminal that is gone is no fault of the run.
+/// Ignores write errors: a closed terminal is not an error of the run.
 fn write(text: &str) {
     let mut out = std::io::stderr();
     _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());

@@ -1,4 +1,4 @@
-//! How frames travel from one relay to others.
+//! Transmission of frames between relays over links or an ideal shared channel.
 
 use uav_relay::{Instant, Port};
 
@@ -10,7 +10,6 @@ use super::recorded::link;
 use super::state::Chain;
 
 impl Chain {
-    /// Puts a frame on a link.
     pub(super) fn transmit(&mut self, index: usize, port: Port, frame: &[u8]) {
         if port == Port::Shared && self.broadcast(index, frame) {
             return;
@@ -46,7 +45,7 @@ impl Chain {
         self.keep_frame(self.sent_at(arrives), link(index, port), frame, note);
     }
 
-    /// An attacker hears a frame that arrives at all whom it is for.
+    /// Records for the attacker a frame that reaches all its receivers.
     pub(super) fn overhear(&mut self, frame: &[u8], into: Port, arrives: Instant) {
         if let Some(attacker) = &mut self.attacker {
             attacker.record(Recorded {
@@ -57,7 +56,7 @@ impl Chain {
         }
     }
 
-    /// Puts `frame` of node `from` into the queues of all that hear it, each with what happens to it on its way; what that was, in words.
+    /// Schedules the arrivals of a frame of node `from` at its receivers, with faults. Returns a description of the faults.
     pub(super) fn send(
         &mut self,
         from: usize,
@@ -97,7 +96,7 @@ impl Chain {
         note
     }
 
-    /// Whether a frame falls into a run of losses.
+    /// Returns true if a burst of losses hits the frame.
     fn loses(&mut self, from: usize, receiver: Receiver) -> bool {
         let to = match receiver {
             Receiver::Relay(at) => at,

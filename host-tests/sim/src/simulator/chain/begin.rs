@@ -1,4 +1,4 @@
-//! The begin of a run: every relay is switched on, and all that is to happen stands in the queue.
+//! Start of a run: switches every relay on and schedules all planned events.
 
 use std::collections::BTreeMap;
 
@@ -24,10 +24,7 @@ use super::state::{Chain, Member};
 use super::station::stations;
 
 impl Chain {
-    /// Switches every relay on at time 0. `run` finds what they are held against, where the run is watched.
-    ///
-    /// # Errors
-    /// [`SetupError`] where a profile or setting is refused by the relay.
+    /// Switches every relay on at time 0. `run` computes the reference positions if the run is watched.
     pub(super) fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -125,7 +122,6 @@ impl Chain {
     }
 }
 
-/// The relays, switched on at time 0.
 fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupError> {
     let mut members = Vec::new();
     for index in 1..=setup.mission.relays() {
@@ -155,7 +151,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// What happens to drones with autopilots; how often something does.
+/// Schedules the events of drones with autopilots and returns their number.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     let Some(fleet) = &setup.fleet else {
         return 0;
@@ -166,7 +162,7 @@ fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     for &(relay, at) in &fleet.restarts {
         put(at, relay, Happening::Restart);
     }
-    // A pilot who does not give a drone back lands it, and its relay is switched off.
+    // A pilot who keeps the drone lands it; its relay is switched off.
     let kept = fleet.takeovers.iter().filter(|it| it.until.is_none());
     for takeover in kept.clone() {
         put(takeover.from + LANDS_AFTER, takeover.relay, Happening::Kill);

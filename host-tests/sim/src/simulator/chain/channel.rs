@@ -1,4 +1,4 @@
-//! The relays and the ground on a shared channel: a node for each relay, and one for each station after them.
+//! Shared channel: nodes 0 to N - 1 are the relays, the following ones are the ground stations.
 
 use uav_relay::Port;
 
@@ -9,7 +9,7 @@ use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {
-    /// Hands a frame of a node to its radio, where there is a channel to share; whether there is.
+    /// Passes a frame to the node's radio. Returns false if there is no simulated channel.
     pub(super) fn broadcast(&mut self, node: usize, frame: &[u8]) -> bool {
         let Some(medium) = &mut self.medium else {
             return false;
@@ -23,7 +23,6 @@ impl Chain {
         true
     }
 
-    /// Something is due on the channel.
     pub(super) fn on_air(&mut self, event: AirEvent) {
         let Some(mut medium) = self.medium.take() else {
             return;
@@ -43,7 +42,7 @@ impl Chain {
         }
     }
 
-    /// The nodes that hear `node`.
+    /// Returns the nodes in range of `node`.
     fn hearers(&self, node: usize) -> Vec<usize> {
         let relays = self.members.len();
         match node.checked_sub(relays) {
@@ -63,7 +62,7 @@ impl Chain {
     fn deliver(&mut self, sent: &Sent) {
         let relays = self.members.len();
         let arrives = self.now + self.setup.link.latency;
-        // Sent again, a frame that somebody has missed would be no replay.
+        // A frame that some receiver missed would be no replay when sent again.
         if sent.missed == 0 {
             self.overhear(&sent.frame, Port::Shared, arrives);
         }

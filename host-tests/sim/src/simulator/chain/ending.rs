@@ -1,4 +1,4 @@
-//! When a run is over.
+//! End conditions of a run.
 
 use uav_relay::{Instant, Phase, Side, Wiring};
 
@@ -16,7 +16,7 @@ impl Chain {
         }
         let killed = self.members.iter().any(|member| member.killed.is_some());
         if killed && self.setup.settings.wiring == Wiring::Pair {
-            // Nothing that is uploaded gets past it.
+            // Uploads cannot pass a silent relay on separate links.
             return self.all_noticed().then_some(Ending::Broken);
         }
         if self.stations.iter().any(Station::is_busy) {
@@ -57,7 +57,7 @@ impl Chain {
         (settled && others).then_some(Ending::Settled)
     }
 
-    /// A run that goes on to its deadline has got there: nothing but `next` is to come.
+    /// Ends a soak at its planned time if the next event is later.
     pub(super) fn end_soak(&mut self, next: Instant) {
         if let Some(until) = self.setup.soak
             && next > until
@@ -67,7 +67,7 @@ impl Chain {
         }
     }
 
-    /// The living relays that can hear each other, part by part.
+    /// Returns the living relays, grouped into parts that can receive each other.
     fn parts(&self) -> Vec<Vec<&Member>> {
         let mut parts: Vec<Vec<&Member>> = Vec::new();
         let mut last: Option<usize> = None;
@@ -90,7 +90,7 @@ impl Chain {
         parts
     }
 
-    /// Whether every living neighbour of a silent relay has noticed.
+    /// Returns true if every living neighbour of a silent relay has reported the loss.
     fn all_noticed(&self) -> bool {
         let noticed = |by: usize, side| {
             let Some(member) = self.members.get(by) else {
@@ -112,14 +112,14 @@ impl Chain {
     }
 }
 
-/// Whether the relays of `part` have been counted as they are.
+/// Returns true if the members' indices and number of relays match `part`.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
     })
 }
 
-/// Whether no part can go on: each is at most half of what it was, its leader knows, and nobody is left to be found in it.
+/// Returns true if no part has a quorum, the relays know it, and all know their present neighbours.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -138,7 +138,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Whether all hold their places for the same target.
+/// Returns true if all relays hold their positions for the same target.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()

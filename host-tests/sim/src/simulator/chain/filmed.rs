@@ -1,4 +1,4 @@
-//! What is kept of how a run looks from outside, where that is asked for.
+//! Recording of the film.
 
 use uav_relay::{Port, Side};
 
@@ -6,7 +6,7 @@ use super::super::film::{Sent, Shot};
 use super::state::Chain;
 
 impl Chain {
-    /// Films relay `index` (from 0), if it looks different than before.
+    /// Records the state of relay `index` (from 0) if it changed.
     pub(super) fn film(&mut self, index: usize) {
         let (Some(film), Some(member)) = (&mut self.outcome.film, self.members.get_mut(index))
         else {
@@ -31,7 +31,6 @@ impl Chain {
         }
     }
 
-    /// Films that relay `index` (from 0) says something.
     pub(super) fn film_frame(&mut self, index: usize, port: Port) {
         if let (Some(film), Some(member)) = (&mut self.outcome.film, self.members.get(index)) {
             film.sent.push(Sent {

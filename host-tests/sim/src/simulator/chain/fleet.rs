@@ -1,4 +1,4 @@
-//! Drones with autopilots: each step they fly on and talk with the links of their relays, which say where to fly and hear where they are.
+//! Drones with autopilots: time steps, MAVLink exchange with the relays, and distances.
 
 use uav_relay::HoldReason;
 use uav_relay::flight::autopilot::AutopilotEvent;
@@ -11,23 +11,23 @@ use super::super::outcome::Turning;
 use super::super::queue::Happening;
 use super::state::Chain;
 
-/// Between two steps of the flight.
+/// Time step of the flight.
 const STEP: Duration = Duration::from_millis(50);
 
-/// A drone is at its place if it is no farther from it than that, m.
+/// Largest distance of a drone from its setpoint that counts as arrived, m.
 const THERE_M: f64 = 1.0;
 
-/// So often an operator looks at the fleet.
+/// Period of the operator's checks.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
-/// A pilot gives no drone back while another one moves within the separation and this, m.
+/// Traffic margin, m: no hand-over while another drone moves within the separation plus this.
 const TRAFFIC_M: f64 = 30.0;
 
-/// The pilot of a drone whose relay is silent, or who has taken it for good, lands it after so long.
+/// Delay until a pilot lands a drone whose relay is silent or that was taken over for good.
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
-    /// Puts the drones on the ground, where there are any.
+    /// Creates the drones on the ground, if any.
     pub(super) fn line_up(&mut self) {
         if let Some(spec) = &self.setup.fleet {
             let all = 0..self.members.len();
@@ -38,7 +38,6 @@ impl Chain {
         }
     }
 
-    /// All fly on for a step.
     pub(super) fn fly_fleet(&mut self) {
         self.look_for_traffic();
         for index in 0..self.fleet.len() {
@@ -65,7 +64,7 @@ impl Chain {
         self.queue.put(self.now + STEP, 0, Happening::Fly);
     }
 
-    /// Compares the distance of each pair with what it may be.
+    /// Updates the smallest separation margin from all pairs of drones.
     fn measure_pairs(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let count = self.fleet.len();
@@ -93,7 +92,7 @@ impl Chain {
         }
     }
 
-    /// Has each pilot look whether another drone flies past.
+    /// Tells each pilot if another moving drone is near.
     fn look_for_traffic(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let seen: Vec<(Point, bool)> = self
@@ -111,7 +110,7 @@ impl Chain {
         }
     }
 
-    /// One drone flies on, and talks with its relay's link: as a firmware's loop does, unless that is off.
+    /// Advances a drone and runs one iteration of its relay's firmware loop, unless the relay is silent.
     fn drive(&mut self, index: usize) {
         let now = self.now;
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
@@ -130,7 +129,7 @@ impl Chain {
         }
         vehicle.follow(now, member.relay.sites());
         vehicle.link.handle_timeout(now);
-        // Before it hears where the drone is: flown again it begins with the next place.
+        // Report the control state before the position: a drone that is engaged again begins with the next position.
         let is_flown = vehicle.link.is_flown();
         member.relay.handle_control(now, is_flown);
         vehicle.link.handle_ready(now, member.relay.is_ready());
@@ -140,7 +139,7 @@ impl Chain {
         while let Some(frame) = vehicle.link.poll_transmit(now) {
             vehicle.hear(now, &frame);
         }
-        // A relay that was rebooted takes it for news that its drone is not flown, though nothing has changed for the drone.
+        // A rebooted relay sees a change of the control state even if nothing changed for the drone.
         let due = member.relay.poll_timeout();
         let is_sooner = due.is_some_and(|at| member.wake.is_none_or(|wake| at < wake));
         let mut has_said = is_flown != member.lent || is_sooner;
@@ -171,8 +170,9 @@ impl Chain {
         }
     }
 
-    /// An operator looks: where the drones of silent relays have landed, those beside them are told that keep away from where they were,
-    /// unless that may be because of another one that a pilot has, or had a moment ago.
+    /// Simulates an operator: clears the keep-away zones of silent relays whose drones have landed.
+    ///
+    /// A zone stays while the next flying drone is in its pilot's hands, or was until recently.
     fn look_around(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_lent_long(index) {
@@ -184,7 +184,7 @@ impl Chain {
                     Side::Upstream => (0..index).rev().find(is_up),
                     Side::Downstream => (index + 1..self.members.len()).find(is_up),
                 };
-                // Nobody is looked for who was not lost: the one beside may not have been heard yet.
+                // Skip a neighbour that was never lost: it may not have been received yet.
                 let is_lost = match (side, beside) {
                     (Side::Upstream, at) => at.map_or(index > 0, |at| at + 1 < index),
                     (Side::Downstream, at) => at.unwrap_or(self.members.len()) > index + 1,
@@ -206,7 +206,7 @@ impl Chain {
         }
     }
 
-    /// Whether the relay flies its drone, and did all the last half minute.
+    /// Returns true if the relay has controlled its drone for at least [`LANDS_AFTER`].
     fn is_lent_long(&self, index: usize) -> bool {
         let Some(member) = self
             .members
@@ -230,7 +230,7 @@ impl Chain {
         }
     }
 
-    /// Whether every drone that its pilot has lent to a relay that is on hovers at that relay's place.
+    /// Returns true if every drone under the control of a living relay hovers at its agreed position.
     pub(super) fn all_hover(&self) -> bool {
         let lent = self.members.iter().zip(&self.fleet);
         lent.filter(|(member, vehicle)| member.killed.is_none() && vehicle.is_lent(self.now))

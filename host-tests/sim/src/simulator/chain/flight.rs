@@ -1,4 +1,4 @@
-//! Drones that fly to their relays' setpoints, say where they are, and how near they come to each other.
+//! Flight of simple drones: setpoints, position reports and closest approach.
 
 use uav_relay::Instant;
 
@@ -7,7 +7,7 @@ use super::super::queue::Happening;
 use super::state::Chain;
 
 impl Chain {
-    /// Has the drones take off, where there are any.
+    /// Creates the drones, if any, and starts their time steps.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));
@@ -16,7 +16,7 @@ impl Chain {
         self.line_up();
     }
 
-    /// All fly on for a step; those whose relays are on say where they are.
+    /// Advances all drones by one time step; those with living relays report their positions.
     pub(super) fn fly(&mut self) {
         let now = self.now;
         let Some(mut flight) = self.flight.take() else {
@@ -52,7 +52,7 @@ impl Chain {
         self.flight = Some(flight);
     }
 
-    /// Keeps when two drones were nearest to each other.
+    /// Updates the closest approach.
     pub(super) fn keep(&mut self, nearest: Option<Nearest>) {
         let known = self.outcome.nearest;
         if nearest.is_some_and(|it| known.is_none_or(|known| it.apart_m < known.apart_m)) {
@@ -60,7 +60,7 @@ impl Chain {
         }
     }
 
-    /// Whether every drone whose relay is on is where that was agreed to be.
+    /// Returns true if every drone with a living relay is at its agreed position, by its own estimate.
     pub(super) fn has_arrived(&self) -> bool {
         let Some(flight) = &self.flight else {
             return true;

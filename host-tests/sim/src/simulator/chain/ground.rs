@@ -1,4 +1,4 @@
-//! The ground's end of an upload.
+//! Ground stations of a run: uploads and measurements.
 
 use uav_relay::MAX_FRAME;
 use uav_relay::{Port, Side, Wiring};
@@ -13,7 +13,6 @@ use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {
-    /// Upload number `which` of the setup begins.
     pub(super) fn begin_upload(&mut self, which: usize) {
         let Some(spec) = self.setup.uploads.get(which).copied() else {
             return;
@@ -33,7 +32,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Bytes arrive at station `at`.
+    /// Handles bytes received by station `at`.
     pub(super) fn hear(&mut self, at: usize, bytes: &[u8]) {
         if let Some(station) = self.stations.get_mut(at) {
             station.ground.handle_bytes(bytes);
@@ -41,7 +40,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Station `at` may have something to do.
+    /// Handles the timer of station `at`.
     pub(super) fn ask(&mut self, at: usize) {
         let now = self.now;
         if let Some(station) = self.stations.get_mut(at)
@@ -53,7 +52,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Every station that has something to measure says what.
+    /// Measures the interference at every station and sends the results.
     pub(super) fn measure_at_ends(&mut self, sky: &Sky, scene: &Scene) {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
@@ -117,7 +116,7 @@ impl Chain {
         }
     }
 
-    /// Whether station `at` hears what relay `index` (from 0) sends through `port`.
+    /// Returns true if station `at` receives what relay `index` (from 0) sends through `port`.
     pub(super) fn reaches_ground(&self, index: usize, port: Port, at: usize) -> bool {
         let Some(station) = self.stations.get(at) else {
             return false;

@@ -1,14 +1,14 @@
-//! Who hears whom.
+//! Connectivity of the relays: range, partitions and one-way failures.
 
 use uav_relay::Wiring;
 
 use super::state::Chain;
 
-/// A relay takes one that is so many places away at most for its neighbour, however far it is heard.
+/// Largest difference of the numbers of two neighbours, whatever the radio range.
 const NEIGHBOUR: usize = 4;
 
 impl Chain {
-    /// How many relays away a relay is heard.
+    /// Returns the range of a relay, in relays.
     pub(super) fn reach(&self) -> usize {
         match self.setup.settings.wiring {
             Wiring::Pair => 1,
@@ -16,7 +16,7 @@ impl Chain {
         }
     }
 
-    /// Whether relays `one` and `other` (from 0) are on different sides of a partition now.
+    /// Returns true if a partition separates relays `one` and `other` (from 0) now.
     pub(super) fn are_parted(&self, one: usize, other: usize) -> bool {
         let parts = &self.setup.partitions;
         parts
@@ -24,7 +24,7 @@ impl Chain {
             .any(|part| part.parts(number(one), number(other), self.now))
     }
 
-    /// Whether relay `by` hears relay `of` now (from 0), if it is near enough.
+    /// Returns true if no failure keeps relay `by` from receiving relay `of` (from 0) now. Range is not checked.
     pub(super) fn hears(&self, by: usize, of: usize) -> bool {
         let deaf = &self.setup.deaf;
         !self.are_parted(by, of)
@@ -33,13 +33,13 @@ impl Chain {
                 .any(|deaf| deaf.applies(number(by), number(of), self.now))
     }
 
-    /// Whether relays `one` and `other` (from 0) can be neighbours in a chain now: they hear each other, and not too many are between.
+    /// Returns true if relays `one` and `other` (from 0) can be neighbours now: linked both ways and near.
     pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
         let most = self.reach().min(NEIGHBOUR);
         one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)
     }
 
-    /// The relays that hear what relay `index` (from 0) sends on a shared channel.
+    /// Returns the relays that receive relay `index` (from 0) on a shared channel.
     pub(super) fn in_range(&self, index: usize) -> Vec<usize> {
         let reach = self.setup.radio_reach;
         let until = self.members.len().min(index + reach + 1);
@@ -49,7 +49,6 @@ impl Chain {
     }
 }
 
-/// The number of a relay, from 1.
 fn number(index: usize) -> u16 {
     u16::try_from(index + 1).unwrap_or(u16::MAX)
 }

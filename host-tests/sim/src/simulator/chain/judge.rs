@@ -1,4 +1,4 @@
-//! The run under watch: what has changed, and whether the chain is right.
+//! Updates of the run's statistics after each event.
 
 use super::super::flying::Seen;
 use super::super::longest::longest;
@@ -7,13 +7,13 @@ use super::super::queue::Happening;
 use super::super::watch::Watch;
 use super::state::{Chain, Member};
 
-/// Whom a happening may have changed.
+/// Relays that an event may have changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Touched {
     Nobody,
-    /// One relay, from 0.
+    /// Index of a single relay, from 0.
     One(usize),
-    /// Anybody, or who hears whom.
+    /// Change that may affect any relay, or the connectivity.
     All,
 }
 
@@ -28,13 +28,13 @@ impl Touched {
 }
 
 impl Chain {
-    /// Begins to watch the relays; `run` finds what they are held against.
+    /// Starts the statistics; `run` computes the reference positions.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(seen).collect();
         self.watch = Some(Watch::new(seen, run));
     }
 
-    /// Sees what has changed.
+    /// Updates the statistics after an event.
     pub(super) fn look(&mut self, touched: Touched) {
         if touched == Touched::Nobody {
             return;
@@ -67,9 +67,9 @@ impl Chain {
         }
     }
 
-    /// Whether a longest chain that there can be of the relays that are on holds its optimum; of several, any one.
+    /// Returns true if at least one of the longest possible chains of the living relays holds its optimum.
     ///
-    /// Where all of those are too few for a quorum nobody may fly, and that counts as wrong like any other time without a chain.
+    /// If all of these lack a quorum, no relay may hold a position, which counts as wrong.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();

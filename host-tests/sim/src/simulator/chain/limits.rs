@@ -1,11 +1,11 @@
-//! What a relay may never do: leave its limits, or make the chain worse.
+//! Invariants of a run: setpoints stay within their limits, and Algorithm 2 never makes the chain worse.
 
 use uav_relay::{Method, Placement};
 
 use super::state::Chain;
 
 impl Chain {
-    /// Holds what relay `index` (from 0) says now against that.
+    /// Checks the current setpoint and the rounds of relay `index` (from 0).
     pub(super) fn check(&mut self, index: usize) {
         let Some(member) = self.members.get_mut(index) else {
             return;
@@ -16,7 +16,7 @@ impl Chain {
         {
             let config = member.relay.mission().config();
             let end = config.distance_m;
-            // What it was given, or one of the band.
+            // Allowed altitude: the configured one, or any in the band.
             let given = self.setup.profiles.iter().find(|(of, _)| *of == by);
             let altitude = given.map_or(config.common, |(_, own)| *own).altitude_m;
             let chosen = self.setup.settings.method != Method::Align
@@ -31,13 +31,13 @@ impl Chain {
             let chosen = (0.0..=end).contains(&place.x_m)
                 && aside
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
-            // With a guard it may be on its way from anywhere, and may be halted on it: it goes no farther outside the box than where it
-            // has been since its drone was engaged.
+            // With a guard, a drone may come from anywhere and be halted anywhere on its path: its setpoint may not leave the box
+            // by more than it has since the drone was engaged.
             let [low, high] = member.been.unwrap_or([place; 2]);
             let guard = self.setup.settings.guard;
             let inside = guard.map_or(chosen, |guard| {
                 let fence = guard.fence;
-                // The box goes along with the line of an upload.
+                // The box grows with the line of an uploaded mission.
                 let longer_m = end - self.setup.mission.config().distance_m;
                 let most_x_m = fence.most_x_m + longer_m;
                 [
@@ -63,7 +63,7 @@ impl Chain {
                 })
             });
             self.outcome.unsafe_setpoints += u64::from(!inside);
-            // With a new mission it stays where it is until the next agreement.
+            // After an upload, the drone keeps its position until the next agreement.
             member.safe = inside.then_some(place);
         }
         member.been = member.relay.setpoint().map(|place| {
@@ -79,7 +79,7 @@ impl Chain {
             && sir > 0.0
             && self.outcome.rounds.len() <= usize::from(done)
         {
-            // Algorithm 2 moves only what makes the worse of two hops better.
+            // Algorithm 2 moves a relay only if this improves the worse of its two hops.
             debug_assert!(
                 self.attacker.is_some()
                     || self.outcome.rounds.last().is_none_or(|last| sir >= *last),

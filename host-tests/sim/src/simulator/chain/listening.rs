@@ -1,4 +1,4 @@
-//! Relays that measure the interference where they are.
+//! Interference measurements of the relays.
 
 use uav_relay::sensing::belief::Told;
 use uav_relay::{Instant, Phase, Placement, Sample};
@@ -10,7 +10,7 @@ use super::super::sky::Stand;
 use super::state::Chain;
 
 impl Chain {
-    /// Every relay that is on measures where it is, and where all are is written down.
+    /// Measures at every living relay and takes a snapshot of the positions.
     pub(super) fn measure_all(&mut self) {
         let Some(sky) = self.setup.sky.clone() else {
             return;

@@ -1,6 +1,6 @@
-//! Who hears a frame.
+//! Receivers of a frame.
 
-/// A relay or a station, counted from 0.
+/// Receiving node: a relay or a ground station, from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Receiver {
     Relay(usize),

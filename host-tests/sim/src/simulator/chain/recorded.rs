@@ -1,4 +1,4 @@
-//! What is kept of the frames on the air, where that is asked for.
+//! Recording of transmitted frames.
 
 use std::fmt::Write as _;
 
@@ -10,8 +10,7 @@ use super::receiver::Receiver;
 use super::state::Chain;
 
 impl Chain {
-    /// The frames that were put on the air by `until` and not taken before, in the order in which they ended; none unless
-    /// [`Setup::record`](super::super::setup::Setup::record) was set.
+    /// Removes and returns the frames sent by `until`, ordered by their end, if recording is on.
     pub fn frames(&mut self, until: Instant) -> Vec<OnAir> {
         self.record
             .as_mut()
@@ -19,7 +18,7 @@ impl Chain {
             .unwrap_or_default()
     }
 
-    /// When the last bit of a frame is sent that arrives at `arrives`.
+    /// Returns the time of a frame's last bit from its arrival time.
     pub(super) fn sent_at(&self, arrives: Instant) -> Instant {
         let latency = self.setup.link.latency.as_micros();
         Instant::from_micros(arrives.as_micros().saturating_sub(latency))
@@ -31,7 +30,7 @@ impl Chain {
         }
     }
 
-    /// Adds to `note` what became of `frame` on its way to `receiver`.
+    /// Appends to `note` the faults of `frame` on its path to `receiver`.
     pub(super) fn remark(
         &self,
         note: &mut String,
@@ -71,7 +70,7 @@ impl Chain {
     }
 }
 
-/// What relay `index` (from 0) has at `port`.
+/// Returns the link at `port` of relay `index` (from 0).
 pub(super) fn link(index: usize, port: Port) -> Link {
     let number = u16::try_from(index).unwrap_or(u16::MAX);
     match port {

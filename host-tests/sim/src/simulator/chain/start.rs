@@ -1,4 +1,4 @@
-//! A relay of the run that is switched on.
+//! Creation of a relay when it is switched on.
 
 use uav_relay::SetupError;
 use uav_relay::Upload;
@@ -7,18 +7,17 @@ use uav_relay::{Identity, Instant, Relay, Settings, ViewRecord};
 use super::super::forge::NETWORK;
 use super::super::setup::Setup;
 
-/// A relay that is switched on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
-    /// Which one, from 1.
+    /// Relay number, from 1.
     pub(super) index: u16,
-    /// For the how manieth time, from 1.
+    /// Number of the start, from 1.
     pub(super) number: u32,
     pub(super) seed: u32,
     pub(super) now: Instant,
 }
 
-/// A relay of the run that has just been switched on, with what it has stored.
+/// Creates a relay and restores its persistent state.
 pub(super) fn switched_on(
     setup: &Setup,
     start: Start,

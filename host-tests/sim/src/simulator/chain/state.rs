@@ -1,4 +1,4 @@
-//! The state of a run: its relays, the ground, the drones, and what is still to happen.
+//! State of a run.
 
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Upload;
@@ -17,36 +17,33 @@ use super::super::setup::Setup;
 use super::super::watch::Watch;
 use super::station::Station;
 
-/// One relay in the run.
 #[derive(Debug)]
 pub(super) struct Member {
     pub(super) relay: Relay,
-    /// Its number in the mission, from 1.
+    /// Relay number in the mission, from 1.
     pub(super) node: u16,
-    /// Its lines: toward Tx (or to all), toward Rx.
+    /// Transmit lines: toward Tx (or shared), toward Rx.
     pub(super) lines: [Line; 2],
     pub(super) killed: Option<Instant>,
-    /// Whether its setpoint was flown when that was last looked at.
+    /// True if the relay controlled its drone at the last time step.
     pub(super) lent: bool,
-    /// How often it has been switched on.
     pub(super) starts: u32,
-    /// Passes that it has begun before it was switched on last.
+    /// Sweeps begun before the last start.
     pub(super) swept: u32,
-    /// What it has stored of uploads.
     pub(super) stored: Option<Upload>,
-    /// Where it was told to fly when that was last found to be within its limits.
+    /// Last setpoint that passed the limit check.
     pub(super) safe: Option<Placement>,
-    /// Least and greatest coordinates of its setpoints since its drone was engaged.
+    /// Least and greatest setpoint coordinates since the drone was engaged.
     pub(super) been: Option<[Placement; 2]>,
-    /// Where it has measured the interference last.
+    /// Position of the last measurement.
     pub(super) measured: Option<Placement>,
-    /// What it looked like when it was filmed last: whether it was on, and where it was told to fly.
+    /// Last filmed state: on or off, and the setpoint.
     pub(super) filmed: Option<(bool, Option<Placement>)>,
-    /// The wake-up in the queue that counts: the earliest one. Any other is void.
+    /// Time of the valid wake-up in the queue, the earliest; others are ignored.
     pub(super) wake: Option<Instant>,
 }
 
-/// A chain under way.
+/// Simulated chain during a run.
 #[derive(Debug)]
 pub struct Chain {
     pub(super) setup: Setup,
@@ -56,27 +53,25 @@ pub struct Chain {
     pub(super) outcome: Outcome,
     pub(super) now: Instant,
     pub(super) happenings: u64,
-    /// How often a relay has taken a place.
+    /// Number of `Converged` events so far.
     pub(super) holding: usize,
-    /// Kills, boots, partitions and strikes that are still to come.
+    /// Planned kills, boots, partitions, uploads and attacker frames that are still pending.
     pub(super) ahead: usize,
     pub(super) stations: Vec<Station>,
     pub(super) attacker: Option<Attacker>,
     pub(super) flight: Option<Flight>,
     pub(super) fleet: Vec<Vehicle>,
-    /// Of each pair of drones that no pilot has: their distance when both were handed over last, m.
+    /// Distance of each pair of drones at their last hand-over, m; `None` while a pilot flies one of the two.
     pub(super) handed_over_m: Vec<Option<f64>>,
-    /// The channel that all share, unless each has a line of its own.
+    /// Simulated shared channel; `None` for separate lines or an ideal channel.
     pub(super) medium: Option<Medium>,
-    /// Where losses come in runs.
     pub(super) bursts: Option<Bursts>,
-    /// Where all were told to be when they agreed last, and how often that has changed.
+    /// Setpoints of the last agreement.
     pub(super) agreed: Option<Vec<Placement>>,
     pub(super) agreements: u32,
-    /// Whether all has been heard that was to be.
+    /// True after the last measurement.
     pub(super) listened: bool,
-    /// Where its whole time counts.
+    /// Statistics, for soaks and shared channels.
     pub(super) watch: Option<Watch>,
-    /// Where somebody wants to see what is on the air.
     pub(super) record: Option<Record>,
 }

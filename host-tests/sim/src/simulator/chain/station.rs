@@ -1,4 +1,4 @@
-//! The transmitter and the receiver, as nodes of the run.
+//! Transmitter and receiver as nodes of the run.
 
 use uav_relay::ground::{Ground, Progress};
 use uav_relay::{Instant, Side};
@@ -7,7 +7,7 @@ use super::super::forge::NETWORK;
 use super::super::link::Line;
 use super::super::setup::Setup;
 
-/// The transmitter or the receiver.
+/// Ground station: the transmitter or the receiver.
 #[derive(Debug)]
 pub(super) struct Station {
     pub(super) end: Side,
@@ -17,7 +17,7 @@ pub(super) struct Station {
 }
 
 impl Station {
-    /// Whether an upload of its is under way.
+    /// Returns true during an upload.
     pub(super) fn is_busy(&self) -> bool {
         matches!(
             self.ground.progress(),
@@ -26,7 +26,7 @@ impl Station {
     }
 }
 
-/// One station for every end that something is uploaded from, and for both where the relays listen: what it measures it says on the air.
+/// Creates the stations that upload or measure; none without keys.
 pub(super) fn stations(setup: &Setup) -> Vec<Station> {
     let Some(proof) = setup.proof(1) else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! The story of a run: what is worth a line in it.
+//! Log of the run.
 
 use uav_relay::Event;
 
@@ -6,7 +6,7 @@ use super::super::outcome::{Moment, Turning};
 use super::state::{Chain, Member};
 
 impl Chain {
-    /// Takes out what relay `index` (from 0) has to tell its firmware.
+    /// Handles all events of relay `index` (from 0) and logs them.
     pub(super) fn listen(&mut self, index: usize) {
         while let Some(member) = self.members.get_mut(index)
             && let Some(event) = member.relay.poll_event()
@@ -35,7 +35,7 @@ impl Chain {
                     (Turning::Converged, None)
                 }
                 Event::Reformed => {
-                    // What Algorithm 2 had come to was another chain's.
+                    // The rounds so far belong to the previous view.
                     self.outcome.rounds.clear();
                     let what = Turning::Reformed {
                         view: member.relay.view().number(),
@@ -62,7 +62,7 @@ impl Chain {
         }
     }
 
-    /// Adds a line about relay `index` (from 0).
+    /// Adds a log entry about relay `index` (from 0).
     pub(super) fn tell(&mut self, index: usize, what: Turning, other: Option<u16>) {
         let Some(member) = self.members.get(index) else {
             return;
@@ -77,7 +77,7 @@ impl Chain {
         });
     }
 
-    /// A partition begins or ends now, or a relay does not hear another one from here on, or hears it again.
+    /// Logs the partitions and one-way failures that begin or end now.
     pub(super) fn tell_of_partitions(&mut self) {
         for deaf in self.setup.deaf.clone() {
             let by = usize::from(deaf.by).saturating_sub(1);
@@ -90,7 +90,7 @@ impl Chain {
         let relays = self.setup.mission.relays();
         for partition in self.setup.partitions.clone() {
             if !(1..relays).contains(&partition.after) {
-                // That parts nobody.
+                // This partition separates no relays.
                 continue;
             }
             let last = usize::from(partition.after).saturating_sub(1);
@@ -102,14 +102,13 @@ impl Chain {
         }
     }
 
-    /// Passes that all relays together have begun: their leaders, and those that led before them.
     pub(super) fn sweeps(&self) -> u32 {
         self.members.iter().map(Member::begun).sum()
     }
 }
 
 impl Member {
-    /// Passes that it has begun.
+    /// Returns the number of sweeps that this relay has begun over all its starts.
     fn begun(&self) -> u32 {
         self.swept + self.relay.stats().sweeps
     }

@@ -1,4 +1,4 @@
-//! An attacker's frames come in.
+//! Frames of the attacker.
 
 use rand::RngExt;
 use uav_relay::{Duration, Port, Wiring};
@@ -9,11 +9,11 @@ use super::super::queue::Happening;
 use super::recorded::link;
 use super::state::{Chain, Member};
 
-/// How long an attacker that has heard nothing yet waits.
+/// Retry delay of an attacker that has no recorded frame yet.
 const WAIT: Duration = Duration::from_millis(10);
 
 impl Chain {
-    /// Sets up the attacker that `setup` asks for.
+    /// Creates the attacker of the setup and schedules its frames.
     pub(super) fn expect_an_attack(&mut self) {
         let Some(attack) = self.setup.attack else {
             return;
@@ -26,7 +26,7 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// One frame of the attacker's arrives at a living relay; nothing if there is none, or nothing to send again.
+    /// Sends one frame of the attacker to a living relay, or retries later if there is nothing to replay.
     pub(super) fn strike(&mut self, kind: Strike) {
         let now = self.now;
         let Some(mut attacker) = self.attacker.take() else {
@@ -61,7 +61,7 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// From one relay, or from the ground, to a relay that might listen to it.
+    /// Returns a random relay and a possible neighbour or ground station as the sender.
     fn way(&self, attacker: &mut Attacker) -> Way {
         let relays = self.setup.mission.relays();
         let reach = match self.setup.settings.wiring {
@@ -89,7 +89,7 @@ impl Chain {
         }
     }
 
-    /// Relay `to` (from 1), or any other that lives if that one does not; counted from 0.
+    /// Returns the index (from 0) of relay `to` (from 1), or of a random living relay if that one is not alive.
     fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
         let living = |member: &Member| member.killed.is_none();
         let meant = to.and_then(|to| usize::from(to).checked_sub(1));
@@ -103,7 +103,7 @@ impl Chain {
         })
     }
 
-    /// The frame comes in, and what it is taken for is written down.
+    /// Delivers the frame and records how the relay classified it.
     fn hit(&mut self, index: usize, kind: Strike, port: Port, bytes: &[u8]) {
         let Some(member) = self.members.get_mut(index) else {
             return;

@@ -1,23 +1,23 @@
-//! The bytes of an autopilot: what it says, and what it makes of what it hears.
+//! MAVLink frames of a simulated autopilot: encoding and decoding.
 
 use uav_relay::Geodetic;
 use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum};
 use uav_relay::flight::mavlink::table::{self, id};
 
-/// Its number as a vehicle.
+/// MAVLink system ID.
 const SYSTEM: u8 = 1;
 
-/// What an autopilot says.
+/// Message sent by the autopilot.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Says {
     Heartbeat {
         autopilot: u8,
         armed: bool,
         custom_mode: u32,
-        /// `MAV_STATE` 5: it is in its failsafe.
+        /// True for `MAV_STATE` 5 (critical): failsafe.
         is_critical: bool,
     },
-    /// The answer to a TIMESYNC.
+    /// Reply to a TIMESYNC request.
     Sync {
         asked: u64,
     },
@@ -34,7 +34,6 @@ pub(super) enum Says {
 }
 
 impl Says {
-    /// The frame that says it.
     pub(super) fn frame(self, sequence: u8) -> Vec<u8> {
         let mut payload = Vec::new();
         let id = match self {
@@ -45,7 +44,7 @@ impl Says {
                 is_critical,
             } => {
                 payload.extend(custom_mode.to_le_bytes());
-                // A quadrotor; its mode is its own; active, or critical.
+                // Quadrotor; custom mode; active or critical.
                 let status = if is_critical { 5 } else { 4 };
                 payload.extend([2, autopilot, 1 | if armed { 128 } else { 0 }, status, 3]);
                 id::HEARTBEAT
@@ -93,18 +92,18 @@ fn framed(id: u32, payload: &[u8], sequence: u8) -> Vec<u8> {
     frame
 }
 
-/// What an autopilot hears.
+/// Message received by the autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Heard {
-    /// To send a message that often, µs.
+    /// Message interval request, µs.
     Interval { id: u32, interval_us: u64 },
-    /// To fly there.
+    /// Position target.
     Target(Geodetic),
-    /// To send that back.
+    /// TIMESYNC request; the value is returned.
     Sync(u64),
 }
 
-/// What a frame tells an autopilot, if anything.
+/// Decodes a received frame; `None` for messages that the autopilot ignores.
 pub(super) fn heard(frame: &[u8]) -> Option<Heard> {
     let end = frame.len().checked_sub(CHECKSUM)?;
     let header = frame.first_chunk::<HEADER>()?;

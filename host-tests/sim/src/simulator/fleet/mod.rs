@@ -1,11 +1,11 @@
-//! Drones with an autopilot each, which the relay's link talks to in MAVLink.
+//! Drones with simulated autopilots, connected to their relays by MAVLink.
 //!
-//! | file | one idea |
+//! | file | contents |
 //! | --- | --- |
-//! | [`spec`] | how they fly, and what pilots do |
-//! | `frames` | the bytes of an autopilot |
-//! | `pilot` | take-off, handing over, taking over |
-//! | `vehicle` | one drone: its body, its modes, what it says and what it does |
+//! | [`spec`] | flight parameters and pilots' actions |
+//! | `frames` | MAVLink frames of the autopilot |
+//! | `pilot` | take-off, hand-over, takeover |
+//! | `vehicle` | one drone: dynamics, modes and messages |
 
 mod frames;
 mod pilot;

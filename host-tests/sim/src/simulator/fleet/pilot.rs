@@ -1,40 +1,38 @@
-//! What a pilot does: has the drone take off, hands it over, takes it, gives it back.
+//! Pilot of a drone: take-off, hand-over to the relay, takeover.
 
 use uav_relay::Instant;
 
 use super::spec::Takeover;
 use crate::simulator::drones::Point;
 
-/// Drones take off one after the other.
+/// Take-off time of the first drone, and interval between drones.
 const FIRST_S: u64 = 5;
 const NEXT_MS: u64 = 500;
 
-/// So long after the climb a pilot chooses the mode of a companion, and so long after the autopilot was switched off and on.
+/// Delay of the hand-over after the climb, and after a restart of the autopilot.
 const LOOKS_S: u64 = 2;
 const RECOVERS_S: u64 = 10;
 
-/// Who flies.
+/// Flight mode.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Mode {
-    /// The pilot.
+    /// Pilot control.
     Sticks,
-    /// The autopilot by itself: it hovers.
+    /// Hover, controlled by the autopilot alone.
     Hold,
-    /// The relay.
+    /// Control by the relay's setpoint.
     Companion,
 }
 
-/// The pilot of one drone.
 #[derive(Clone, Debug)]
 pub(super) struct Pilot {
     arms_at: Instant,
-    /// When to hand it over, once that is known.
+    /// Time of the next hand-over, once known.
     hands_over_at: Option<Instant>,
     takeovers: Vec<Takeover>,
 }
 
 impl Pilot {
-    /// Of the drone of that index, from 0.
     pub(super) fn new(index: usize, all: &[Takeover]) -> Self {
         let later = u64::try_from(index).unwrap_or(0) * NEXT_MS;
         let own = |takeover: &&Takeover| usize::from(takeover.relay) == index + 1;
@@ -49,22 +47,22 @@ impl Pilot {
         now >= self.arms_at
     }
 
-    /// The drone hovers where it climbed to.
+    /// Handles the end of the climb.
     pub(super) fn is_up(&mut self, now: Instant) {
-        // Not earlier where the autopilot was switched off and on during the climb.
+        // Keep a later hand-over time: the autopilot may have restarted during the climb.
         let looked = now + uav_relay::Duration::from_millis(1_000 * LOOKS_S);
         self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
-    /// The autopilot was switched off and on.
+    /// Handles a restart of the autopilot.
     pub(super) fn has_seen_a_restart(&mut self, now: Instant) {
         self.hands_over_at = Some(now + uav_relay::Duration::from_millis(1_000 * RECOVERS_S));
     }
 
-    /// The mode that the pilot chooses now, if any. A drone that flies, or that another one flies past, is not handed over.
+    /// Returns the mode that the pilot selects now, if any. `may_hand_over` is false while the drone moves or traffic is near.
     pub(super) fn chooses(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
         if self.has_sticks(now) {
-            // It is handed over once more afterwards.
+            // Schedule a hand-over after the takeover.
             self.hands_over_at = Some(now);
             return Some(Mode::Sticks);
         }
@@ -75,13 +73,13 @@ impl Pilot {
         None
     }
 
-    /// Place to which the pilot who has the sticks flies it, if that is any.
+    /// Returns the position to which the pilot flies the drone during a takeover, if any.
     pub(super) fn flies_to(&self, now: Instant) -> Option<Point> {
         let during = |it: &&Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
         self.takeovers.iter().find(during)?.to
     }
 
-    /// The autopilot has refused the mode.
+    /// Schedules another attempt after the autopilot rejected the mode.
     pub(super) fn tries_again(&mut self, now: Instant) {
         self.hands_over_at = Some(now + uav_relay::Duration::from_millis(1_000 * LOOKS_S));
     }

@@ -1,4 +1,4 @@
-//! How drones with autopilots fly, and what their pilots do.
+//! Flight parameters of drones with autopilots, and pilots' actions.
 
 use uav_relay::Geodetic;
 use uav_relay::Instant;
@@ -7,40 +7,40 @@ use uav_relay::flight::axis::Axis;
 
 use crate::simulator::drones::Point;
 
-/// The pilot of a drone has the sticks for a time.
+/// Takeover of a drone by its pilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Takeover {
-    /// Whose, from 1.
+    /// Relay number of the drone, from 1.
     pub relay: u16,
-    /// From when on.
+    /// Start time.
     pub from: Instant,
-    /// When the pilot gives it back, if that is ever: from then on once it hovers and no other drone flies past.
+    /// End time, if any: the pilot then hands the drone over once it hovers without traffic.
     pub until: Option<Instant>,
-    /// Place that the pilot flies it to, m along the line of the run, to its right and up; `None` to climb where it is.
+    /// Position to which the pilot flies, m along the run's line, to its right and up; `None` to climb in place.
     pub to: Option<Point>,
 }
 
-/// All drones of a run.
+/// Parameters of all drones of a run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FleetSpec {
-    /// The line on earth that they fly along.
+    /// Line on earth along which they fly.
     pub axis: Axis,
-    /// Place in the air at which each is handed over first, m along the line, to its right and up. It takes off below it.
+    /// Position of each drone's first hand-over, m along the line, to its right and up; it takes off below.
     pub start: Vec<Point>,
-    /// Pilots who take over.
+    /// Takeovers by pilots.
     pub takeovers: Vec<Takeover>,
-    /// Autopilots that are switched off and on in the air: whose, from 1, and when.
+    /// Restarts of autopilots in the air: relay number from 1, and time.
     pub restarts: Vec<(u16, Instant)>,
-    /// How much gusts move a drone, m/s (standard deviation).
+    /// Standard deviation of the gusts, m/s.
     pub gust_mps: f64,
-    /// A drone takes itself to be so far off where it is at most, along each axis and for the whole run, m.
+    /// Bound on each drone's constant position error per axis, m.
     pub bias_m: f64,
-    /// It says so far off where it takes itself to be at most, along each axis and each time anew, m.
+    /// Bound on the additional error of each position report per axis, m.
     pub noise_m: f64,
 }
 
 impl FleetSpec {
-    /// Of every other drone PX4 is the autopilot.
+    /// Returns PX4 and ArduCopter for alternate drones.
     pub(super) const fn kind(index: usize) -> Kind {
         if index.is_multiple_of(2) {
             Kind::Px4
@@ -50,8 +50,7 @@ impl FleetSpec {
     }
 }
 
-/// A line of that length somewhere on earth, for a scenario that does not say where it is: eastward from 47.4 N, 8.54 E; `None` for a
-/// length that no line may have.
+/// Returns a line of the given length eastward from 47.4 N, 8.54 E, for scenarios without sites; `None` for an invalid length.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
     const TX: [f64; 2] = [47.4, 8.54];
     let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;
@@ -59,7 +58,7 @@ pub fn somewhere(distance_m: f64) -> Option<Axis> {
         let rx = Geodetic::from_degrees(TX[0], TX[1] + east_deg, 420.0)?;
         Axis::try_new(tx, rx).ok()
     };
-    // A degree is some 75 km there; two steps come as near as its units allow.
+    // A degree of longitude is about 75 km there; two iterations reach the resolution of the coordinates.
     let mut east_deg = distance_m / 75_000.0;
     for _ in 0..3 {
         east_deg *= distance_m / line(east_deg)?.distance_m();

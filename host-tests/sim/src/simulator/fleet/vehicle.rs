@@ -1,4 +1,4 @@
-//! One drone: its body, its modes, what it says and what it does.
+//! One drone with its autopilot: dynamics, modes and messages.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,36 +13,35 @@ use super::pilot::{Mode, Pilot};
 use super::spec::FleetSpec;
 use crate::simulator::drones::{Body, Point, placement, point, sum};
 
-/// Streams of random numbers begin here: one for each drone.
+/// First random-number stream of the drones, one per drone.
 const DRONES: u64 = 1_000;
 
-/// How fast it flies and climbs, m/s and m/s².
+/// Speed and climb rate, m/s, and acceleration, m/s².
 const SPEED_MPS: f64 = 10.0;
 const CLIMB_MPS: f64 = 2.0;
 const ACCELERATION_MPS2: f64 = 3.0;
 
-/// A PX4 that hears no target for so long leaves its mode, and hovers (COM_OBL_RC_ACT 5).
+/// Target timeout after which a PX4 leaves OFFBOARD and hovers (COM_OBL_RC_ACT 5).
 const LOST: Duration = Duration::from_millis(1_000);
 
-/// It resumes its mode by itself once it has heard targets again for so long.
+/// Time of streamed targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
 const RESUMES: Duration = Duration::from_millis(1_200);
 
-/// An autopilot that is switched off and on is away for so long.
+/// Duration of an autopilot's restart.
 const AWAY: Duration = Duration::from_millis(3_000);
 
-/// The link has heard of another mode or state after so long: it is said once a second.
+/// Time within which the link learns of a new mode or state, reported once a second.
 const TOLD_WITHIN: Duration = Duration::from_millis(1_500);
 
-/// How high a pilot who takes over climbs, m: away from the chain.
+/// Climb of a pilot who takes over, away from the chain, m.
 const ASIDE_M: f64 = 15.0;
 
-/// `MAV_LANDED_STATE`.
+/// Values of `MAV_LANDED_STATE`.
 const ON_GROUND: u8 = 1;
 const IN_AIR: u8 = 2;
 const TAKING_OFF: u8 = 3;
 const LANDING: u8 = 4;
 
-/// A message that is sent again and again.
 #[derive(Clone, Copy, Debug)]
 struct Rate {
     id: u32,
@@ -50,13 +49,13 @@ struct Rate {
     due: Instant,
 }
 
-/// A drone, its autopilot, and the relay's link to it.
+/// Drone, its autopilot, and the relay's link to it.
 #[derive(Debug)]
 pub(in crate::simulator) struct Vehicle {
     kind: Kind,
     spec: FleetSpec,
     pub(in crate::simulator) link: Autopilot,
-    /// Between which its relay flies, if that is not the line of this run.
+    /// Sites of the relay's mission if they differ from the run's line.
     sites: Option<Sites>,
     pilot: Pilot,
     body: Body,
@@ -65,28 +64,28 @@ pub(in crate::simulator) struct Vehicle {
     armed: bool,
     landed: u8,
     mode: Mode,
-    /// Where it hovers, or flies to.
+    /// Current target of the autopilot: where it hovers or flies to.
     goal: Point,
-    /// Height at which it is handed over first, m.
+    /// Height of the first hand-over, m.
     climbs_to_m: f64,
-    /// True while no other drone flies past it, as its pilot sees.
+    /// True while the pilot sees no other drone near.
     pub(in crate::simulator) is_clear: bool,
     told_at: Option<Instant>,
-    /// A PX4 is in its failsafe; it resumes its mode by itself where it is streamed targets again.
+    /// True while a PX4 is in its failsafe; it resumes OFFBOARD when targets are streamed again.
     is_failing: bool,
     streamed_since: Instant,
     began: Instant,
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Until then the link may not know yet that nothing may be sent.
+    /// Grace period in which the link may not know yet that it must not send targets.
     unknown_until: Instant,
     pub(in crate::simulator) strays: u64,
     rng: ChaCha8Rng,
 }
 
 impl Vehicle {
-    /// The drone of that index, from 0, on the ground.
+    /// Drone `index` (from 0) on the ground.
     pub(in crate::simulator) fn new(spec: &FleetSpec, index: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(DRONES + u64::try_from(index).unwrap_or(0));
@@ -121,7 +120,7 @@ impl Vehicle {
         }
     }
 
-    /// What it sends unasked: that it is there.
+    /// Returns the initial message rates: heartbeats only.
     fn rates(now: Instant) -> [Rate; 4] {
         let often = Some(Duration::from_millis(1_000));
         [
@@ -137,7 +136,7 @@ impl Vehicle {
         })
     }
 
-    /// Its relay flies between `sites` from now on; `None` for the ends of the line of this run.
+    /// Follows the relay's mission to new `sites`; `None` for the run's own line.
     pub(in crate::simulator) fn follow(&mut self, now: Instant, sites: Option<Sites>) {
         if self.sites != sites {
             self.sites = sites;
@@ -145,13 +144,13 @@ impl Vehicle {
         }
     }
 
-    /// The line that the relay's places are along.
+    /// Returns the line of the relay's placements.
     fn line(&self) -> Axis {
         let moved = self.sites.and_then(|sites| Axis::between(sites).ok());
         moved.unwrap_or(self.spec.axis)
     }
 
-    /// Where it is, along the line of its relay.
+    /// Returns the drone's position along its relay's line.
     pub(in crate::simulator) fn along(&self) -> Point {
         if self.sites.is_none() {
             return self.body.at;
@@ -161,43 +160,41 @@ impl Vehicle {
         along.map_or([f64::NAN; 3], point)
     }
 
-    /// Where a place of the relay is, along the line of this run.
+    /// Converts a placement of the relay to the run's line.
     pub(in crate::simulator) fn there(&self, place: Placement) -> Option<Point> {
         let on_earth = self.line().point(place)?;
         self.spec.axis.place(on_earth).map(point)
     }
 
-    /// Where it is.
     pub(in crate::simulator) const fn at(&self) -> Point {
         self.body.at
     }
 
-    /// Returns true while it moves.
+    /// Returns true while the drone moves at more than 0.5 m/s along an axis.
     pub(in crate::simulator) fn moves(&self) -> bool {
         self.body.velocity_mps.iter().any(|v| v.abs() > 0.5)
     }
 
-    /// Whether it is in the air.
     pub(in crate::simulator) const fn flies(&self) -> bool {
         self.landed != ON_GROUND
     }
 
-    /// Whether the relay is to fly it: its pilot has not taken it.
+    /// Returns true unless the pilot has taken over.
     pub(in crate::simulator) fn is_lent(&self, now: Instant) -> bool {
         !self.pilot.has_sticks(now)
     }
 
-    /// Whether it is in the air, and neither taking off nor in its pilot's hands.
+    /// Returns true if the drone is in the air and neither taking off, landing nor flown by its pilot.
     pub(in crate::simulator) fn is_in_its_hands(&self, now: Instant) -> bool {
         self.landed == IN_AIR && self.mode != Mode::Sticks && self.is_lent(now)
     }
 
-    /// Its autopilot is switched off, and comes back.
+    /// Restarts the autopilot; it is silent for [`AWAY`].
     pub(in crate::simulator) fn restart(&mut self, now: Instant) {
         self.away_until = Some(now + AWAY);
         self.mode = Mode::Hold;
         self.is_failing = false;
-        // A climb is finished: nobody would hand over a drone that stopped on its way up.
+        // A climb continues: no pilot would hand over a drone that stopped on the way up.
         if self.landed == IN_AIR {
             self.goal = self.taken();
         }
@@ -205,14 +202,13 @@ impl Vehicle {
         self.pilot.has_seen_a_restart(now);
     }
 
-    /// Its relay is switched on again, and with it the link, which knows nothing of before.
+    /// Reboots the relay's link, which loses its state.
     pub(in crate::simulator) fn boot(&mut self, now: Instant) {
         self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
         self.sites = None;
         self.pilot.has_seen_a_restart(now);
     }
 
-    /// Its pilot lands it, where it is.
     pub(in crate::simulator) fn land(&mut self) {
         if self.landed == IN_AIR {
             self.landed = LANDING;
@@ -222,7 +218,7 @@ impl Vehicle {
         }
     }
 
-    /// Flies on until `now`, for `step_s` seconds; then its relay's link hears what it has to say.
+    /// Advances by `step_s` seconds to `now` and delivers the due messages to the relay's link.
     pub(in crate::simulator) fn go_on(&mut self, now: Instant, step_s: f64) {
         self.choose(now);
         self.fly(step_s);
@@ -250,7 +246,7 @@ impl Vehicle {
         }
     }
 
-    /// The choices of this step; the link hears of them within a second or so.
+    /// Updates the mode and, on a change, starts the grace period of the link.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);
@@ -259,7 +255,7 @@ impl Vehicle {
         }
     }
 
-    /// Whether a target may come now: a PX4 hears one in any mode while it flies.
+    /// Returns true if targets are allowed now: a PX4 in flight accepts them in any mode.
     fn may_be_told(&self) -> bool {
         match self.landed {
             IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
@@ -267,7 +263,6 @@ impl Vehicle {
         }
     }
 
-    /// The pilot's choices, and the autopilot's own.
     fn decide(&mut self, now: Instant) {
         if !self.armed && self.pilot.has_armed(now) {
             self.armed = true;
@@ -292,10 +287,10 @@ impl Vehicle {
             && (mode != self.mode || mode == Mode::Companion)
         {
             let refuses = self.kind == Kind::Px4 && (!streamed || self.is_failing);
-            // A failsafe is ended by a mode of the pilot's own; then OFFBOARD is tried again.
+            // A mode selected by the pilot ends the failsafe; OFFBOARD is tried again afterwards.
             self.is_failing = false;
             if mode == self.mode {
-                // The autopilot was in it all along, and the link that was started meanwhile has seen no other.
+                // The mode was selected before the link started: change it once so that the link sees the pilot's choice.
                 self.mode = Mode::Hold;
                 self.goal = self.taken();
                 self.pilot.tries_again(now);
@@ -335,7 +330,7 @@ impl Vehicle {
         };
         let to = sum(self.goal, self.bias.map(|part| -part));
         self.body.fly(to, speed, ACCELERATION_MPS2, step_s);
-        // Gusts come and go within some two seconds.
+        // Gusts have a correlation time of about 2 s.
         let keeps = (-step_s / 2.0).exp();
         let drawn = self.spec.gust_mps * (3.0 * (1.0 - keeps * keeps)).sqrt();
         for (gust, at) in self.gust.iter_mut().zip(&mut self.body.at) {
@@ -344,7 +339,7 @@ impl Vehicle {
         }
     }
 
-    /// Where it takes itself to be.
+    /// Returns the drone's own position estimate: the true position plus the bias.
     fn taken(&self) -> Point {
         sum(self.body.at, self.bias)
     }
@@ -389,7 +384,7 @@ impl Vehicle {
         }
     }
 
-    /// The relay's link says something.
+    /// Handles a MAVLink frame from the relay's link.
     pub(in crate::simulator) fn hear(&mut self, now: Instant, frame: &[u8]) {
         if self.away_until.is_some() {
             return;

@@ -1,20 +1,20 @@
-//! What has happened on the air.
+//! Counters of the shared channel.
 
 use serde::Serialize;
 
 /// Counters of a channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct AirCounts {
-    /// Frames that were sent.
+    /// Frames sent.
     pub sent: u64,
-    /// Receptions that were lost because frames overlapped.
+    /// Receptions lost because frames overlapped.
     pub collided: u64,
-    /// Receptions that were lost because the node was sending itself.
+    /// Receptions lost because the receiving node was sending.
     pub unheard: u64,
-    /// Times that a node found the channel busy and waited.
+    /// Back-offs because of a busy channel.
     pub deferred: u64,
-    /// Frames that found the queue of their radio full.
+    /// Frames dropped because the radio's queue was full.
     pub dropped: u64,
-    /// How long all frames together were on the air, µs.
+    /// Total time of all frames on the air, µs.
     pub air_time_us: u64,
 }

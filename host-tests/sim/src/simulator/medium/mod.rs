@@ -1,7 +1,7 @@
-//! One half-duplex radio channel: a frame takes its time on the air, who sends does not hear, and frames that overlap where both are
-//! heard are lost there.
+//! Half-duplex radio channel: senders receive nothing, and overlapping frames are lost.
 //!
-//! A medium has no clock of its own: each call says what is due when (an [`Agenda`]), and its user calls [`Medium::happen`] then.
+//! Frames that overlap are lost at the nodes that are in range of both senders. The medium has no clock: each call appends its
+//! future events to an [`Agenda`], and the caller passes them to [`Medium::happen`] when due.
 
 pub mod access;
 mod counts;
@@ -16,43 +16,42 @@ pub use access::Access;
 pub use counts::AirCounts;
 use radio::{Radio, State};
 
-/// Something that is due at a node.
+/// Event of a node's radio.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AirEvent {
-    /// It has waited and listens whether the channel is free.
+    /// End of the back-off: the radio senses the channel.
     Sense(usize),
-    /// Its frame begins.
+    /// Start of a transmission.
     Begin(usize),
-    /// Its frame ends.
+    /// End of a transmission.
     End(usize),
 }
 
-/// What is due when.
+/// Scheduled events and their times.
 pub type Agenda = Vec<(Instant, AirEvent)>;
 
-/// A frame that is over.
+/// Completed transmission.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Sent {
-    /// Who has sent it.
+    /// Sending node.
     pub from: usize,
-    /// The frame.
+    /// Bytes of the frame.
     pub frame: Vec<u8>,
-    /// The nodes that it has reached unharmed.
+    /// Nodes that received the frame intact.
     pub heard_by: Vec<usize>,
-    /// How many in range it has not reached.
+    /// Number of nodes in range that did not receive it.
     pub missed: usize,
 }
 
-/// What becomes of a frame at one node.
+/// Reception of a frame at one node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Fate {
     Clean,
     Collided,
-    /// The node was sending itself.
+    /// Lost because the node itself was sending.
     Unheard,
 }
 
-/// A frame on the air.
 #[derive(Debug)]
 struct OnAir {
     from: usize,
@@ -61,23 +60,23 @@ struct OnAir {
     hearers: Vec<(usize, Fate)>,
 }
 
-/// The channel, and a radio for every node.
+/// Channel with a radio for every node.
 #[derive(Debug)]
 pub struct Medium {
     access: Access,
     link: LinkSpec,
     radios: Vec<Radio>,
     on_air: Vec<OnAir>,
-    /// Its own: what it draws changes nothing in what others draw.
+    /// Separate generator, so that back-offs do not change other draws.
     rng: ChaCha8Rng,
     counts: AirCounts,
 }
 
-/// The stream of random numbers that back-offs are drawn from.
+/// Random-number stream of the back-offs.
 const BACKOFFS: u64 = 3;
 
 impl Medium {
-    /// A quiet channel of the data rate of `link` with `nodes` radios. [`Access::Ideal`] is no channel: it is treated as ALOHA.
+    /// Free channel with the data rate of `link` and `nodes` radios. [`Access::Ideal`] is treated as ALOHA.
     pub fn new(access: Access, link: LinkSpec, nodes: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(BACKOFFS);
@@ -91,17 +90,17 @@ impl Medium {
         }
     }
 
-    /// What has happened so far.
+    /// Returns the counters.
     pub fn counts(&self) -> AirCounts {
         self.counts
     }
 
-    /// How long a frame of `bytes` bytes is on the air.
+    /// Returns the time on the air of a frame of `bytes` bytes.
     pub fn air_time(&self, bytes: usize) -> Duration {
         self.link.line_time(access::HEADER + bytes)
     }
 
-    /// Hands a frame to the radio of `node`; whether there was room for it.
+    /// Queues a frame at the radio of `node`. Returns false if the queue is full.
     pub fn offer(&mut self, now: Instant, node: usize, frame: &[u8], agenda: &mut Agenda) -> bool {
         let Some(radio) = self.radios.get_mut(node) else {
             return false;
@@ -117,7 +116,7 @@ impl Medium {
         true
     }
 
-    /// Something is due; a frame that is over with it. `hearers` tells who is in range of a node that begins to send.
+    /// Processes a due event. Returns the frame whose transmission it ends; `hearers` returns the nodes in range of a sender.
     pub fn happen(
         &mut self,
         now: Instant,
@@ -133,7 +132,7 @@ impl Medium {
         None
     }
 
-    /// The radio of `node` is switched off: what it holds is gone, what it sends is cut short.
+    /// Switches off the radio of `node`: its queue is lost, and its current transmission is cut short.
     pub fn switch_off(&mut self, node: usize) {
         if let Some(radio) = self.radios.get_mut(node) {
             radio.queue.clear();
@@ -148,7 +147,7 @@ impl Medium {
         }
     }
 
-    /// The radio of `node` is free for the next frame, if it has one.
+    /// Starts the next frame of `node`, if any.
     fn next(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let Some(radio) = self.radios.get_mut(node) else {
             return;
@@ -174,7 +173,6 @@ impl Medium {
         }
     }
 
-    /// Listens whether somebody sends whom `node` hears.
     fn sense(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let Some(State::Waiting { until, exponent }) = self.radios.get(node).map(|it| it.state)
         else {
@@ -192,7 +190,7 @@ impl Medium {
         }
     }
 
-    /// Turns from receiving to sending: what the node was receiving is lost to it.
+    /// Turns from receiving to sending; frames that the node was receiving are lost there.
     fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let until = now + self.link.line_time(access::TURNAROUND);
         if let Some(radio) = self.radios.get_mut(node) {
@@ -267,12 +265,12 @@ impl Medium {
 }
 
 impl OnAir {
-    /// Whether `node` hears it now: a frame that ends at this moment is in nobody's way.
+    /// Returns true if `node` is in range and the frame has not ended; a frame ending now does not interfere.
     fn is_heard(&self, node: usize, now: Instant) -> bool {
         self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
     }
 
-    /// It is lost to `node`, if it was not before.
+    /// Marks the frame as lost at `node`, unless it already was.
     fn spoil(&mut self, node: usize, now: Instant, how: Fate) {
         if self.ends <= now {
             return;

@@ -1,5 +1,6 @@
-//! `cargo ci`: everything that must pass, one step after the other; the last line says what did not.
+//! `cargo ci`: everything that must pass, one step after the other; the last lines name what failed, with its output.
 
+mod evidence;
 mod prepare;
 mod steps;
 
@@ -8,7 +9,7 @@ use std::time::Instant;
 
 use clap::Parser;
 
-/// Runs everything that must pass, one step after the other; the last line says what did not.
+/// Runs everything that must pass, one step after the other; the last lines name what failed, with its output.
 #[derive(Parser)]
 #[command(name = "cargo ci")]
 struct Options {
@@ -42,15 +43,15 @@ fn main() -> ExitCode {
             step.command
         );
         let begun = Instant::now();
-        let passed = step.run();
+        let result = step.run();
         println!(
             "== {} {} in {} s",
             step.name,
-            if passed { "passed" } else { "FAILED" },
+            if result.is_ok() { "passed" } else { "FAILED" },
             begun.elapsed().as_secs()
         );
-        if !passed {
-            failed.push(&*step.name);
+        if let Err(evidence) = result {
+            failed.push((&*step.name, evidence));
         }
     }
     let (all, seconds) = (steps.len(), started.elapsed().as_secs());
@@ -58,10 +59,14 @@ fn main() -> ExitCode {
         println!("\nci: all {all} steps passed in {seconds} s");
         ExitCode::SUCCESS
     } else {
+        for (name, evidence) in &failed {
+            println!("\n== {name} failed:\n{evidence}");
+        }
+        let names: Vec<&str> = failed.iter().map(|&(name, _)| name).collect();
         println!(
             "\nci: {} of {all} steps failed: {} ({seconds} s)",
             failed.len(),
-            failed.join("; ")
+            names.join("; ")
         );
         ExitCode::FAILURE
     }

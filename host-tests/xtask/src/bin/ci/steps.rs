@@ -1,8 +1,11 @@
 //! The steps, in order.
 
-use std::process::Command;
+use std::io::BufReader;
+use std::process::{Command, Stdio};
 
 use uav_relay_xtask::FUZZ_TARGETS;
+
+use super::evidence::Evidence;
 
 /// The target the firmware is built for.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
@@ -65,13 +68,29 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
 }
 
 impl Step {
-    pub(crate) fn run(&self) -> bool {
+    /// Runs the command and passes its output on. `Err` holds the output that tells why it failed.
+    pub(crate) fn run(&self) -> Result<(), Evidence> {
         let mut words = self.command.split_whitespace();
-        let status = Command::new(words.next().unwrap_or("cargo"))
+        let child = Command::new(words.next().unwrap_or("cargo"))
             .args(words)
             .envs(self.environment.iter().copied())
-            .status();
-        status.is_ok_and(|status| status.success())
+            .stdout(Stdio::piped())
+            .spawn();
+        let mut evidence = Evidence::default();
+        let passed = child.and_then(|mut child| {
+            if let Some(output) = child.stdout.take() {
+                evidence.read(BufReader::new(output))?;
+            }
+            child.wait()
+        });
+        match passed {
+            Ok(status) if status.success() => Ok(()),
+            Ok(_) => Err(evidence),
+            Err(error) => {
+                evidence.add(&format!("{}: {error}", self.command));
+                Err(evidence)
+            }
+        }
     }
 }
 
