@@ -1,13 +1,11 @@
 //! Interference-blind baseline: the chain that maximises the weakest received signal.
 //!
 //! The received power of a hop is p_t / (eta (d^2 + h^2)) from Tx, p_u / (mu_LoS d^2) between relays and p_u / (eta (d^2 + h^2))
-//! to
-//! Rx. It falls with the hop length, so the best chain has the hop lengths at which all received powers are equal and the hops
+//! to Rx. It falls with the hop length, so the best chain has the hop lengths at which all received powers are equal and the hops
 //! just span the distance. With one relay this maximises min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}.
 //!
 //! The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
-//! equally
-//! good; the one that shortens every hop in the same proportion is used.
+//! equally good; the one that shortens every hop in the same proportion is used.
 
 use uav_relay_scenario::scene::{Relay, Scene};
 

@@ -1,8 +1,7 @@
 //! Local search that improves any chain against the true sum, one relay at a time.
 //!
 //! Moving a relay changes two hops: the one that it receives and the one that it sends. The relay moves, between its neighbours,
-//! to
-//! maximise the worse of the two; passes along the chain and back spread the gain. The search improves an approximate
+//! to maximise the worse of the two; passes along the chain and back spread the gain. The search improves an approximate
 //! placement but can not move the chain to the other side of an interferer.
 
 use super::altitude::golden;
@@ -53,8 +52,8 @@ struct Turn<'a> {
 ///
 /// Order and least separation are kept if the start has them; a relay with a fixed altitude moves along x and sideways only. At
 /// most 200 rounds, fewer when three in a row gain less than a millionth each. A round is 2 N moves, a move about 50 SIRs at one
-/// altitude, 2 400 in a band and as many again with lateral room. `None` unless the start has one position per relay and at
-/// least one relay.
+/// altitude, 2 400 in a band and as many again with lateral room. `None` unless the start has one position per relay and at least
+/// one relay.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],

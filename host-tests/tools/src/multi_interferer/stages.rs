@@ -2,9 +2,9 @@
 //!
 //! For a receiver at y the SIR of a hop depends only on its length, so the sender may be anywhere in [y - d(y), y - s]: d(y) the
 //! hop range at the target, s the least separation. Backwards from Rx, the feasible positions of relay k are the union of these
-//! intervals over those of relay k + 1. Over an interval of y with d(y) >= s this union is again an interval, from
-//! the least y - d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets,
-//! so the best target can be bisected.
+//! intervals over those of relay k + 1. Over an interval of y with d(y) >= s this union is again an interval, from the least y -
+//! d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
+//! target can be bisected.
 
 use super::crossing::boundary;
 use super::line::{Line, Stride};
