@@ -58,7 +58,7 @@ pub struct Look {
 /// Which points of a line have a sign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signs {
-    /// No point.
+    /// Draws no signs.
     None,
     /// Every point.
     All,
@@ -69,7 +69,7 @@ pub enum Signs {
 /// Stroke between points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Stroke {
-    /// No stroke.
+    /// Draws only the signs.
     None,
     /// Solid line.
     Full,

@@ -14,7 +14,7 @@ pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 /// The paper's step of the target SIR, linear.
 pub const STEP: f64 = 0.1;
 
-/// One sweep of one chain.
+/// SIR of a chain after one sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Number of relays.

@@ -36,7 +36,7 @@ pub enum Kind {
     Even,
 }
 
-/// One sweep of one chain.
+/// Expected SIR of a chain after one sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Kind of field.

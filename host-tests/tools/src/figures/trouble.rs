@@ -16,7 +16,7 @@ pub enum Trouble {
     Mission(Refusal),
     /// A relay rejects its settings.
     Setup(SetupError),
-    /// No target is met, or the simulated chain has not settled.
+    /// The target can not be met, or the simulated chain has not settled.
     Unsettled(&'static str),
     /// The chart could not be drawn.
     Drawing(NotDrawn),
