@@ -1,8 +1,8 @@
-//! A reader that has gone is no reason to fail otherwise than the command would.
+//! A closed output pipe does not change the exit status.
 
 use std::process::{Command, Stdio};
 
-/// The exit status with standard output and standard error that nobody reads.
+/// Returns the exit status with standard output and standard error closed by the reader.
 fn unheard(tool: &str, arguments: &[&str]) -> Option<i32> {
     let pipe = || {
         let (reader, writer) = std::io::pipe().unwrap();

@@ -75,7 +75,7 @@ fn along(text: &str) -> Result<f64, String> {
 pub(crate) enum Altitude {
     /// Altitudes of the scenario
     Given,
-    /// Any altitude in the scenario's band, and any place beside the line within its limits
+    /// Free within the scenario's band, and beside the line within its limits
     Free,
 }
 
