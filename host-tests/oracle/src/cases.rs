@@ -158,7 +158,7 @@ impl Case {
     }
 }
 
-/// Reads a JSON number, or a word for a value that JSON can not represent.
+/// Reads a JSON number, or a word for a value that JSON cannot represent.
 fn number(value: &Value) -> Option<f64> {
     match value.as_str() {
         Some("nan") => Some(f64::NAN),

@@ -1,6 +1,6 @@
 //! Table of all keys of a scenario file and their allowed values.
 //!
-//! The checks and the error messages both use it, so they can not disagree.
+//! The checks and the error messages both use it, so they cannot disagree.
 
 use core::fmt;
 

@@ -50,7 +50,7 @@ impl Scenario {
     /// Reads a scenario file of at most 1 MiB.
     ///
     /// # Errors
-    /// A file that can not be read as text, or any of the mistakes of [`Scenario::parse`].
+    /// A file that cannot be read as text, or any of the mistakes of [`Scenario::parse`].
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
         let text = read::text_of(path)?;
         Self::parse(&path.display().to_string(), &text)

@@ -16,7 +16,7 @@ use crate::{Interference, Scenario, Source};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The scenario's interferers can not be replaced by a hypothetical one.
+    /// The scenario's interferers cannot be replaced by a hypothetical one.
     NoHypothetical,
     /// The relays do not fit on the distance with their least separation.
     NoRoom {
@@ -63,7 +63,7 @@ impl std::error::Error for Refusal {}
 /// Returns the mission of `uavs` relays, with one interferer in place of several, and the relays' own profiles (index from 1).
 ///
 /// # Errors
-/// [`Refusal`] for missions that can not be flown, and for parameters that relays reject.
+/// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
 pub fn mission(
     scenario: &Scenario,
     uavs: u16,

@@ -2,7 +2,7 @@
 //!
 //! The crate solves a quadratic for the reach of a node. Here the SIR of a hop is computed from received powers, and derived
 //! quantities (how far a node may be, the best target of a chain) are found by bisecting that function. A mistake in the crate's
-//! algebra therefore can not repeat itself here.
+//! algebra therefore cannot repeat itself here.
 //!
 //! The only analysis used is the *number* of turning points. With d >= 0 the distance beyond the sender, a hop's SIR is a
 //! quotient of two quadratics with equal leading coefficients, so its derivative has the sign of a quadratic in d, and the

@@ -39,7 +39,7 @@ impl Table {
     /// Creates the table of `rows`; the head has the names of their fields.
     ///
     /// # Errors
-    /// [`Trouble::Table`] if a row can not be serialised, [`Trouble::NotFinite`] if a number is not finite.
+    /// [`Trouble::Table`] if a row cannot be serialised, [`Trouble::NotFinite`] if a number is not finite.
     pub fn new<R: Serialize>(
         name: &'static str,
         rows: impl IntoIterator<Item = R>,

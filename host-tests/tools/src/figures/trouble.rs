@@ -16,7 +16,7 @@ pub enum Trouble {
     Mission(Refusal),
     /// A relay rejects its settings.
     Setup(SetupError),
-    /// The target can not be met, or the simulated chain has not settled.
+    /// The target cannot be met, or the simulated chain has not settled.
     Unsettled(&'static str),
     /// The chart could not be drawn.
     Drawing(NotDrawn),

@@ -19,7 +19,7 @@ pub struct Chain {
     pub sir: f64,
 }
 
-/// Returns the chain with every hop as long as `target` (linear, > 0) allows; `None` if a hop can not meet it.
+/// Returns the chain with every hop as long as `target` (linear, > 0) allows; `None` if a hop cannot meet it.
 ///
 /// If the target is too high, the chain ends short of its end, with a lower SIR on the last hop. Work: N reaches.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
@@ -67,7 +67,7 @@ pub struct Sweep {
     pub number: u32,
     /// Target SIR of every hop, linear.
     pub target: f32,
-    /// Chain stretched for the target; `None` if a hop can not meet it.
+    /// Chain stretched for the target; `None` if a hop cannot meet it.
     pub chain: Option<Chain>,
 }
 

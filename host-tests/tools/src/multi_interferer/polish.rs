@@ -2,7 +2,7 @@
 //!
 //! Moving a relay changes two hops: the one that it receives and the one that it sends. The relay moves, between its neighbours,
 //! to maximise the worse of the two; passes along the chain and back spread the gain. The search improves an approximate
-//! placement but can not move the chain to the other side of an interferer.
+//! placement but cannot move the chain to the other side of an interferer.
 
 use super::altitude::golden;
 use uav_relay_scenario::scene::Corridor;

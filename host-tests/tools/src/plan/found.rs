@@ -53,12 +53,12 @@ pub struct Plan {
     pub fitted: Option<Fitted>,
 }
 
-/// Why the request can not be met.
+/// Why the request cannot be met.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Why {
     /// An explanation.
     Plain(String),
-    /// The target can not be met by any number of relays.
+    /// The target cannot be met by any number of relays.
     Short {
         /// Requested SIR, linear.
         target: f64,
@@ -104,7 +104,7 @@ impl Default for Why {
 pub enum NoPlan {
     /// The scenario is not a valid mission, or the request does not fit it.
     Wrong(String),
-    /// The request can not be met; with the best SIR found (linear).
+    /// The request cannot be met; with the best SIR found (linear).
     Unmet(Why, Option<f64>),
 }
 

@@ -134,7 +134,7 @@ pub struct PlanReport {
     /// Error message, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best SIR found (linear) if the request can not be met.
+    /// Best SIR found (linear) if the request cannot be met.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// `best_sir` in dB, if above 0.
@@ -255,7 +255,7 @@ impl PlanReport {
         }
     }
 
-    /// Creates the report of a request that can not be met: the reason and the best SIR found (linear).
+    /// Creates the report of a request that cannot be met: the reason and the best SIR found (linear).
     pub fn unmet(why: &Why, best_sir: Option<f64>, number: Number, unit: Unit) -> Self {
         let (uavs, target_sir) = match number {
             Number::Of(relays) => (Some(relays), None),

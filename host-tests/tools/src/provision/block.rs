@@ -12,7 +12,7 @@ use super::config::{
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::{AirGround, ChannelSpec, Scenario};
 
-/// Why a block can not be built.
+/// Why a block cannot be built.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BlockError {

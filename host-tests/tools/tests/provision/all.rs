@@ -221,7 +221,7 @@ fn all_or_none_is_written() {
     let line = refusal(&wide);
     assert!(line.contains("a drone has room for 16 points"), "{line}");
     assert!(!dir.exists());
-    // A folder with the name of a block can not be replaced: files renamed before are removed again.
+    // A folder with the name of a block cannot be replaced: files renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
     let line = refusal(&[
         "--uavs",

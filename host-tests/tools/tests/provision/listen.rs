@@ -81,7 +81,7 @@ fn the_ranges_are_those_of_a_relay() {
     }
 }
 
-/// A mission with a field can not locate an interferer, even if a program asks for it.
+/// A mission with a field cannot locate an interferer, even if a program asks for it.
 #[test]
 fn a_field_has_nothing_to_find() {
     let mut scenario = super::in_a_field(3);

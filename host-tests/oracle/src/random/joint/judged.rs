@@ -26,7 +26,7 @@ pub fn numbered(number: u32) -> Scenario {
 /// Returns the optimum SIR (linear) of each scenario, by number; 0 if no chain is possible.
 ///
 /// # Errors
-/// If the file can not be read, or a row is not a number and an SIR.
+/// If the file cannot be read, or a row is not a number and an SIR.
 pub fn optima() -> io::Result<Vec<f64>> {
     let mut optima = Vec::new();
     for row in csv::Reader::from_path(PATH)?.deserialize() {

@@ -30,7 +30,7 @@ struct Iterate {
 
 /// Returns the local optimum reached from `start`; `None` if `start` is not strictly feasible.
 ///
-/// Also `None` as soon as the optimum can not exceed `hope`, a ln SIR. `slack` > 0 is the difference of the initial target below
+/// Also `None` as soon as the optimum cannot exceed `hope`, a ln SIR. `slack` > 0 is the difference of the initial target below
 /// the SIR of `start`, and sets the initial barrier: a larger slack forgets more of `start`.
 pub(super) fn polish(
     scene: &Scene,
