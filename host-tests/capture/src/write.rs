@@ -35,7 +35,6 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Returns the lowest two bits of a packet's flags.
     const fn bits(self) -> u32 {
         match self {
             Self::Unknown => 0,
@@ -204,7 +203,6 @@ impl Block {
         self.has_options = true;
     }
 
-    /// Appends an option with a text, unless it is empty.
     fn text(&mut self, code: u16, text: &str) {
         if !text.is_empty() {
             self.option(code, text.as_bytes());

@@ -7,7 +7,6 @@ use std::process::Command;
 /// Default folder of the environment: in the target folder.
 pub(crate) const USUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/compare");
 
-/// Packages with their versions.
 const REQUIREMENTS: &str = include_str!("../rivals/requirements.txt");
 const REQUIREMENTS_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/requirements.txt");
 
@@ -58,11 +57,8 @@ pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Error of an external command.
 enum Trouble {
-    /// The program is missing.
     Missing,
-    /// The command failed, with its last message.
     Failed(String),
 }
 

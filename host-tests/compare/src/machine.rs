@@ -5,17 +5,13 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-/// Machine and date of a run.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Machine {
-    /// Date, UTC.
     pub(crate) date: String,
-    /// Model of the processor.
     pub(crate) processor: String,
 }
 
 impl Machine {
-    /// Returns this machine, today.
     pub(crate) fn this() -> Self {
         Self {
             date: date().unwrap_or_else(|| "an unknown day".to_owned()),
@@ -52,7 +48,6 @@ impl Clock {
         }
     }
 
-    /// Returns the time since the start, s.
     pub(crate) fn elapsed_s(&self) -> f64 {
         let on_cpu_s = on_cpu_s()
             .zip(self.on_cpu_s)

@@ -111,7 +111,6 @@ fn read(file: &Path) -> Result<Results, Failure> {
     results.map_err(|error| Failure::input(format!("--from {}: {error}", file.display())))
 }
 
-/// Solves every problem with every solver, one after the other.
 fn solve(options: &Options) -> Result<Results, Failure> {
     let problems = problem::all();
     // Hidden unless standard error is a terminal.

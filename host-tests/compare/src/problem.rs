@@ -13,18 +13,14 @@ use uav_relay_scenario::{Interference, Scenario};
 pub(crate) enum Choice {
     /// Positions along the line, at a fixed altitude.
     Places,
-    /// Positions and altitudes.
     Altitudes,
-    /// Positions, altitudes and lateral positions.
     Sides,
 }
 
 /// The best placement of a number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(crate) struct Problem {
-    /// Degrees of freedom.
     pub(crate) choice: Choice,
-    /// Number of relays.
     pub(crate) relays: u16,
 }
 
@@ -51,7 +47,6 @@ const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (Choice::Sides, &[(8, 1.543_032_046), (50, 9.002_614_360)]),
 ];
 
-/// Returns the problems in the order of the tables.
 pub(crate) fn all() -> Vec<Problem> {
     let of = |(choice, optima): (Choice, &[(u16, f64)])| {
         let relays = optima.iter().map(|(relays, _)| *relays);

@@ -5,20 +5,15 @@ use serde::{Deserialize, Serialize};
 use crate::machine::Machine;
 use crate::problem::Problem;
 
-/// Results of a run of the command.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Results {
-    /// Machine and date.
     pub(crate) machine: Machine,
-    /// Versions of the other solvers.
     pub(crate) versions: Versions,
     /// Processor time limit of the other solvers per problem, s.
     pub(crate) limit_s: f64,
-    /// The solved problems.
     pub(crate) problems: Vec<Solved>,
 }
 
-/// Versions of Python and its packages.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Versions {
     pub(crate) python: String,
@@ -33,7 +28,6 @@ pub(crate) struct Solved {
     pub(crate) runs: Vec<Run>,
 }
 
-/// Run of one solver on one problem.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Run {
     /// Name of the solver in the table.
@@ -41,13 +35,10 @@ pub(crate) struct Run {
     pub(crate) answer: Answer,
 }
 
-/// Result of a solver.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Answer {
-    /// A chain.
     Found(Found),
-    /// The reason for the failure.
     Error(String),
 }
 
@@ -73,12 +64,10 @@ pub(crate) struct Found {
     pub(crate) cut: bool,
 }
 
-/// An intermediate chain.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Mark {
     /// Processor time since the start, s.
     pub(crate) after_s: f64,
-    /// x, y and h of every relay, m.
     pub(crate) chain: Chain,
 }
 

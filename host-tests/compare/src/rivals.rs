@@ -21,7 +21,6 @@ fn patience(limit_s: f64) -> Duration {
     Duration::from_secs_f64(20.0 * limit_s + 60.0)
 }
 
-/// A solver of the Python process.
 #[derive(Clone, Copy)]
 pub(crate) struct Solver {
     name: &'static str,
@@ -29,7 +28,6 @@ pub(crate) struct Solver {
     pub(crate) title: &'static str,
 }
 
-/// The solvers.
 pub(crate) const SOLVERS: [Solver; 5] = [
     Solver {
         name: "scipy-slsqp-one",
@@ -53,7 +51,6 @@ pub(crate) const SOLVERS: [Solver; 5] = [
     },
 ];
 
-/// The Python process, after warm-up.
 pub(crate) struct Rivals {
     child: Child,
     tasks: ChildStdin,
@@ -105,7 +102,6 @@ impl Rivals {
         Ok(rivals)
     }
 
-    /// Returns the versions that Python reports.
     pub(crate) const fn versions(&self) -> &Versions {
         &self.versions
     }
@@ -160,7 +156,6 @@ impl Drop for Rivals {
     }
 }
 
-/// Returns the problem as JSON.
 fn link(problem: Problem) -> Result<Value, String> {
     let (link, room) = problem.link()?;
     let relay = link.relays.first().ok_or("a problem without relays")?;

@@ -19,7 +19,6 @@ const SIR_SLACK: f64 = 1e-5;
 /// Why a chain does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
-    /// The number of relays is wrong.
     Count(usize),
     /// A relay is not between transmitter and receiver: its index from 1, and x in m.
     Outside(usize, f64),
@@ -90,16 +89,13 @@ pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f
     sir(link, &places).ok_or(count)
 }
 
-/// Rounds the chain to the f32 of setpoints.
 fn rounded(chain: &[[f64; 3]]) -> Vec<[f64; 3]> {
     #[expect(clippy::cast_possible_truncation, reason = "what this is about")]
     let flown = |place: &[f64; 3]| place.map(|value| f64::from(value as f32));
     chain.iter().map(flown).collect()
 }
 
-/// Score of a solver's chain.
 pub(crate) struct Score {
-    /// SIR of the worst hop, linear.
     pub(crate) sir: f64,
     /// SIR of the worst hop with positions rounded to f32 setpoints, linear.
     pub(crate) flown: f64,

@@ -62,7 +62,6 @@ const EXCERPT_HEAD: &str = "\
 | --- | --- | --- | --- | --- | --- |
 ";
 
-/// Returns the tables and the notes.
 pub(crate) fn table(results: &Results) -> Result<String, String> {
     let mut text = String::new();
     for (choice, title) in TITLES {
@@ -82,7 +81,6 @@ pub(crate) fn table(results: &Results) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns the table of RESULTS.md.
 pub(crate) fn excerpt(results: &Results) -> Result<String, String> {
     let mut text = EXCERPT_HEAD.to_owned();
     for (choice, relays, title) in EXCERPT {
@@ -103,7 +101,6 @@ pub(crate) fn excerpt(results: &Results) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns date, machine and versions.
 fn circumstances(results: &Results) -> String {
     let (machine, versions) = (&results.machine, &results.versions);
     format!(
@@ -142,7 +139,6 @@ struct Line {
 /// A solver, with its line or the reason for having none.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
-/// Returns the lines of one problem in the table.
 fn rows(solved: &Solved) -> Result<String, String> {
     let mut text = String::new();
     for (solver, line) in lines(solved)? {
@@ -233,7 +229,6 @@ fn time(time_s: f64, own_s: f64) -> String {
     )
 }
 
-/// Rounds a number above 0 to two digits.
 fn two_digits(value: f64) -> String {
     let size = 10_f64.powf(value.log10().floor() - 1.0);
     let rounded = (value / size).round() * size;

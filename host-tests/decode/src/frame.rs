@@ -50,7 +50,6 @@ pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     frame
 }
 
-/// Removes COBS.
 fn unstuffed(wire: &[u8], len: usize) -> Result<Vec<u8>, Refusal> {
     if wire.len() < len {
         return Err(Refusal::Oversized(len));
@@ -110,7 +109,6 @@ fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
     };
 }
 
-/// Returns the reason why the library rejects the frame.
 fn broken(error: FrameError, plain: &[u8]) -> Refusal {
     match (error, plain.split_last_chunk::<4>()) {
         (FrameError::Crc, Some((checked, check))) => {

@@ -3,7 +3,6 @@
 use crate::format::{Field, Kind};
 use crate::value::{Fields, Value};
 
-/// Remaining bytes of a body.
 struct Rest<'b>(&'b [u8]);
 
 impl Rest<'_> {

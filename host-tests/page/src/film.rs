@@ -29,7 +29,6 @@ pub(crate) struct FilmTold {
 /// A moment of the recording.
 #[derive(Serialize)]
 struct StandTold {
-    /// Time, s.
     at_s: f64,
     /// Relays that changed: index, on or off, and x, y, h in m; `None` without an agreed position.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
@@ -43,7 +42,6 @@ struct StandTold {
     believed: Option<[f32; 3]>,
 }
 
-/// Changes at one moment.
 #[derive(Default)]
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,

@@ -38,7 +38,6 @@ struct Told {
     /// Recording of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     film: Option<FilmTold>,
-    /// Error message.
     #[serde(skip_serializing_if = "Option::is_none")]
     wrong: Option<String>,
 }
@@ -98,7 +97,6 @@ fn run(options: &str, scenario: &str, film: bool) -> Result<Told, Failure> {
     })
 }
 
-/// Formats the report as the command prints it.
 fn raw(report: &impl Serialize) -> Result<Box<RawValue>, Failure> {
     let text = command::json(report)?;
     RawValue::from_string(text.trim_end().to_owned())

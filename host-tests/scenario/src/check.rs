@@ -8,7 +8,6 @@ use crate::error::{Problem, ScenarioError, cut, quote};
 use crate::keys::Rule::{LinkOrNumber, Number, Whole};
 use crate::keys::{FILE, Key, Rule, names};
 
-/// Creates the error for a mistake in the value of a key.
 pub(super) fn mistake(
     file: &str,
     key: &str,
@@ -192,7 +191,6 @@ fn join(path: &str, name: &str) -> String {
     }
 }
 
-/// Returns a number, written with or without a decimal point.
 fn as_number(value: &Value) -> Option<f64> {
     match value {
         Value::Integer(whole) => Some(*whole as f64),

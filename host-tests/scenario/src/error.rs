@@ -145,12 +145,10 @@ fn one_line(text: &str) -> String {
     out
 }
 
-/// Formats a value as TOML, cut if long.
 pub(super) fn quote(value: &Value) -> String {
     cut(&value.to_string())
 }
 
-/// Cuts a long text and adds an ellipsis.
 pub(super) fn cut(text: &str) -> String {
     match text.char_indices().nth(QUOTED) {
         Some((end, _)) => format!("{}...", text.get(..end).unwrap_or_default()),

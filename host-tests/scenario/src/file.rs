@@ -57,12 +57,10 @@ struct RawGeometry {
     altitude_m: f64,
     altitude_min_m: Option<f64>,
     altitude_max_m: Option<f64>,
-    /// Defaults to above the line.
     #[serde(default)]
     lateral_min_m: f64,
     #[serde(default)]
     lateral_max_m: f64,
-    /// Defaults to no separation.
     #[serde(default)]
     min_separation_m: f64,
 }

@@ -23,11 +23,8 @@ pub(super) enum Rule {
     Whole(Range),
     /// "los", "nlos" or a number.
     LinkOrNumber(Range),
-    /// true or false.
     Flag,
-    /// A text from this list.
     Choice(&'static [&'static str]),
-    /// A text that is not empty.
     Text,
     /// A serial port, or the UDP address of an autopilot.
     TtyOrUdp,
@@ -44,7 +41,6 @@ pub(super) enum Need {
     Unless(&'static [&'static str]),
 }
 
-/// A key of a table.
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
@@ -266,7 +262,6 @@ impl Key {
 }
 
 impl Range {
-    /// Returns true if a number is in the range.
     pub(super) fn holds(&self, value: f64) -> bool {
         // A NaN fails the first comparison, an infinity one of the two.
         let low = if self.open {
@@ -342,7 +337,6 @@ fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
     }
 }
 
-/// Joins the names of keys for a message.
 pub(super) fn names<'a>(keys: impl IntoIterator<Item = &'a Key>) -> String {
     keys.into_iter()
         .map(|key| key.name)

@@ -41,7 +41,6 @@ pub(super) struct RawPower {
     rx_gain_dbi: Option<f64>,
 }
 
-/// Senders' EIRPs, W, and receivers' gains, dBi.
 pub(super) struct Powers {
     pub(super) tx_w: f64,
     pub(super) uav_w: f64,
@@ -91,12 +90,10 @@ impl Said<'_> {
         ))
     }
 
-    /// Returns the EIRP of Tx or of a relay, W, if given.
     pub(super) fn of_ours(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
         self.eirp_w(file, EIRP)
     }
 
-    /// Returns the EIRP of an interferer, W, if given.
     pub(super) fn of_source(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
         self.eirp_w(file, SOURCE_EIRP)
     }

@@ -11,7 +11,6 @@ use crate::error::{Problem, ScenarioError, cut};
 /// Largest file size, bytes: far more than 1000 relays and as many interferers, and it bounds `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 
-/// Reads the text of a file.
 pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
     let fail = |problem, value, allowed: &str| ScenarioError {
         file: path.display().to_string(),
@@ -46,7 +45,6 @@ pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
     })
 }
 
-/// Parses a text as a TOML table.
 pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
     let fail = |key, value, problem, allowed| ScenarioError {
         file: file.to_owned(),

@@ -237,7 +237,6 @@ pub struct Sender {
     factor: f64,
 }
 
-/// Returns relay `index` of a scenario, from 1.
 fn relay(scenario: &Scenario, index: u16) -> Relay {
     let own = scenario.relays.get(&index);
     let altitude_m = own.and_then(|own| own.altitude_m);

@@ -44,7 +44,6 @@ fn results(choice: &str, relays: u16, runs: &[Value]) -> Value {
     })
 }
 
-/// Runs `--from` with `results`.
 fn rescored(results: &Value, more: &[&str]) -> Output {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("results.json");

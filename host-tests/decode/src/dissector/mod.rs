@@ -7,7 +7,6 @@ use crate::format::{Field, Format, Kind, Layout};
 /// Lua code that interprets the data.
 const ENGINE: &str = include_str!("engine.lua");
 
-/// Header of the file.
 const HEAD: &str = "\
 -- Frames of uav-relay in Wireshark. Written by `cargo decode --dissector` from the tables of FORMAT.md: do not edit it.
 --
@@ -100,7 +99,6 @@ fn inner(name: &str, more: &str, of: &Kind, indent: usize, out: &mut String) {
     out.push_str(" }");
 }
 
-/// Quotes a string for Lua.
 fn string(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

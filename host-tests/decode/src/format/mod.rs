@@ -3,7 +3,6 @@
 mod document;
 mod rows;
 
-/// Text of `FORMAT.md`.
 const DOCUMENT: &str = include_str!("../../../../src/wire/FORMAT.md");
 
 /// Type of a field on the wire.

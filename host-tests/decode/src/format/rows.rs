@@ -1,6 +1,5 @@
 //! Rows of the document's tables.
 
-/// A row of a table of fields.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) offset: String,
@@ -22,7 +21,6 @@ fn cells(line: &str) -> Vec<&str> {
     inner.split('|').map(str::trim).collect()
 }
 
-/// Returns the tables in `text`, in order.
 pub(super) fn tables(text: &str) -> Vec<Table<'_>> {
     let mut all: Vec<Table<'_>> = Vec::new();
     let mut inside = false;
@@ -66,7 +64,6 @@ pub(super) fn rows(table: &Table<'_>) -> Result<Vec<Row>, String> {
     Ok(all)
 }
 
-/// Returns the last whole number in a cell.
 pub(super) fn last_number(cell: &str) -> Option<usize> {
     let mut numbers = cell.split(|digit: char| !digit.is_ascii_digit());
     numbers.rfind(|digits| !digits.is_empty())?.parse().ok()

@@ -25,7 +25,6 @@ pub struct Shown<'a> {
     pub tag: Option<TagCheck>,
 }
 
-/// Formats bytes in hexadecimal.
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         _ = write!(text, "{byte:02x}");

@@ -98,7 +98,6 @@ fn lines(fields: &Fields<'_>, indent: usize, ranges: bool, out: &mut String) {
     }
 }
 
-/// Formats a value for people.
 fn said(field: &Field, value: &Value<'_>) -> String {
     match value {
         Value::Unsigned(number) => scaled(field, number.to_string(), *number as f64),

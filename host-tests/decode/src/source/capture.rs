@@ -14,7 +14,6 @@ use uav_relay_capture::{Cut, Direction, LINK_TYPE, Piece};
 
 use super::{Item, Packet, Trouble};
 
-/// An interface of a capture.
 struct Interface {
     name: String,
     is_ours: bool,

@@ -99,7 +99,6 @@ fn stream<E>(
     }
 }
 
-/// Returns a piece of a stream, without further information.
 fn bare(piece: Piece<'_>) -> Item<'_> {
     Item::Packet(Packet {
         at: None,

@@ -16,7 +16,6 @@ fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the bytes on the wire of every section whose heading begins with `heading`.
 fn wires(heading: &str) -> Vec<Vec<u8>> {
     let sections = DOCUMENT.split(heading).skip(1);
     let block = |section: &str| {

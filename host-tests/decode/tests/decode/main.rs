@@ -29,7 +29,6 @@ fn decode() -> Command {
     command
 }
 
-/// Runs the program with `input` on standard input.
 fn piped(arguments: &[&str], input: &[u8]) -> Output {
     let mut child = decode().args(arguments).spawn().unwrap();
     child.stdin.take().unwrap().write_all(input).unwrap();

@@ -32,7 +32,6 @@ const DISSECTOR: &str = concat!(
 /// Number of frames of each message, and of the handshake.
 const EACH: usize = 200;
 
-/// Number of damaged frames.
 const HURT: usize = 2_000;
 
 #[test]

@@ -7,7 +7,6 @@ use roxmltree::{Document, Node};
 use uav_relay_decode::format::Kind;
 use uav_relay_decode::value::{Fields, Value};
 
-/// A field as shown.
 #[derive(Debug)]
 pub(crate) struct Shown {
     name: String,
@@ -27,7 +26,6 @@ impl Packet {
             .map(|shown| shown.show.as_str())
     }
 
-    /// Returns the fields of a message.
     pub(crate) fn of<'p>(&'p self, message: &str) -> impl Iterator<Item = &'p Shown> {
         let prefix = format!("{message}.");
         self.0
@@ -76,7 +74,6 @@ fn fields(packet: Node<'_, '_>) -> Vec<Shown> {
     all.collect()
 }
 
-/// Expected field.
 #[derive(Debug)]
 pub(crate) struct Wanted<'f> {
     name: String,

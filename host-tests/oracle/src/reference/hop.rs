@@ -123,7 +123,6 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// Returns the largest SIR between `low` and `high`, both at or beyond the sender.
     pub(super) fn peak(&self, low: f64, high: f64) -> f64 {
         let turns = self.turns(low, high);
         let ends = self.sir(low).max(self.sir(high));

@@ -5,7 +5,6 @@ use super::link::Link;
 /// Golden-section steps per refined cell: the cell shrinks by about 2e-9.
 const STEPS: usize = 42;
 
-/// Number of maxima of the sampled function that are refined.
 const PEAKS: usize = 4;
 
 impl Link {

@@ -79,7 +79,6 @@ fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -
     merge(&pieces.flatten().collect::<Vec<_>>())
 }
 
-/// Joins intervals, sorted by their starts, that touch.
 fn merge(pieces: &[Interval]) -> Vec<Interval> {
     let mut merged: Vec<Interval> = Vec::with_capacity(pieces.len());
     for &(start, end) in pieces {
@@ -91,7 +90,6 @@ fn merge(pieces: &[Interval]) -> Vec<Interval> {
     merged
 }
 
-/// Returns the last position of `set` that is not beyond `limit`.
 fn last_at_or_before(set: &[Interval], limit: f64) -> Option<f64> {
     set.iter()
         .rev()

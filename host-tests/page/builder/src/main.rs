@@ -11,7 +11,6 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
-/// Rust target of the page's code.
 const TARGET: &str = "wasm32-unknown-unknown";
 
 /// Scripts of the page, each after those that it needs.
@@ -107,14 +106,12 @@ fn target_directory(cargo: &mut Command, root: &Path) -> Result<PathBuf, Box<dyn
     Ok(folder.ok_or("cargo metadata: no target_directory")?.into())
 }
 
-/// Compresses by gzip, which a browser can unpack.
 fn packed(code: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(code)?;
     encoder.finish()
 }
 
-/// Installs the target if rustup lacks it.
 fn add_target() -> Result<(), Box<dyn Error>> {
     let libraries = Command::new("rustc")
         .args(["--print", "target-libdir", "--target", TARGET])

@@ -40,7 +40,6 @@ const RISE: f64 = 0.35;
 /// Number of the grid's local minima that are refined, and of the true sources.
 const VALLEYS: usize = 6;
 
-/// Number of refined candidates that are followed to the end.
 const FINALISTS: usize = 3;
 
 /// A hypothetical interferer in place of several, and its error.
@@ -241,7 +240,6 @@ impl Space {
         }
     }
 
-    /// Returns the coordinates of a source.
     fn inside(&self, source: &Source) -> (f64, f64) {
         (source.x_m, (source.y_m.abs() / self.unit).asinh())
     }

@@ -6,10 +6,8 @@ use crate::scene::Scene;
 /// Largest cell width relative to the distance to the nearest source.
 const WIDEST_STEP: f64 = 0.9;
 
-/// Steps that are tried to approach the requested number of points.
 const TRIES: u32 = 6;
 
-/// A point of a [`Raster`].
 #[derive(Debug, Clone, Copy)]
 struct Node {
     x: f64,

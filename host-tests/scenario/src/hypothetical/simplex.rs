@@ -1,6 +1,5 @@
 //! Nelder-Mead simplex search in the plane, near a minimum of a function without usable derivatives.
 
-/// A corner of the simplex and its function value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
     pub(super) at: (f64, f64),

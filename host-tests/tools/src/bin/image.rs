@@ -73,7 +73,6 @@ fn write(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Builds an image with cargo.
 fn of_image(board: &Board, radio: bool) -> Result<(String, Vec<Piece>), String> {
     let (arguments, elf) = board.build(radio);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -93,7 +92,6 @@ fn of_image(board: &Board, radio: bool) -> Result<(String, Vec<Piece>), String> 
     Ok((board.stem(radio), pieces(&bytes)?))
 }
 
-/// Reads an existing configuration block.
 fn of_block(board: &Board, block: &Path) -> Result<(String, Vec<Piece>), Failure> {
     let named = |what: String| Failure::input(format!("--block {}: {what}", block.display()));
     let bytes = std::fs::read(block).map_err(|error| named(error.to_string()))?;

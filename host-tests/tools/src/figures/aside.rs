@@ -23,7 +23,6 @@ pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
 /// Largest lateral room to each side, m.
 pub const MOST_ROOM_M: u16 = 400;
 
-/// Step of the lateral room, m.
 const ROOM_STEP_M: u16 = 4;
 
 /// Lateral room in the figure of the gain, m: as large as the highest altitude.

@@ -105,7 +105,6 @@ impl Axis {
         }
     }
 
-    /// Returns the axis scale for `values`.
     pub(super) fn scale(&self, values: impl Iterator<Item = f64> + Clone) -> Scale {
         if let Some((from, to)) = self.ends {
             return Scale::new(self.kind, from, to);

@@ -10,17 +10,13 @@ use super::chart::{Chart, Line, Look, Panel, Signs, Stroke};
 use super::scale::Scale;
 use super::signs::{self, Sign};
 
-/// Width of a picture, units: 960 are 8 cm.
 const WIDTH: u32 = 960;
 /// Height of a single panel with its axis titles.
 const PANEL: u32 = 560;
 /// Height of each of several panels.
 const PANEL_OF_SEVERAL: u32 = 470;
-/// Height of a legend row.
 const ROW: u32 = 44;
-/// Margin above and below the legend.
 const GAP: u32 = 10;
-/// Approximate width of a letter.
 const LETTER: u32 = 17;
 /// Distance from the start of a legend entry to its text.
 const SAMPLE: u32 = 104;
@@ -31,9 +27,7 @@ const LETTERS: f64 = 28.0 * 1.24;
 const INK: RGBColor = RGBColor(34, 34, 34);
 const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
-/// Line width, units.
 const PEN: u32 = 4;
-/// Distance between spaced signs of a line, units.
 const APART: f64 = 105.0;
 /// Offset of the first sign per hue, units.
 const APART_BY_HUE: u8 = 25;
@@ -202,7 +196,6 @@ fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     entries
 }
 
-/// Returns the number of legend columns.
 fn columns(entries: &[(&str, Look)]) -> usize {
     let letters = entries.iter().map(|(name, _)| name.chars().count()).max();
     let widest = SAMPLE + LETTER * u32::try_from(letters.unwrap_or(0)).unwrap_or(0);
@@ -248,7 +241,6 @@ fn draw_legend(area: &Area<'_>, entries: &[(&str, Look)], columns: usize) -> Res
     Ok(())
 }
 
-/// Adds a title for screen readers.
 fn with_title(svg: &str, title: &str) -> String {
     let title = title.replace('&', "&amp;").replace('<', "&lt;");
     match svg.split_once(">\n") {

@@ -18,7 +18,6 @@ pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
 /// Rounds of Algorithm 2.
 pub const ROUNDS: u16 = 500;
 
-/// Lateral offset of the interferer, m.
 const OFFSET_M: f64 = 150.0;
 
 /// Results for one number of relays.

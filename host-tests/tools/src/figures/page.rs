@@ -47,7 +47,6 @@ pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, Trouble> {
     Ok(file)
 }
 
-/// Adds a table of contents with a link to each figure.
 fn contents(html: &mut String, sheets: &[Sheet]) {
     html.push_str("<nav>\n<h2>Contents</h2>\n<ol>\n");
     for sheet in sheets {

@@ -6,7 +6,6 @@ use plotters::coord::ranged1d::{
     KeyPointHint, KeyPointWeight, NoDefaultFormatting, Ranged, ValueFormatter,
 };
 
-/// Approximate largest number of steps between labels.
 const STEPS: f64 = 6.0;
 
 /// Number of decades up to which 2 and 5 are labelled on a logarithmic axis.
@@ -76,7 +75,6 @@ impl Scale {
         (-ROUNDING..=1.0 + ROUNDING).contains(&self.part(value))
     }
 
-    /// Returns the labelled values, rising.
     fn ticks(&self) -> Vec<f64> {
         match self.kind {
             Kind::Linear => {
@@ -136,7 +134,6 @@ fn round_number(value: f64, up: bool) -> f64 {
     .unwrap_or(power)
 }
 
-/// Formats a number without trailing zeros.
 fn digits(value: f64) -> String {
     if value.abs() < 1e-12 {
         return "0".to_owned();

@@ -15,7 +15,6 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
 ];
 
-/// Half the size of a sign, units.
 const SIZE: i32 = 9;
 
 /// Returns colour number `hue`, modulo the palette.

@@ -23,7 +23,6 @@ pub const RELAY_W: [f64; 17] = [
 /// Printed averages, percent: over random, over the blind method.
 pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
-/// Printed largest gain, percent.
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
 /// Difference up to which an average counts as the printed one, percentage points.

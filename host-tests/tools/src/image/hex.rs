@@ -4,7 +4,6 @@ use ihex::Record;
 
 use super::elf::Piece;
 
-/// Data bytes per record.
 const RECORD: u8 = 16;
 
 /// Returns the HEX file, with 32-bit addresses.

@@ -14,7 +14,6 @@ use uav_relay_sim::simulator::sky::{Sky, Stand};
 use crate::figures::trouble::Trouble;
 use crate::multi_interferer::optimum;
 
-/// Error for a scene without sources.
 const NO_SCENE: Trouble = Trouble::Unsettled("a scene");
 
 /// A random scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.

@@ -3,10 +3,8 @@
 /// Bisection steps: more than enough to collapse any f64 interval in metres to adjacent numbers.
 const HALVINGS: u32 = 200;
 
-/// A crossing of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
-    /// Position, m.
     pub(super) at: f64,
     /// True if the function is below the level before the crossing and not below it after.
     pub(super) rising: bool,

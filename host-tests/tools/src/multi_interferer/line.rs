@@ -17,7 +17,6 @@ pub(super) struct Line<'a> {
     nodes: Vec<f64>,
     /// Quiet r = (I + N)^(-1/2) at the nodes, W^(-1/2).
     quiet: Vec<f64>,
-    /// Slope of the quiet at the nodes.
     slope: Vec<f64>,
     /// Local maxima of the first hop's SIR inside the line, m.
     tops: Vec<f64>,

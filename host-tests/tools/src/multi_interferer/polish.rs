@@ -8,7 +8,6 @@ use super::altitude::golden;
 use uav_relay_scenario::scene::Corridor;
 use uav_relay_scenario::scene::{Place, Relay, Scene, Sender};
 
-/// Largest number of rounds.
 const ROUNDS: u32 = 200;
 
 /// Least relative gain for a round to count as progress.
@@ -110,7 +109,6 @@ fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: 
 }
 
 impl Turn<'_> {
-    /// Returns the SIR of the worse of the two hops with this relay at `place`.
     fn sir(&self, place: Place) -> f64 {
         let heard = self.scene.sir_at(self.before, place);
         let fed = match self.next {

@@ -31,7 +31,6 @@ fn figures(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Returns the folder of the full run's files.
 fn written() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     DIR.get_or_init(|| {
@@ -81,7 +80,6 @@ impl Table {
         all.filter(matches).collect()
     }
 
-    /// Returns the only row with these values.
     fn row(&self, of: &[(&str, f64)]) -> Row<'_> {
         let mut rows = self.rows(of);
         assert_eq!(rows.len(), 1, "{of:?}");
@@ -100,7 +98,6 @@ impl Row<'_> {
         &self.cells[self.table.column(name)]
     }
 
-    /// Returns the number in a column, if any.
     fn get(&self, name: &str) -> Option<f64> {
         self.text(name).parse().ok()
     }
@@ -111,7 +108,6 @@ impl Row<'_> {
     }
 }
 
-/// Returns the relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }

@@ -155,7 +155,7 @@ fn the_best_place_and_the_baselines_are_the_references() {
     }
 }
 
-/// Returns the mean over all positions of `of` the SIR.
+/// Returns the mean of `of` applied to the SIR, over all positions.
 fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     let points = 2000;
     let place = |k: u32| link.distance_m * (f64::from(k) + 0.5) / f64::from(points);

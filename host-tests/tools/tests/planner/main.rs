@@ -21,7 +21,6 @@ fn plan(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Returns the standard output of a successful run.
 fn said(arguments: &[&str]) -> String {
     let output = plan(arguments);
     assert!(output.status.success(), "{arguments:?}: {output:?}");

@@ -65,7 +65,6 @@ fn the_command_writes_what_the_relay_is_to_do() {
     );
 }
 
-/// Returns a scenario with a field of `points` points.
 fn toml(points: usize) -> String {
     let mut text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n\
                     [power]\ntx_w = 80.0\nuav_w = 1.0\n\

@@ -121,7 +121,6 @@ fn a_bad_key_is_named_and_not_shown() {
     assert!(!Path::new(&out).exists());
 }
 
-/// A key file that every user of the computer can read is refused.
 #[test]
 fn a_key_file_that_others_can_read_is_refused() {
     use std::os::unix::fs::PermissionsExt as _;

@@ -4,7 +4,6 @@ use std::path::Path;
 
 const LENGTH: usize = 32;
 
-/// Reads the key from a file of 64 hexadecimal digits.
 pub(crate) fn load(file: &Path) -> Result<[u8; LENGTH], String> {
     let text = std::fs::read_to_string(file)
         .map_err(|error| format!("--key {}: cannot be read: {error}", file.display()))?;

@@ -57,7 +57,6 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Opens the input and returns its name.
 fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
     match file.filter(|file| *file != Path::new("-")) {
         Some(file) => {
@@ -74,7 +73,6 @@ fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
     }
 }
 
-/// Printer of frames.
 struct Printer<'f, W: Write> {
     format: &'f Format,
     members: Members,

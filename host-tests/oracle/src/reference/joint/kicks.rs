@@ -27,7 +27,6 @@ fn row(chain: &[Triple], rng: &mut ChaCha8Rng) -> std::ops::RangeInclusive<usize
     one.min(other)..=one.max(other)
 }
 
-/// Moves one to three relays to other positions in the order of the chain.
 fn reinserted(chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let mut chain = chain.to_vec();
     for _ in 0..rng.random_range(1..=3) {
@@ -70,7 +69,6 @@ fn shaken(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> 
     chain
 }
 
-/// Mirrors a range of relays to the other side of the interferer.
 fn mirrored(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let mut chain = chain.to_vec();
     let row = row(&chain, rng);

@@ -17,7 +17,6 @@ type Reach = Vec<(Across, Vec<Interval>)>;
 /// Positions open to a relay.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
-    /// Positions in the cross-section.
     pub(super) levels: Vec<Across>,
     /// Range along Tx-Rx, both ends included.
     pub(super) window: Interval,
@@ -37,7 +36,6 @@ pub(super) fn at_places(scene: &Scene, places: &[Across]) -> Vec<Slot> {
         .collect()
 }
 
-/// Returns the nearest positions to `levels` in a room, without duplicates.
 pub(super) fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
     let mut inside: Vec<Across> = Vec::with_capacity(levels.len());
     for level in levels {
@@ -240,7 +238,6 @@ fn not_positive(a: f64, b: f64, c: f64, within: Interval, mut found: impl FnMut(
     }
 }
 
-/// Sorts intervals and joins those that touch.
 fn merge(mut pieces: Vec<Interval>) -> Vec<Interval> {
     pieces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut merged: Vec<Interval> = Vec::with_capacity(4);
@@ -253,7 +250,6 @@ fn merge(mut pieces: Vec<Interval>) -> Vec<Interval> {
     merged
 }
 
-/// Returns the last position of `set` that is not beyond `limit`.
 fn last_at_or_before(set: &[Interval], limit: f64) -> Option<f64> {
     set.iter()
         .rev()

@@ -56,7 +56,6 @@ impl Log {
 /// A hop's ln SIR over the target, or a margin of order, corridor or separation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
-    /// Index of the relay, from 0.
     pub(super) relay: usize,
     pub(super) value: f64,
     /// Slope by the relay's own position.
@@ -72,7 +71,6 @@ pub(super) struct Limit {
 }
 
 impl Limit {
-    /// Creates a linear margin.
     fn margin(relay: usize, value: f64, own: Triple, before: Triple) -> Self {
         Self {
             relay,

@@ -14,7 +14,6 @@ const LAST_WEIGHT: f64 = 1e-12;
 /// Least error of the optimality conditions above rounding.
 const LEAST_ERROR: f64 = 1e-10;
 
-/// Largest number of Newton steps; 30 to 100 are usual.
 const STEPS: u32 = 400;
 
 /// Largest part of the distance to the nearest constraint that one step may take.
@@ -75,7 +74,6 @@ pub(super) fn polish(
     Some(at.places)
 }
 
-/// A change of positions and target.
 struct Direction {
     steps: Vec<Triple>,
     raise: f64,

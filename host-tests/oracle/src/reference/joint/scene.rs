@@ -37,7 +37,6 @@ impl Room {
         )
     }
 
-    /// Returns true if the cross-section is a single point.
     pub(super) fn is_point(&self) -> bool {
         self.free() == Triple::new(1.0, 0.0, 0.0)
     }
@@ -75,9 +74,7 @@ pub(super) struct Scene {
     pub(super) interferer: Triple,
     /// Room of relays without a fixed position.
     pub(super) corridor: Room,
-    /// Room of each relay.
     pub(super) rooms: Vec<Room>,
-    /// Least separation of neighbouring relays.
     pub(super) apart: f64,
     /// ln of the constant of the hop that ends at each relay.
     pub(super) hops: Vec<f64>,

@@ -14,7 +14,6 @@ impl Across {
         Self { y, h }
     }
 
-    /// Returns the squared distance to another position.
     pub(super) fn apart_2(self, other: Self) -> f64 {
         (self.y - other.y).powi(2) + (self.h - other.h).powi(2)
     }
@@ -50,7 +49,6 @@ impl Triple {
         Self::new(self.x * other.x, self.y * other.y, self.h * other.h)
     }
 
-    /// Returns the largest absolute coordinate.
     pub(super) fn size(self) -> f64 {
         self.x.abs().max(self.y.abs()).max(self.h.abs())
     }
@@ -84,7 +82,6 @@ impl Neg for Triple {
     }
 }
 
-/// A 3 x 3 matrix, by its rows.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Square {
     x: Triple,
@@ -101,12 +98,10 @@ impl Square {
         }
     }
 
-    /// Returns `value` times the identity.
     pub(super) fn even(value: f64) -> Self {
         Self::diagonal(Triple::new(value, value, value))
     }
 
-    /// Returns `row` times the transpose of `column`.
     pub(super) fn outer(row: Triple, column: Triple) -> Self {
         Self {
             x: column * row.x,
@@ -127,7 +122,6 @@ impl Square {
         Triple::new(self.x.dot(to), self.y.dot(to), self.h.dot(to))
     }
 
-    /// Scales rows by `rows` and columns by `columns`.
     pub(super) fn scaled(self, rows: Triple, columns: Triple) -> Self {
         Self {
             x: self.x.times(columns) * rows.x,
@@ -136,7 +130,6 @@ impl Square {
         }
     }
 
-    /// Applies a function to each row.
     pub(super) fn by_rows(self, of: impl Fn(Triple) -> Triple) -> Self {
         Self {
             x: of(self.x),

@@ -93,12 +93,10 @@ pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
     search.best.map(|(_, chain)| chain)
 }
 
-/// Search state: the scene and the best chain so far.
 struct Search<'a> {
     scene: &'a Scene,
     /// Scene with a slightly larger least separation, so that its chains can be moved a little.
     roomy: Scene,
-    /// ln SIR and chain.
     best: Option<(f64, Vec<Triple>)>,
 }
 
@@ -222,7 +220,6 @@ impl Search<'_> {
         self.consider_apart(chain, FAR);
     }
 
-    /// Tries a perturbation of the best chain.
     fn kicked(&mut self, rng: &mut ChaCha8Rng) {
         if let Some((_, chain)) = &self.best {
             let chain = kicked(self.scene, chain, rng);

@@ -11,7 +11,6 @@ pub(super) struct Block {
     pub(super) before: Square,
     /// Coefficients of the common unknown.
     pub(super) common: Triple,
-    /// Right-hand side.
     pub(super) right: Triple,
 }
 

@@ -15,7 +15,6 @@ fn least(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     value(0.5 * (a + b)).min(value(low)).min(value(high))
 }
 
-/// Joins intervals that touch.
 fn joined(mut all: Stretches) -> Stretches {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out = Stretches::new();

@@ -81,7 +81,6 @@ impl Browser {
         browser
     }
 
-    /// Opens `url` in the same window.
     pub(crate) fn open(&mut self, url: &str) {
         self.call("Page.navigate", &json!({"url": url}));
     }
@@ -138,7 +137,6 @@ impl Browser {
         self.value(&format!("(() => {{ {script}; return 0; }})()"));
     }
 
-    /// Waits until `condition` is true.
     pub(crate) fn until(&mut self, condition: &str) {
         let begun = Instant::now();
         while self.value(&format!("Boolean({condition})")) != true {
@@ -200,7 +198,6 @@ impl Browser {
         }
     }
 
-    /// Types into the focused field.
     pub(crate) fn types(&mut self, text: &str) {
         for letter in text.chars() {
             let parameters = json!({"text": letter.to_string()});

@@ -51,7 +51,6 @@ fn it_is_laid_out_for_wide_and_for_narrow_screens() {
     }
 }
 
-/// Checks the information for screen readers.
 #[test]
 fn all_of_it_can_be_heard() {
     let mut browser = opened(1280, 900);

@@ -23,7 +23,6 @@ pub(crate) fn page() -> &'static PathBuf {
     })
 }
 
-/// Returns the URL of the page.
 pub(crate) fn address() -> String {
     format!("file://{}", page().display())
 }

@@ -33,7 +33,6 @@ fn failure(trouble: &Trouble) -> Failure {
     }
 }
 
-/// Makes the requested figures and prints the path of the page.
 fn run(options: &Options) -> Result<(), Trouble> {
     let started = Instant::now();
     let dir = &options.out;
@@ -99,7 +98,6 @@ impl Progress {
         }
     }
 
-    /// Reports a finished figure.
     fn made(&self, name: &str) {
         let made = self.made.fetch_add(1, Ordering::Relaxed) + 1;
         self.bar.set_message(format!("(last: {name})"));

@@ -24,7 +24,6 @@ pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failur
     )))
 }
 
-/// Writes the requested maps.
 pub(crate) fn write(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
     if options.geojson.is_none() && options.kml.is_none() {
         return Ok(());

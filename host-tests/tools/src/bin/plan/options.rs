@@ -88,7 +88,6 @@ impl Options {
         )
     }
 
-    /// Returns the unit of the requested SIR.
     pub(crate) const fn unit(&self) -> Unit {
         match self.wanted.target_sir_db {
             Some(_) => Unit::Decibels,

@@ -111,7 +111,6 @@ fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     Ok(sections)
 }
 
-/// Returns the next command for the written file.
 fn next(file: &str, sections: &Deployment) -> String {
     let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR\n");
     let companions = format!("  cargo companion --config {file} --index INDEX\n");

@@ -261,7 +261,6 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
-    /// Returns the key and epoch that sign frames.
     fn secret(&self) -> Result<Option<Secret>, String> {
         let Some(file) = &self.key_file else {
             return match self.options.epoch {
@@ -282,7 +281,6 @@ impl<'a> Asked<'a> {
         }))
     }
 
-    /// Writes the blocks of all relays, and the summary.
     fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
         let heading = Heading {
             scenario: self.name.clone(),
