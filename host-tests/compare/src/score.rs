@@ -105,9 +105,7 @@ pub(crate) struct Score {
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// Returns the score of a solver's result against a reference chain of `level`, linear SIR.
-///
-/// Only the times are trusted; SIRs are recomputed.
+/// Returns the score of a solver's result against a chain of `level` (linear SIR): times are trusted, SIRs recomputed.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -32,8 +32,7 @@ struct StandTold {
     at_s: f64,
     /// Relays that changed: index, on or off, and x, y, h in m; `None` without an agreed position.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// SIR of every hop of the relays that are on and have a position, linear, with the interference of that time. Empty without
-    /// relays.
+    /// SIR of every hop between relays that are on and have a position, linear, at that time. Empty without relays.
     sirs: Vec<f32>,
     /// Number of frames sent so far on all links.
     messages: u64,

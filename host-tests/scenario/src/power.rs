@@ -1,7 +1,7 @@
 //! Powers as in data sheets, in W or dBm and with antenna gains, and their form in the model.
 //!
-//! The channel model has only a path loss: P / (mu d^2) is received of P. With antennas of gains `G_t` and `G_r` (Friis) it is `P
-//! G_t G_r / (mu d^2)`. With the interferers' `P_i G_i` and the receiver's noise N, the SINR is
+//! The channel model has only a path loss: P / (mu d^2) is received of P. With antennas of gains `G_t` and `G_r` (Friis) it is
+//! `P G_t G_r / (mu d^2)`. With the interferers' `P_i G_i` and the receiver's noise N, the SINR is
 //!
 //! ```text
 //! P G_t G_r / (mu d^2)                      P G_t / (mu d^2)

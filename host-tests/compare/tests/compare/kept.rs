@@ -33,8 +33,7 @@ fn the_results_have_the_run_that_is_kept() {
     );
 }
 
-/// Checks the speed with eight and fifty relays and free altitudes: SLSQP from its best start takes at least twenty times as
-/// long.
+/// SLSQP from its best start takes at least twenty times as long, with eight and fifty relays and free altitudes.
 ///
 /// With lateral room this crate has more than twice as many starts to try.
 #[test]

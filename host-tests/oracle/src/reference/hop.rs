@@ -70,7 +70,7 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a function with the sign of the SIR's slope, concave beyond the sender (see [`super`]).
+    /// Returns a value with the sign of the SIR's slope at `x`, concave in `x` beyond the sender (see [`super`]).
     ///
     /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of the total disturbance.
     fn rise(&self, x: f64) -> f64 {

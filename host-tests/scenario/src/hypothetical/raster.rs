@@ -195,9 +195,7 @@ struct Ratio {
     weight: f64,
 }
 
-/// Returns the weighted median; 0 without values. Reorders `ratios`.
-///
-/// Each round examines half of the previous one's values.
+/// Returns the weighted median in linear time; 0 without values. Reorders `ratios`.
 fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     let mut half = 0.5 * ratios.iter().map(|ratio| ratio.weight).sum::<f64>();
     let mut median = 0.0;

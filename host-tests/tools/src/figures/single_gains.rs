@@ -166,9 +166,7 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference of the two averages from the printed ones, percentage points.
-///
-/// With `middle`, the middle replaces the blind method.
+/// Returns the larger difference from the printed averages, percentage points; `middle` replaces the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent

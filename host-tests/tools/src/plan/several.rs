@@ -155,8 +155,7 @@ impl Planner<'_> {
 
     /// Returns single-interferer scenarios whose chains may take another route.
     ///
-    /// The hypothetical interferer mirrored to the other side, with room on one side only or none, and each of the first
-    /// interferers alone.
+    /// The hypothetical interferer on the other side, with room on one side or none, and each of the first interferers alone.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();

@@ -22,9 +22,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     })
 }
 
-/// Returns the best position of one relay, by Theorem 1, 2 or 3, or beside the line.
-///
-/// A relay with a fixed altitude stays above the line.
+/// Returns the best position of one relay, by a theorem or beside the line; with a fixed altitude it stays above the line.
 pub(super) fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
@@ -164,9 +162,6 @@ pub(super) fn fewest(
 }
 
 /// Returns the mission of the fewest relays that meet `target` at their own altitudes, and whether that is proven.
-///
-/// # Errors
-/// [`NoPlan::Unmet`], with the best SIR of any number of relays.
 pub(super) fn enough(
     scenario: &Scenario,
     target: f64,

@@ -31,9 +31,7 @@ impl Side {
     }
 }
 
-/// Returns a jittered grid of levels in a room, including walls and corners.
-///
-/// `columns` sideways and `rows` upward, closer at the bottom or evenly; about as many in all if the room has no width or no
+/// Returns a jittered grid of `columns` x `rows` levels with walls and corners; as many in all if the room has no width or
 /// height.
 pub(super) fn levels(room: &Room, rng: &mut ChaCha8Rng, columns: u32, rows: u32) -> Vec<Across> {
     let free = room.free();

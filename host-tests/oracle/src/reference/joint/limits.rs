@@ -1,9 +1,9 @@
 //! Constraints of a chain, with slopes and curvatures.
 //!
 //! A hop's SIR is a constant times (receiver to interferer)^2 / (sender to receiver)^2, at Rx a constant over (sender to Rx)^2.
-//! Its logarithm is a sum of logarithms of squared distances, with the derivatives of ln(q), q = d^2: slope 2 d / q, curvature 2
-//! I / q - 4 d d^T / q^2. With noise the first of them is ln(q / w), w = 1 + nu q: slope 2 d / (q w), curvature 2 I / (q w) - (1
-//! + 2 nu q) (2 d / (q w)) (2 d / (q w))^T.
+//! Its logarithm is a sum of logarithms of squared distances, with the derivatives of ln(q), q = d^2: slope 2 d / q, curvature
+//! 2 I / q - 4 d d^T / q^2. With noise the first of them is ln(q / w), w = 1 + nu q: slope 2 d / (q w), curvature
+//! 2 I / (q w) - (1 + 2 nu q) (2 d / (q w)) (2 d / (q w))^T.
 
 use super::scene::Scene;
 use super::space::{Square, Triple};
@@ -51,9 +51,7 @@ impl Log {
     }
 }
 
-/// A constraint `value` >= 0 on one relay and its predecessor.
-///
-/// A hop's ln SIR over the target, or a margin of order, corridor or separation.
+/// A constraint `value` >= 0 on a relay and its predecessor: a hop's ln SIR over the target, or a margin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
     pub(super) relay: usize,

@@ -108,8 +108,7 @@ impl Iterate {
 
     /// Takes one damped Newton step; returns false if it gains nothing.
     ///
-    /// The step follows an arc, because the constraints are curved and a straight step along a narrow valley would soon hit its
-    /// wall.
+    /// The step is an arc, because the constraints are curved and a straight step along a narrow valley would soon hit its wall.
     fn step(&mut self, scene: &Scene, weight: f64) -> bool {
         let Some((damping, line)) = self.direction(scene, weight) else {
             return false;

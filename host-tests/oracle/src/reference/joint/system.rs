@@ -27,9 +27,7 @@ impl Block {
     }
 }
 
-/// Solves the system in O(N); `None` unless the matrix is positive definite.
-///
-/// `corner` and `corner_right` are the row of the common unknown.
+/// Solves the system in O(N), with `corner` on the common unknown's diagonal; `None` unless it is positive definite.
 pub(super) fn solve(
     blocks: &[Block],
     corner: f64,

@@ -32,9 +32,6 @@ impl Document {
     }
 
     /// Writes the measured costs to the document.
-    ///
-    /// # Errors
-    /// If it cannot be written.
     pub(crate) fn write(&self) -> Result<(), String> {
         let written = std::fs::write(&self.path, &self.measured);
         written.map_err(|error| format!("{}: {error}", self.name))
@@ -65,9 +62,6 @@ fn milliseconds(instructions: u64) -> String {
 }
 
 /// Returns both documents of the checkout at `root`.
-///
-/// # Errors
-/// If one cannot be read, or has no place for the costs.
 pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     let results = with(root, "host-tests/RESULTS.md", |text| {
         let begin = text.find(HEAD)?;

@@ -174,9 +174,7 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
     Ok((flash, ram))
 }
 
-/// Returns the largest stack of the thread, from the entry that `Reset` calls, and of one interrupt on top of it.
-///
-/// The interrupt's frame with the FPU's registers is 104 bytes.
+/// Returns the largest stack of the thread, from the entry that `Reset` calls, and of one interrupt with its FPU frame.
 pub(crate) fn deepest_stack(elf: &Path, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";

@@ -1,8 +1,8 @@
 //! `cargo cost`: costs of the firmware against its budgets and the documents, and the proof that it cannot panic.
 //!
 //! Builds the relay image and the counting image with the firmware profile, reads sizes and the largest stack from the relay's
-//! ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked. `cargo cost
-//! --write` writes the measured costs to the documents.
+//! ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked.
+//! `cargo cost --write` writes the measured costs to the documents.
 
 mod counted;
 mod document;

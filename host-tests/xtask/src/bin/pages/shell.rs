@@ -27,10 +27,6 @@ pub(crate) struct Shell {
 }
 
 impl Shell {
-    /// Builds the programs.
-    ///
-    /// # Errors
-    /// The step that failed.
     pub(crate) fn build(root: &Path) -> Result<Self, String> {
         let failed = |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}");
         let mut build = Command::new("cargo");
@@ -60,9 +56,6 @@ impl Shell {
     }
 
     /// Recreates the folder, so that each page starts in a clean clone.
-    ///
-    /// # Errors
-    /// The step that failed.
     pub(crate) fn clean(&self) -> Result<(), String> {
         let failed = |error: std::io::Error| format!("{}: {error}", self.folder.display());
         // The folder may not exist.
@@ -79,9 +72,6 @@ impl Shell {
     }
 
     /// Runs a script like a user, until its first command that fails; returns its output.
-    ///
-    /// # Errors
-    /// The exit status, and the last lines of output.
     pub(crate) fn run(&self, script: &str) -> Result<String, String> {
         let limit = format!("{LIMIT_S}");
         let script = format!("exec 2>&1\n{}\n{script}\n", self.before);
