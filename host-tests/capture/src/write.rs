@@ -187,7 +187,6 @@ impl Block {
         self.bytes(&number.to_le_bytes());
     }
 
-    /// Appends bytes and zeros up to a multiple of four.
     fn padded(&mut self, bytes: &[u8]) {
         self.bytes(bytes);
         let full = self.contents.len().next_multiple_of(4);

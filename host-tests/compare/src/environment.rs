@@ -10,7 +10,6 @@ pub(crate) const USUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../targe
 const REQUIREMENTS: &str = include_str!("../rivals/requirements.txt");
 const REQUIREMENTS_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/requirements.txt");
 
-/// Returns the interpreter in `venv`; creates the environment and installs the packages if they are missing.
 pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     let python = venv.join("bin").join("python");
     // Written last: without it the environment is incomplete, or has other versions.

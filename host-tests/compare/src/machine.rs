@@ -59,7 +59,6 @@ impl Clock {
     }
 }
 
-/// Returns the processor time of this thread since its start, s.
 fn on_cpu_s() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;

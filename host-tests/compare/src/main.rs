@@ -85,7 +85,6 @@ const MARKS: [&str; 2] = [
     "<!-- end of that -->\n",
 ];
 
-/// Replaces the text between the two marks in `file` with `excerpt`.
 fn put(file: &Path, excerpt: &str) -> Result<(), Failure> {
     let wrong = |why: String| Failure::input(format!("--into {}: {why}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;

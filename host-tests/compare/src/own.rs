@@ -75,7 +75,6 @@ fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     places.ok_or_else(|| "no target can be met".to_owned())
 }
 
-/// Runs the simulated chain: all relays' computations and all frames.
 fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
     let outcome: Outcome = chain::run(setup).map_err(|error| error.to_string())?;
     let places = outcome.relays.iter().map(|relay| relay.setpoint).collect();

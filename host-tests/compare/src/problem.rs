@@ -76,7 +76,6 @@ impl Problem {
         Some(known.1)
     }
 
-    /// Returns the scenario, as `cargo chain` reads it.
     pub(crate) fn scenario(self) -> Result<Scenario, String> {
         match self.choice {
             Choice::Places => Ok(Scenario::default()),

@@ -30,7 +30,6 @@ pub(crate) struct Solved {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Run {
-    /// Name of the solver in the table.
     pub(crate) solver: String,
     pub(crate) answer: Answer,
 }
@@ -42,7 +41,6 @@ pub(crate) enum Answer {
     Error(String),
 }
 
-/// A chain found by a solver, with its cost.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Found {
     /// Total processor time, s.
@@ -66,7 +64,6 @@ pub(crate) struct Found {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Mark {
-    /// Processor time since the start, s.
     pub(crate) after_s: f64,
     pub(crate) chain: Chain,
 }

@@ -22,7 +22,6 @@ fn patience(limit_s: f64) -> Duration {
 #[derive(Clone, Copy)]
 pub(crate) struct Solver {
     name: &'static str,
-    /// Name in the table.
     pub(crate) title: &'static str,
 }
 

@@ -47,7 +47,6 @@ rounded.
 in f64, by formulas that no solver shares; a chain that breaks order, room or least separation does not count.
 ";
 
-/// Problems in RESULTS.md, in order.
 const EXCERPT: [(Choice, u16, &str); 6] = [
     (Choice::Places, 8, "8 relays at 20 m"),
     (Choice::Places, 50, "50 relays at 20 m"),
@@ -125,7 +124,6 @@ pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
     }
 }
 
-/// Cells of a valid chain.
 struct Line {
     sir: String,
     short: String,

@@ -17,7 +17,6 @@ const STANDS: usize = 600;
 /// Largest number of frames; the first ones are shown.
 const FRAMES: usize = 20_000;
 
-/// Recording of a run.
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
     /// Moments at which the picture changes, in order.
@@ -26,7 +25,6 @@ pub(crate) struct FilmTold {
     sent: Vec<(f64, u16, i8)>,
 }
 
-/// A moment of the recording.
 #[derive(Serialize)]
 struct StandTold {
     at_s: f64,
@@ -50,7 +48,6 @@ struct Change {
 }
 
 impl FilmTold {
-    /// Creates the recording of a run with [`Setup::film`](uav_relay_sim::simulator::setup::Setup::film).
     pub(crate) fn of(run: &Prepared<'_>, outcome: &Outcome) -> Self {
         let film = outcome.film.clone().unwrap_or_default();
         Self {
@@ -60,7 +57,6 @@ impl FilmTold {
     }
 }
 
-/// Returns all changes, by the time of their display.
 fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     let mut changes: BTreeMap<Instant, Change> = BTreeMap::new();
     for shot in shots {

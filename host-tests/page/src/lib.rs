@@ -20,7 +20,6 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use film::FilmTold;
 
-/// Name of the page's scenario in messages.
 const NAME: &str = "the page";
 
 /// Simulator events between two checks of the virtual clock.
@@ -35,7 +34,6 @@ struct Told {
     /// Output of `cargo chain --json`, character by character.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<Box<RawValue>>,
-    /// Recording of the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     film: Option<FilmTold>,
     #[serde(skip_serializing_if = "Option::is_none")]

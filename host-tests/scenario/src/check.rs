@@ -24,12 +24,10 @@ pub(super) fn mistake(
     }
 }
 
-/// Checks shape, known and required keys, types, and every range.
 pub(super) fn table(file: &str, table: &Table) -> Result<(), ScenarioError> {
     Check { file }.table("", table, sections())
 }
 
-/// Returns all sections that a file may have: of the scenario, and of the deployment.
 fn sections() -> impl Iterator<Item = &'static Key> + Clone {
     FILE.iter().chain(SECTIONS)
 }

@@ -114,7 +114,6 @@ pub struct Ground {
     pub capture: Option<PathBuf>,
 }
 
-/// Splits a file's table into the scenario and the sections.
 pub(super) fn split(mut table: Table) -> (Table, Table) {
     let sections = SECTIONS
         .iter()

@@ -90,7 +90,6 @@ fn default_local(port: u16) -> Option<u16> {
     }
 }
 
-/// Writes the address as it was given.
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { host, port, .. } = self;

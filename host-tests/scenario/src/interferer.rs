@@ -27,7 +27,6 @@ pub(super) struct RawSource {
     amsl_m: Option<f64>,
 }
 
-/// Region in which relays may fly, and the geographic line.
 pub(super) struct Room<'a> {
     pub(super) line: Option<&'a Line>,
     pub(super) distance_m: f64,

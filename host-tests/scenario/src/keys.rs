@@ -17,7 +17,6 @@ pub(super) struct Range {
     unit: &'static str,
 }
 
-/// Allowed values of a key.
 pub(super) enum Rule {
     Number(Range),
     Whole(Range),
@@ -119,7 +118,6 @@ const AMSL: Range = range(-1e3, 1e4, "m");
 const PLACE: Range = range(-1e7, 1e7, "m");
 const LOSS: Range = range(0.0, 200.0, "dB");
 
-/// Keys of the whole file.
 pub(super) const FILE: Keys = &[
     required("geometry", Rule::Table(GEOMETRY)),
     required("power", Rule::Table(POWERS)),
@@ -273,7 +271,6 @@ impl Range {
     }
 }
 
-/// Formats a number without long rows of digits.
 pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if size > 0.0 && !(1e-3..1e5).contains(&size) {

@@ -60,7 +60,6 @@ pub(super) struct Said<'a> {
 }
 
 impl Said<'_> {
-    /// Returns the EIRP, W, if given.
     fn eirp_w(&self, file: &str, [least, most]: [f64; 2]) -> Result<Option<f64>, ScenarioError> {
         let gain = self.gain.1.map_or(1.0, factor);
         let ((key, given), eirp_w) = match (self.in_w, self.in_dbm, self.eirp) {
@@ -99,7 +98,6 @@ impl Said<'_> {
     }
 }
 
-/// Converts `[power]`, once its keys have been checked.
 pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError> {
     let table = "power.";
     let tx = Said {

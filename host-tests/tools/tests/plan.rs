@@ -34,7 +34,6 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Returns the exit status and the single line on standard error.
 fn refusal(arguments: &[&str]) -> (i32, String) {
     let output = plan(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
@@ -181,7 +180,6 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
     }
 }
 
-/// Checks that the worst hop's rate is divided by the number of slots, one per hop.
 #[test]
 fn rates_are_divided_by_the_slots() {
     for relays in [1_u32, 4, 8] {

@@ -171,7 +171,6 @@ fn heading(line: &str) -> Option<(u64, &str)> {
     Some((u64::from_str_radix(address, 16).ok()?, name))
 }
 
-/// Parses a line of code: `address: <tab> mnemonic <tab> operands`.
 fn instruction(line: &str, function: &mut Function) -> Result<(), StackError> {
     let mut parts = line.split('\t').map(str::trim).skip(1);
     let (Some(mnemonic), operands) = (parts.next(), parts.next().unwrap_or("")) else {

@@ -47,7 +47,6 @@ pub fn generate(name: &str, folder: &Path) -> io::Result<()> {
     fs::write(manifest, text.replace(CRATE, &format!("path = \"{path}\"")))
 }
 
-/// Copies a folder recursively.
 fn copy(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
@@ -62,7 +61,6 @@ fn copy(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Returns the relative path between two absolute folders.
 fn relative(from: &Path, to: &Path) -> PathBuf {
     let [from, to] = [from, to].map(|path| path.components().collect::<Vec<Component<'_>>>());
     let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();

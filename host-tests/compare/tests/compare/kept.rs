@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// Checks the table of RESULTS.md against the stored run.
 #[test]
 fn the_results_have_the_run_that_is_kept() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -91,7 +90,6 @@ fn without_python_it_says_so() {
     assert!(line.starts_with("python3 is not on PATH: "), "{line}");
 }
 
-/// Programs that do nothing replace Python: one fails, one succeeds.
 #[cfg(target_os = "linux")]
 #[test]
 fn without_venv_pip_or_packages_it_says_so() {

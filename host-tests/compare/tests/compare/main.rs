@@ -34,7 +34,6 @@ fn refusal(output: &Output, status: i32) -> String {
     text
 }
 
-/// Returns results with these runs of one problem, as of `--json`.
 fn results(choice: &str, relays: u16, runs: &[Value]) -> Value {
     json!({
         "machine": { "date": "2000-01-01", "processor": "Some CPU" },

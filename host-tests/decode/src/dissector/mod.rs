@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use crate::format::{Field, Format, Kind, Layout};
 
-/// Lua code that interprets the data.
 const ENGINE: &str = include_str!("engine.lua");
 
 const HEAD: &str = "\

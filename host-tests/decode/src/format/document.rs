@@ -107,7 +107,6 @@ fn fields(rows: &[Row], tables: &[Table<'_>]) -> Result<Vec<Field>, String> {
     Ok(all)
 }
 
-/// Returns the kind of a list's items.
 fn item(row: &Row, all: &[Table<'_>]) -> Result<Kind, String> {
     if row.kind != "seats" {
         return plain(&row.kind);

@@ -42,7 +42,6 @@ pub(super) fn tables(text: &str) -> Vec<Table<'_>> {
     all
 }
 
-/// Returns the rows of a table of fields, without the tag.
 pub(super) fn rows(table: &Table<'_>) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in &table.rows {

@@ -9,7 +9,6 @@ use crate::format::Field;
 use crate::refusal::Refusal;
 use crate::value::{Fields, Value, set};
 
-/// Least widths of the columns of names and values.
 const NAME: usize = 18;
 const VALUE: usize = 14;
 

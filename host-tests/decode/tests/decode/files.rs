@@ -6,7 +6,6 @@ use uav_relay_capture::{Capture, Direction, Frame};
 
 use super::{HEARTBEAT, decode, lines, name, piped, refusal};
 
-/// Returns a capture of two frames with `comment`.
 fn capture(comment: &str) -> Vec<u8> {
     let mut capture = Capture::new(Vec::new(), "a test", comment).unwrap();
     let port = capture.interface("ttyUSB0", "").unwrap();

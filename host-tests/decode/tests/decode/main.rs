@@ -35,7 +35,6 @@ fn piped(arguments: &[&str], input: &[u8]) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// Returns the lines on standard output of a successful run without messages on standard error.
 fn lines(arguments: &[&str], input: &[u8]) -> Vec<String> {
     let output = piped(arguments, input);
     let error = String::from_utf8_lossy(&output.stderr);

@@ -29,7 +29,6 @@ const DISSECTOR: &str = concat!(
     "/../../examples/wireshark/uav_relay.lua"
 );
 
-/// Number of frames of each message, and of the handshake.
 const EACH: usize = 200;
 
 const HURT: usize = 2_000;
@@ -43,7 +42,6 @@ fn the_dissector_is_that_of_the_tables() {
     );
 }
 
-/// Returns what `tshark` shows of these frames, one per packet.
 fn dissected(frames: &[Vec<u8>]) -> Vec<pdml::Packet> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("frames.pcapng");
@@ -114,7 +112,6 @@ fn random_frames_of_every_kind_say_what_cargo_decode_says() {
     println!("{} frames, {fields} fields", frames.len());
 }
 
-/// Returns the frames of the rejection table of FORMAT.md.
 fn rejected() -> Vec<Vec<u8>> {
     let document = include_str!("../../../../src/wire/FORMAT.md");
     let (_, section) = document.split_once("\n## Rejected").unwrap();

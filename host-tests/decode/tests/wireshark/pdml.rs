@@ -14,12 +14,10 @@ pub(crate) struct Shown {
     bytes: String,
 }
 
-/// Fields of one frame, in order.
 #[derive(Debug)]
 pub(crate) struct Packet(Vec<Shown>);
 
 impl Packet {
-    /// Returns what the field of this name shows.
     pub(crate) fn get(&self, name: &str) -> Option<&str> {
         let mut all = self.0.iter();
         all.find(|shown| shown.name == name)
@@ -34,7 +32,6 @@ impl Packet {
     }
 }
 
-/// Runs `tshark` with `dissector` on `file`.
 pub(crate) fn packets(file: &Path, dissector: &Path) -> Vec<Packet> {
     let output = Command::new("tshark")
         .arg("-X")

@@ -6,7 +6,6 @@ use super::link::Link;
 /// Relative bracket width at which the bisection of the target ends.
 const TOLERANCE: f64 = 1e-13;
 
-/// Targets below this are treated as zero.
 const LEAST_TARGET: f64 = 1e-250;
 
 impl Link {

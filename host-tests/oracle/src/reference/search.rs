@@ -76,7 +76,6 @@ fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
         })
 }
 
-/// Returns the largest value of a golden-section search on [`low`, `high`].
 fn golden(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let ratio = (5_f64.sqrt() - 1.0) / 2.0;
     let (mut a, mut b) = (high - ratio * (high - low), low + ratio * (high - low));

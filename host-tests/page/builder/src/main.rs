@@ -136,7 +136,6 @@ mod tests {
 
     use super::*;
 
-    /// Checks that the page is built in cargo's target folder.
     #[test]
     fn the_page_follows_the_target_folder_of_cargo() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -244,7 +244,6 @@ impl Space {
         (source.x_m, (source.y_m.abs() / self.unit).asinh())
     }
 
-    /// Returns the nearest allowed position, (x, y) in metres.
     fn place(&self, (x, u): (f64, f64)) -> (f64, f64) {
         let x = x.clamp(self.low, self.high);
         (x, self.unit * u.clamp(0.0, self.most_u).sinh())

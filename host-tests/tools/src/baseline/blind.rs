@@ -68,7 +68,6 @@ impl Hops<'_> {
         (self.relay.power_w / (self.scene.mu_los * signal_w)).sqrt()
     }
 
-    /// Returns the total length of all hops, m.
     fn span(&self, signal_w: f64) -> f64 {
         let between = (self.scene.relays.len() - 1) as f64 * self.between(signal_w);
         self.first(signal_w) + between + self.outer(self.relay.power_w, signal_w)

@@ -124,7 +124,6 @@ pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), Trouble> {
     })
 }
 
-/// Returns the panel around the paper's best altitude, with and without the paper's step.
 fn close_up(rows: &[Row]) -> Panel {
     let (low, high) = (f64::from(CLOSE_UP_M.0), f64::from(CLOSE_UP_M.1));
     let near = || {

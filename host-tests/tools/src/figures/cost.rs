@@ -83,7 +83,6 @@ fn row(relays: u16) -> Result<Row, Trouble> {
     })
 }
 
-/// Returns a panel with the three schedules; zero costs are omitted on the logarithmic axis.
 fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     let names = [
         "paper's step of 0.1",

@@ -11,14 +11,11 @@ use super::scale::Scale;
 use super::signs::{self, Sign};
 
 const WIDTH: u32 = 960;
-/// Height of a single panel with its axis titles.
 const PANEL: u32 = 560;
-/// Height of each of several panels.
 const PANEL_OF_SEVERAL: u32 = 470;
 const ROW: u32 = 44;
 const GAP: u32 = 10;
 const LETTER: u32 = 17;
-/// Distance from the start of a legend entry to its text.
 const SAMPLE: u32 = 104;
 
 const FONT: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
@@ -145,7 +142,6 @@ fn draw_line(plot: &mut Plot<'_, '_>, line: &Line) -> Result<(), NotDrawn> {
     Ok(())
 }
 
-/// Returns the points of a line that have a sign.
 fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
     match line.look.signs {
         Signs::None => Vec::new(),

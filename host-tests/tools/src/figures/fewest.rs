@@ -84,7 +84,6 @@ fn all_targets() -> Vec<u16> {
     (1..=MOST_TARGET).collect()
 }
 
-/// Returns a chart with one line per `name`.
 fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     let mut lines: Vec<Line> = Vec::new();
     for row in rows {

@@ -21,7 +21,6 @@ pub const CHOICES: [(f64, (f64, f64)); 4] = [
 /// Distance from Tx to Rx, m.
 pub const DISTANCE_M: f64 = 35.0;
 
-/// Positions along x per metre.
 const FINENESS: u8 = 20;
 
 /// Equal-SIR altitudes at one position, with one interferer.

@@ -63,7 +63,6 @@ impl Scale {
         }
     }
 
-    /// Returns the position of a value on the axis, 0 to 1.
     fn part(&self, value: f64) -> f64 {
         match self.kind {
             Kind::Linear => (value - self.from) / (self.to - self.from),
@@ -92,7 +91,6 @@ impl Scale {
         }
     }
 
-    /// Returns the minor grid lines of a logarithmic axis.
     fn minor(&self) -> Vec<f64> {
         match self.kind {
             Kind::Linear => Vec::new(),

@@ -17,10 +17,8 @@ pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
 /// Seed of the uneven field.
 pub const SEED: u64 = 4;
 
-/// Spacing of the uneven field's random points, m.
 const SPACING_M: u32 = 20;
 
-/// First shape parameter of every distribution.
 const ALPHA: f64 = 3.0;
 
 /// Largest interference power as a multiple of Lambda.

@@ -13,7 +13,6 @@ pub struct Board {
     pub name: &'static str,
     /// Rust target triple.
     pub target: &'static str,
-    /// Path of the package's manifest, from the checkout's root.
     manifest: &'static str,
     package: &'static str,
     /// True if the images are examples of the package, false if they are binaries.

@@ -74,6 +74,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), Trouble> {
     }
 }
 
+/// Returns the arithmetic mean; NaN if empty.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

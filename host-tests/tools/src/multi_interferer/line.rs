@@ -18,7 +18,6 @@ pub(super) struct Line<'a> {
     /// Quiet r = (I + N)^(-1/2) at the nodes, W^(-1/2).
     quiet: Vec<f64>,
     slope: Vec<f64>,
-    /// Local maxima of the first hop's SIR inside the line, m.
     tops: Vec<f64>,
 }
 
@@ -27,7 +26,6 @@ pub(super) struct Line<'a> {
 pub(super) struct Stride(f64);
 
 impl<'a> Line<'a> {
-    /// Samples the line at `altitude_m`, m, > 0.
     pub(super) fn new(scene: &'a Scene, altitude_m: f64) -> Self {
         let mut centres: Vec<Centre> = scene
             .sources

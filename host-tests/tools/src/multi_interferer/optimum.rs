@@ -8,7 +8,6 @@ use uav_relay_scenario::scene::Scene;
 /// Relative bracket width at which the bisection of the target ends.
 const TOLERANCE: f64 = 1e-13;
 
-/// Targets below this are treated as zero.
 const LEAST_TARGET: f64 = 1e-250;
 
 /// Relative rounding allowance on the least separation, so that a thousand relays that just fit are accepted.

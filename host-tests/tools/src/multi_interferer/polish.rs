@@ -41,7 +41,6 @@ struct Turn<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
     before: Sender,
-    /// Position of the next relay; `None` for the last one.
     next: Option<Place>,
     /// Least distance from the previous relay, m; 0 from Tx.
     apart_before: f64,

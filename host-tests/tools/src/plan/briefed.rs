@@ -34,7 +34,6 @@ impl Briefed {
             .map_or(self.mission.config().common, |(_, profile)| *profile)
     }
 
-    /// Returns true if all relays have the same altitude.
     pub(super) fn level(&self) -> bool {
         let common = self.mission.config().common;
         self.own

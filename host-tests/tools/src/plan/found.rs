@@ -123,7 +123,6 @@ impl Plan {
         self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// Returns the positions without profiles.
     pub(super) fn chain(&self) -> Vec<Placement> {
         self.places.iter().map(|(place, _)| *place).collect()
     }

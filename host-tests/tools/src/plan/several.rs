@@ -228,7 +228,6 @@ impl Planner<'_> {
 }
 
 impl Candidates {
-    /// Returns the better SIR of both chains.
     fn sir(&self) -> f64 {
         let one = self.by_one.as_ref().map_or(0.0, |(_, sir)| *sir);
         let all = self.by_all.as_ref().map_or(0.0, |best| best.sir);

@@ -30,7 +30,6 @@ fn link_of(row: &Row<'_>, relays: f64) -> Link {
     )
 }
 
-/// Checks the table: its number of relays meets the target, one fewer does not.
 #[test]
 fn the_fewest_relays_meet_the_target_and_one_fewer_do_not() {
     for name in ["fewest-by-place", "fewest-by-power"] {

@@ -10,7 +10,6 @@ use uav_relay_tools::figures::ALL;
 
 use super::{figures, written};
 
-/// Returns the files of the full run, except the page.
 fn files() -> BTreeSet<String> {
     let all = fs::read_dir(written()).unwrap();
     let name =
@@ -247,7 +246,6 @@ fn the_page_begins_with_its_contents() {
     assert!(!contents.contains("<figure"), "the contents come first");
 }
 
-/// Every finished figure prints a line if there is no terminal, to show progress in a run of a minute.
 #[test]
 fn every_finished_figure_is_told() {
     let folder = TempDir::new().unwrap();

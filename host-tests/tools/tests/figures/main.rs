@@ -73,7 +73,6 @@ impl Table {
             .unwrap_or_else(|| panic!("no {name} in {:?}", self.head))
     }
 
-    /// Returns the rows with these values in these columns.
     fn rows(&self, of: &[(&str, f64)]) -> Vec<Row<'_>> {
         let matches = |row: &Row<'_>| of.iter().all(|(name, value)| row.get(name) == Some(*value));
         let all = self.rows.iter().map(|cells| Row { table: self, cells });

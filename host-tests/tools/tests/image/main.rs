@@ -10,7 +10,6 @@ use uav_relay_tools::image::uf2::{Family, PAGE};
 use uav_relay_tools::image::{hex, uf2};
 use uav_relay_tools::provision::config::LEN;
 
-/// Returns a 32-bit ELF with these segments: load address, run address, bytes.
 fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
     let count = u16::try_from(segments.len()).unwrap();
     let mut file = Vec::from(*b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0");

@@ -2,7 +2,6 @@
 
 use std::process::{Command, Stdio};
 
-/// Returns the exit status with standard output and standard error closed by the reader.
 fn unheard(tool: &str, arguments: &[&str]) -> Option<i32> {
     let pipe = || {
         let (reader, writer) = std::io::pipe().unwrap();

@@ -27,7 +27,6 @@ fn said(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Returns the exit status and the single line on standard error.
 fn refusal(arguments: &[&str]) -> (i32, String) {
     let output = plan(arguments);
     let line = String::from_utf8(output.stderr).unwrap();

@@ -388,7 +388,6 @@ fn for_the_firmware(text: &str) -> String {
     kept.collect::<Vec<_>>().join("\n")
 }
 
-/// The command named by `plan --out` accepts the written file.
 #[test]
 fn the_next_command_takes_the_file() {
     let folder = tempfile::tempdir().unwrap();

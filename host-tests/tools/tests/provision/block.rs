@@ -76,7 +76,6 @@ fn a_block_is_what_the_table_says() {
     );
 }
 
-/// A longer silence before a neighbour is probed.
 #[test]
 fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
     let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
@@ -96,7 +95,6 @@ fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
     assert_eq!(ms(usual), times.map(uav_relay::Duration::as_micros));
 }
 
-/// Checks that a block is read back unchanged.
 #[test]
 fn a_drone_reads_what_it_is_to_do() {
     let scenario = Scenario {

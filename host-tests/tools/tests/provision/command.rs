@@ -243,7 +243,6 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     assert!(refusal(&both).contains("--wires"));
 }
 
-/// Section `network` is written to the block or refused, never ignored.
 #[test]
 fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     let folder = tempfile::tempdir().unwrap();

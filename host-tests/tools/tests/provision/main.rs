@@ -32,7 +32,6 @@ fn paper() -> Block {
     flight.block(3).unwrap()
 }
 
-/// Returns a scenario with a field of `points` points, up to 2e-10 W.
 fn in_a_field(points: usize) -> Scenario {
     let point = |k| BetaPoint {
         x_m: 100.0 * k as f64,
@@ -60,7 +59,6 @@ fn write_key(file: impl AsRef<Path>, key: &str) {
     std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
 }
 
-/// Reads a block as a drone does.
 fn reads(block: &Block) -> Result<Config, ConfigError> {
     read(block, Box::leak(Box::new(EMPTY)))
 }
@@ -77,7 +75,6 @@ fn changed(mut block: Block, at: usize, bytes: &[u8]) -> Block {
     block
 }
 
-/// Returns the arguments that write the block of [`paper`] to `out`.
 fn of_paper(out: &str) -> [&str; 8] {
     [
         "--uavs",

@@ -182,7 +182,6 @@ fn a_field_out_of_range_is_named() {
     }
 }
 
-/// Asserts that a relay accepts the configuration that was read.
 fn flies(config: &Config) {
     let settings = Settings {
         profile: Some(config.profile),
@@ -201,7 +200,6 @@ fn flies(config: &Config) {
     }
 }
 
-/// Checks random bytes with a valid CRC: a configuration in range, or an error.
 #[test]
 fn any_bytes_are_a_configuration_or_an_error() {
     let mut rng = ChaCha8Rng::seed_from_u64(uav_relay_oracle::random::seed(41));

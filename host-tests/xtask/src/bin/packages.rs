@@ -55,7 +55,6 @@ fn tree(arguments: &[&str]) -> Result<String, String> {
     }
 }
 
-/// Returns the packages with a licence that is not allowed.
 fn licences() -> Result<Vec<String>, String> {
     let text = tree(&["--workspace", "--edges=all", "--format={l}|{p}"])?;
     let lines = text.lines().filter(|line| line.contains('|'));
@@ -88,7 +87,6 @@ fn twice() -> Result<Vec<String>, String> {
     Ok(versions.into_iter().map(told).collect())
 }
 
-/// Returns the locked packages that are not from the registry.
 fn elsewhere(lock: &str) -> Vec<String> {
     let sources = lock.lines().filter(|line| line.starts_with("source = "));
     let other = sources.filter(|line| !line.starts_with("source = \"registry+"));

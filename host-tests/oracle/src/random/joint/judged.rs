@@ -13,7 +13,6 @@ pub const COUNT: u32 = 2000;
 /// File with the optima.
 pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
-/// Seed of the scenarios; each uses its own stream.
 const SEED: u64 = 2021;
 
 /// Returns the scenario of a number below [`COUNT`]: 1 to 100 relays, numbers rounded to f32.

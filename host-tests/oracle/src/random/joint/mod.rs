@@ -208,7 +208,6 @@ fn aside(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// Draws `mu_los`, `mu_nlos` and eta.
 fn channel(rng: &mut impl Rng) -> (f64, f64, f64) {
     if rng.random() {
         let Link {

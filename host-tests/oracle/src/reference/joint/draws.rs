@@ -9,7 +9,6 @@ use super::space::Across;
 /// Part of the corridor for random levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
-    /// The whole corridor.
     Any,
     /// Positions with y at most the interferer's.
     Left,

@@ -18,7 +18,6 @@ pub(super) fn kicked(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> V
     }
 }
 
-/// Draws a range of consecutive relays.
 fn row(chain: &[Triple], rng: &mut ChaCha8Rng) -> std::ops::RangeInclusive<usize> {
     let (one, other) = (
         rng.random_range(0..chain.len()),

@@ -18,7 +18,6 @@ type Reach = Vec<(Across, Vec<Interval>)>;
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
     pub(super) levels: Vec<Across>,
-    /// Range along Tx-Rx, both ends included.
     pub(super) window: Interval,
 }
 

@@ -56,9 +56,7 @@ impl Log {
 pub(super) struct Limit {
     pub(super) relay: usize,
     pub(super) value: f64,
-    /// Slope by the relay's own position.
     pub(super) own: Triple,
-    /// Slope by the predecessor's position.
     pub(super) before: Triple,
     /// Slope by the target: -1 for hops, 0 for margins.
     pub(super) target: f64,

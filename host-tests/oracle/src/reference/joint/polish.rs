@@ -80,7 +80,6 @@ struct Direction {
 }
 
 impl Direction {
-    /// Returns the steps of a relay and its predecessor.
     fn of(&self, relay: usize) -> (Triple, Triple) {
         let step = |i: usize| self.steps.get(i).copied();
         let before = relay.checked_sub(1).and_then(step);
@@ -152,7 +151,6 @@ impl Iterate {
         false
     }
 
-    /// Returns the first-order change of every constraint along a direction.
     fn changes(&self, along: &Direction) -> Vec<f64> {
         self.limits
             .iter()
@@ -163,7 +161,6 @@ impl Iterate {
             .collect()
     }
 
-    /// Returns the second-order change of every constraint along a direction.
     fn bends(&self, along: &Direction) -> Vec<f64> {
         self.limits
             .iter()

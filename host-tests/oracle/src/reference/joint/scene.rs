@@ -70,7 +70,6 @@ impl Room {
 /// A link and its corridor, with all lengths in units of D.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
-    /// Position of the interferer, on the ground.
     pub(super) interferer: Triple,
     /// Room of relays without a fixed position.
     pub(super) corridor: Room,

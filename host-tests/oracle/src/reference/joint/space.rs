@@ -44,7 +44,6 @@ impl Triple {
         self.x * other.x + self.y * other.y + self.h * other.h
     }
 
-    /// Multiplies element by element.
     pub(super) fn times(self, other: Self) -> Self {
         Self::new(self.x * other.x, self.y * other.y, self.h * other.h)
     }
@@ -178,11 +177,9 @@ impl Mul<f64> for Square {
     }
 }
 
-/// A lower triangular Cholesky factor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Factor {
     diagonal: Triple,
-    /// Elements (y, x), (h, x) and (h, y).
     below: Triple,
 }
 

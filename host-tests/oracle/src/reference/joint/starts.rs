@@ -43,7 +43,6 @@ const WORTH: f64 = 1e-8;
 const FAR: f64 = 1.0;
 const NEAR: f64 = 0.03;
 
-/// Whole range along Tx-Rx.
 const ANYWHERE: (f64, f64) = (0.0, 1.0);
 
 /// Columns and rows of the levels by round.
@@ -54,7 +53,6 @@ const BOWS: u32 = 8;
 const SCATTERED: u32 = 2;
 const KICKS: u32 = 10;
 
-/// Returns the best chain of all starts.
 pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
     if scene.rooms.iter().all(Room::is_point) {
         let any = vec![Across::default(); scene.len()];
@@ -198,7 +196,6 @@ impl Search<'_> {
         }
     }
 
-    /// Tries bent chains, with the best positions along the line.
     fn bowed(&mut self, rng: &mut ChaCha8Rng) {
         for _ in 0..BOWS {
             let bow = bow(&self.scene.corridor, rng, self.scene.len());
@@ -209,7 +206,6 @@ impl Search<'_> {
         }
     }
 
-    /// Tries a chain of random positions, sorted.
     fn scattered(&mut self, rng: &mut ChaCha8Rng) {
         let mut along: Vec<f64> = (0..self.scene.len()).map(|_| rng.random()).collect();
         along.sort_unstable_by(f64::total_cmp);
@@ -288,7 +284,6 @@ impl Search<'_> {
         steps.all(|step| step.x > 0.0 && step.dot(step) > apart_2)
     }
 
-    /// Returns the ln SIR of the best chain so far.
     fn sir(&self) -> f64 {
         self.best.as_ref().map_or(LEAST, |(sir, _)| *sir)
     }

@@ -7,9 +7,7 @@ use super::space::{Factor, Square, Triple};
 pub(super) struct Block {
     /// Coefficients of the relay itself; symmetric.
     pub(super) own: Square,
-    /// Coefficients of the predecessor.
     pub(super) before: Square,
-    /// Coefficients of the common unknown.
     pub(super) common: Triple,
     pub(super) right: Triple,
 }

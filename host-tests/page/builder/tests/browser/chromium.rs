@@ -18,12 +18,10 @@ pub(crate) struct Browser {
     session: String,
     number: u64,
     errors: Vec<String>,
-    /// Profile folder, removed with the browser.
     _folder: tempfile::TempDir,
 }
 
 impl Browser {
-    /// Opens `url` in a window of this size.
     pub(crate) fn start(url: &str, width: u32, height: u32) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut process = Command::new("chromium")
@@ -113,7 +111,6 @@ impl Browser {
         }
     }
 
-    /// Evaluates an expression of the page's script.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters =
             json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
@@ -179,7 +176,6 @@ impl Browser {
         touch("touchEnd", json!([]));
     }
 
-    /// Emulates a preference for dark colours.
     pub(crate) fn prefer_dark(&mut self) {
         let features = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
         self.call("Emulation.setEmulatedMedia", &features);
@@ -220,7 +216,6 @@ impl Browser {
         base64::prelude::BASE64_STANDARD.decode(data).unwrap()
     }
 
-    /// Returns the errors in the page's console.
     pub(crate) fn errors(&mut self) -> Vec<String> {
         // Waits for a reply, after all earlier messages.
         self.value("0");

@@ -5,7 +5,6 @@ use std::process::Command;
 use crate::chromium::Browser;
 use crate::opened::{choose, opened, press, root, sir};
 
-/// Returns the output of `cargo chain --json` for the page's last run.
 fn native(browser: &mut Browser) -> String {
     let toml = browser.text("window.last.toml");
     let words = browser.text("window.last.words");

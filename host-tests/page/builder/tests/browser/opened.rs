@@ -13,7 +13,6 @@ pub(crate) fn root() -> &'static Path {
         .unwrap()
 }
 
-/// Builds the page once and returns its path.
 pub(crate) fn page() -> &'static PathBuf {
     static PAGE: OnceLock<PathBuf> = OnceLock::new();
     PAGE.get_or_init(|| {
@@ -67,7 +66,6 @@ pub(crate) fn number(browser: &mut Browser, expression: &str) -> f64 {
     browser.value(expression).as_f64().unwrap()
 }
 
-/// Returns the SIR of the worst hop in the page's report.
 pub(crate) fn sir(browser: &mut Browser) -> f64 {
     number(browser, "window.last.told.report.sir")
 }

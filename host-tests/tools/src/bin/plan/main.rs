@@ -129,7 +129,6 @@ fn plain(scenario: &Scenario, ask: &Ask, bandwidth_hz: Option<f64>) -> Result<Pl
     })
 }
 
-/// Plans the fewest relays that carry a data rate over a bandwidth.
 fn by_rate(
     scenario: &Scenario,
     ask: &Ask,
@@ -147,7 +146,6 @@ fn by_rate(
     })
 }
 
-/// Returns the error message for a data rate that no number of relays carries.
 fn too_fast(rates: &RateReport) -> String {
     let target_bps = rates.target_rate_bps.unwrap_or_default();
     let tried = rates.best.tried_uavs;

@@ -8,7 +8,6 @@ use uav_relay_tools::plan::map::{Map, geojson, kml};
 use crate::options::Options;
 use crate::out::save;
 
-/// Checks that the scenario has geographic coordinates if a map is requested.
 pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let option = match (&options.geojson, &options.kml) {
         (Some(_), _) => "--geojson",

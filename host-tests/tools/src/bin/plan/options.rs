@@ -80,7 +80,6 @@ pub(crate) enum Altitude {
 }
 
 impl Options {
-    /// Returns the scenario's name for messages.
     pub(crate) fn file(&self) -> String {
         self.scenario.as_ref().map_or_else(
             || "default scenario".into(),

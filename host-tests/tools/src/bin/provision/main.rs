@@ -26,7 +26,6 @@ use options::{Method, Options};
 struct Asked<'a> {
     options: &'a Options,
     scenario: Scenario,
-    /// Name of the scenario for messages.
     name: String,
     network: u16,
     key_file: Option<PathBuf>,
@@ -93,7 +92,6 @@ fn run(options: &Options) -> Result<String, String> {
 }
 
 impl<'a> Asked<'a> {
-    /// Combines the options with the scenario and its plan.
     fn new(options: &'a Options) -> Result<Self, String> {
         let (
             scenario,
@@ -181,7 +179,6 @@ impl<'a> Asked<'a> {
         })
     }
 
-    /// Returns the configuration that all drones share.
     fn flight(&self, secret: Option<Secret>) -> Result<Flight, String> {
         let options = self.options;
         let method = match self.method {

@@ -73,7 +73,6 @@ fn table(counted: &BTreeMap<String, u64>, of: &[Counted]) -> Result<Vec<Row>, St
     Ok(rows)
 }
 
-/// Figures of frames with a tag.
 const SIGNED: &[Counted] = &[
     (
         "the tag of a body of 32 bytes, made or checked",

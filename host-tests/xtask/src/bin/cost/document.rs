@@ -14,7 +14,6 @@ const CLOCK_MHZ: u64 = 168;
 
 /// A document with its current and its expected text.
 pub(crate) struct Document {
-    /// Path in the checkout.
     name: &'static str,
     path: PathBuf,
     kept: String,
@@ -31,14 +30,12 @@ impl Document {
         self.name
     }
 
-    /// Writes the measured costs to the document.
     pub(crate) fn write(&self) -> Result<(), String> {
         let written = std::fs::write(&self.path, &self.measured);
         written.map_err(|error| format!("{}: {error}", self.name))
     }
 }
 
-/// Returns the table of all rows.
 pub(crate) fn table(rows: &[Row]) -> String {
     let lines = rows.iter().map(|row| {
         let (what, unit, value) = (row.what, row.unit, row.value);
@@ -61,7 +58,6 @@ fn milliseconds(instructions: u64) -> String {
     format!("{}.{:03} ms", micros / 1_000, micros % 1_000)
 }
 
-/// Returns both documents of the checkout at `root`.
 pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     let results = with(root, "host-tests/RESULTS.md", |text| {
         let begin = text.find(HEAD)?;

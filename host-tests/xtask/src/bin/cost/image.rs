@@ -11,7 +11,6 @@ use super::row::{Row, row};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Name of the relay image.
 const RELAY: &str = "stm32f405";
 
 /// Name of the image on asynchronous ports, compared with [`RELAY`] with Algorithm 1 alone.
@@ -121,7 +120,6 @@ fn of(
     ])
 }
 
-/// Runs a command and returns its output if it succeeded.
 pub(crate) fn run(command: &mut Command) -> Result<Output, String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let output = command
@@ -137,7 +135,6 @@ pub(crate) fn run(command: &mut Command) -> Result<Output, String> {
     }
 }
 
-/// Returns a cargo command for one example with the firmware profile.
 fn cargo(command: &str, example: &str) -> Command {
     let mut cargo = Command::new("cargo");
     cargo
@@ -156,7 +153,6 @@ pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
         .join(example))
 }
 
-/// Returns the bytes of flash and of static RAM of an image.
 pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
     let bytes = std::fs::read(elf).map_err(|error| format!("{}: {error}", elf.display()))?;
     let file = object::File::parse(&*bytes).map_err(|error| error.to_string())?;

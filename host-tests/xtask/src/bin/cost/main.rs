@@ -76,7 +76,6 @@ fn report(rows: &[Row], write: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns the first two numbers of a program's version.
 fn version(program: &str) -> Result<String, String> {
     let output = Command::new(program).arg("--version").output();
     let output = output.map_err(|error| format!("{program}: {error}"))?;

@@ -10,7 +10,6 @@ pub(crate) enum Kind {
     Commands(Option<String>),
     /// Output of a command, or any other text.
     Text,
-    /// Another language.
     Other,
 }
 
@@ -30,7 +29,6 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Returns the commands as a script.
     pub(crate) fn commands(&self) -> String {
         let lines = self.lines.iter().map(String::as_str);
         let commands: Vec<&str> = if self.is_console {

@@ -15,7 +15,6 @@ const PACKAGES: [&str; 4] = [
 /// Time limit of a block, s.
 const LIMIT_S: u32 = 60;
 
-/// Files that a clean clone lacks.
 const NOT_CLONED: [&str; 2] = ["target", ".git"];
 
 /// Folder, and script that is run before each block.
