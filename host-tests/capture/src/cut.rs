@@ -1,18 +1,18 @@
-//! A stream of bytes cut into frames at the delimiters.
+//! Splits a byte stream into frames at the delimiters.
 
-/// Bytes of one piece that are kept. The longest frame has 137; a longer piece is noise, whose begin is enough.
+/// Bytes stored per piece. The longest frame has 137; a longer piece is noise, and only its start is kept.
 pub const MOST: usize = 1_024;
 
-/// What stands between two delimiters, and the one that ends it.
+/// Bytes between two delimiters, including the final one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece<'a> {
-    /// Its bytes, the delimiter last; of a piece longer than [`MOST`] the first ones.
+    /// The bytes with the delimiter; of a piece longer than [`MOST`] the first ones.
     pub bytes: &'a [u8],
-    /// How many there were.
+    /// Length of the piece before truncation.
     pub len: usize,
 }
 
-/// Collects one piece at a time. How the stream is cut into reads makes no difference.
+/// Stream splitter. The result does not depend on how the stream is split into reads.
 #[derive(Clone, Debug, Default)]
 pub struct Cut {
     bytes: Vec<u8>,
@@ -20,11 +20,12 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Takes in `bytes`, and hands every piece that is whole by then to `take`. Delimiters in a row are no pieces. Work linear in the number of
-    /// bytes, memory of [`MOST`].
+    /// Appends `bytes` and passes each completed piece to `take`; empty pieces are skipped.
+    ///
+    /// Work is linear in the number of bytes, memory at most [`MOST`].
     ///
     /// # Errors
-    /// The first of `take`; what follows that piece is lost.
+    /// The first error of `take`; the bytes after that piece are lost.
     pub fn push<E>(
         &mut self,
         bytes: &[u8],
@@ -51,7 +52,7 @@ impl Cut {
         Ok(())
     }
 
-    /// What the stream ends in, if that is not a delimiter.
+    /// Returns the incomplete piece at the end of the stream, if any.
     pub fn rest(&self) -> Option<Piece<'_>> {
         (self.len > 0).then_some(Piece {
             bytes: &self.bytes,

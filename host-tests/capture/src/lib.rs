@@ -1,7 +1,7 @@
-//! What goes over the air as a pcapng capture, for Wireshark and `cargo decode`.
+//! Writes frames as a pcapng capture, for Wireshark and `cargo decode`.
 //!
-//! A packet is one frame as it is on the wire, COBS and delimiter included, under LINKTYPE_USER0 (147). A [`Capture`] writes frames;
-//! [`Cut`] makes frames of a stream of bytes, for whoever reads a port.
+//! A packet is one frame as on the wire, with COBS and delimiter, under LINKTYPE_USER0 (147). A [`Capture`] writes frames;
+//! [`Cut`] splits the byte stream of a port into frames.
 //!
 //! ```
 //! use std::time::Duration;

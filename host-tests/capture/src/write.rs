@@ -1,12 +1,12 @@
-//! The writer of a capture.
+//! Writer of pcapng captures.
 
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// The link type of a capture: LINKTYPE_USER0, for which the dissector is registered.
+/// Link type of a capture: LINKTYPE_USER0, for which the dissector is registered.
 pub const LINK_TYPE: u32 = 147;
 
-// Blocks, options and the byte-order magic of the pcapng format (draft-ietf-opsawg-pcapng).
+// Block types, options and byte-order magic of the pcapng format (draft-ietf-opsawg-pcapng).
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const BYTE_ORDER: u32 = 0x1A2B_3C4D;
 const INTERFACE_DESCRIPTION: u32 = 1;
@@ -19,23 +19,22 @@ const INTERFACE_DESCRIPTION_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
 
-/// Times are in nanoseconds: 10^-9 s.
+/// Resolution of timestamps: 10^-9 s.
 const NANOSECONDS: u8 = 9;
 
-/// Which way a frame went, as seen by who writes the capture.
+/// Direction of a frame, relative to the node that writes the capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Direction {
-    /// Past it.
+    /// Observed in passing, or unknown.
     #[default]
     Unknown,
-    /// To it.
+    /// Received.
     In,
-    /// From it.
+    /// Sent.
     Out,
 }
 
 impl Direction {
-    /// The lowest two bits of the flags of a packet.
     const fn bits(self) -> u32 {
         match self {
             Self::Unknown => 0,
@@ -45,22 +44,22 @@ impl Direction {
     }
 }
 
-/// A port, a link or a channel of a capture.
+/// Handle of a port, link or channel in a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Interface(u32);
 
-/// One frame of a capture.
+/// A frame of a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Frame<'a> {
-    /// When its last byte was on the wire, since 1970; a virtual clock counts from its own begin.
+    /// Time of its last byte, since 1970; in a simulation, virtual time since the start.
     pub at: Duration,
-    /// It, as it was on the wire: COBS, and the delimiter last.
+    /// Bytes on the wire: COBS, with the final delimiter.
     pub bytes: &'a [u8],
-    /// How many bytes it had, where not all of them are there.
+    /// Original length, if `bytes` is truncated.
     pub len: usize,
-    /// Which way it went.
+    /// Direction.
     pub direction: Direction,
-    /// What is to be said of it; nothing if it is empty.
+    /// Comment; empty for none.
     pub comment: &'a str,
 }
 
@@ -79,9 +78,9 @@ impl<W: Write> std::fmt::Debug for Capture<W> {
 }
 
 impl<W: Write> Capture<W> {
-    /// Begins a capture in `out`: `application` is who writes it, `comment` what is to be said of it all, nothing if it is empty.
+    /// Starts a capture in `out`, written by `application`; `comment` describes the whole capture, empty for none.
     ///
-    /// Every frame is handed to `out` at once; whether that keeps it back is its own affair.
+    /// Each frame is passed to `out` at once, which may buffer it.
     ///
     /// # Errors
     /// `out` cannot be written to.
@@ -91,7 +90,7 @@ impl<W: Write> Capture<W> {
         // Version 1.0 of the format.
         block.u16(1);
         block.u16(0);
-        // The length of the section is not known while it is written.
+        // Section length: unknown while writing.
         block.bytes(&[0xFF; 8]);
         block.option(USER_APPLICATION, application.as_bytes());
         block.text(COMMENT, comment);
@@ -100,15 +99,15 @@ impl<W: Write> Capture<W> {
         Ok(capture)
     }
 
-    /// A port, a link or a channel more.
+    /// Adds a port, link or channel.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The capture cannot be written.
     pub fn interface(&mut self, name: &str, description: &str) -> io::Result<Interface> {
         let mut block = Block::new(INTERFACE_DESCRIPTION);
-        // The link type has 16 bits, and 16 reserved ones behind it.
+        // The link type has 16 bits, followed by 16 reserved ones.
         block.u32(LINK_TYPE);
-        // Frames are not cut.
+        // No limit on the length of packets.
         block.u32(0);
         block.option(INTERFACE_NAME, name.as_bytes());
         block.option(INTERFACE_RESOLUTION, &[NANOSECONDS]);
@@ -119,10 +118,10 @@ impl<W: Write> Capture<W> {
         Ok(interface)
     }
 
-    /// A frame more.
+    /// Adds a frame.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The capture cannot be written.
     pub fn frame(&mut self, interface: Interface, frame: &Frame<'_>) -> io::Result<()> {
         let nanoseconds = u64::try_from(frame.at.as_nanos()).unwrap_or(u64::MAX);
         let [high, low] = [nanoseconds >> 32, nanoseconds & 0xFFFF_FFFF]
@@ -141,18 +140,18 @@ impl<W: Write> Capture<W> {
         block.write(&mut self.out)
     }
 
-    /// Has `out` keep nothing back, so that whoever follows the file sees all frames so far.
+    /// Flushes `out`, so that readers of the file see all frames so far.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The capture cannot be written.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    /// Ends it: what it was written to, all of it written there.
+    /// Flushes and returns `out`.
     ///
     /// # Errors
-    /// The last of it cannot be written.
+    /// The capture cannot be written.
     pub fn finish(self) -> io::Result<W> {
         let Self { mut out, .. } = self;
         out.flush()?;
@@ -160,7 +159,7 @@ impl<W: Write> Capture<W> {
     }
 }
 
-/// A block of the format: type, length, contents, and the length again. Numbers are little-endian; contents are padded to four bytes.
+/// A pcapng block: type, length, contents, and the length again. Little-endian; contents are padded to four bytes.
 struct Block {
     kind: u32,
     contents: Vec<u8>,
@@ -188,14 +187,13 @@ impl Block {
         self.bytes(&number.to_le_bytes());
     }
 
-    /// Bytes, and zeros up to a multiple of four.
     fn padded(&mut self, bytes: &[u8]) {
         self.bytes(bytes);
         let full = self.contents.len().next_multiple_of(4);
         self.contents.resize(full, 0);
     }
 
-    /// An option; a value longer than its 16-bit length field can say is cut.
+    /// Appends an option; a value too long for the 16-bit length field is cut.
     fn option(&mut self, code: u16, value: &[u8]) {
         let length = u16::try_from(value.len()).unwrap_or(u16::MAX);
         self.u16(code);
@@ -204,14 +202,13 @@ impl Block {
         self.has_options = true;
     }
 
-    /// An option with a text, unless that is empty.
     fn text(&mut self, code: u16, text: &str) {
         if !text.is_empty() {
             self.option(code, text.as_bytes());
         }
     }
 
-    /// Ends the options, and writes the block in one piece.
+    /// Ends the options, and writes the block in one call.
     fn write(mut self, out: &mut impl Write) -> io::Result<()> {
         if self.has_options {
             self.u16(END_OF_OPTIONS);

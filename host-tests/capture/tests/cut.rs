@@ -1,4 +1,4 @@
-//! A stream gives the same pieces however it is read, and a capture the same frames that went in.
+//! Splitting does not depend on the reads, and a capture returns the frames written to it.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::convert::Infallible;
@@ -10,7 +10,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay_capture::{Capture, Cut, Direction, Frame, MOST};
 
-/// The pieces of `reads`, each with its length, and how long the rest is.
+/// Returns the pieces of `reads` with their lengths, and the length of the rest.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
     let (mut cut, mut all) = (Cut::default(), Vec::new());
     for read in reads {

@@ -1,4 +1,4 @@
-//! What the commands have in common: how they refuse, and numbers from the command line.
+//! Shared parts of the commands: errors, output and parsing of numbers.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -7,20 +7,20 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use uav_relay::{ChannelLoad, Duration};
 
-/// The fastest link there is, bit/s.
+/// Largest data rate, bit/s.
 pub const MOST_BAUD: u32 = 10_000_000;
 
-/// Why there is no result: the one line on standard error, and the exit status.
+/// Error of a command: the line on standard error, and the exit status.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Failure {
-    /// 1: it ran, but nothing meets what was asked. 2: the input is wrong.
+    /// 1: the request cannot be met. 2: the input is wrong.
     pub status: u8,
-    /// What is wrong, in one line.
+    /// Error message, one line.
     pub line: String,
 }
 
 impl Failure {
-    /// The input is wrong.
+    /// Creates an error for wrong input.
     pub fn input(line: impl Into<String>) -> Self {
         Self {
             status: 2,
@@ -28,7 +28,7 @@ impl Failure {
         }
     }
 
-    /// Nothing meets what was asked.
+    /// Creates an error for a request that cannot be met.
     pub fn unmet(line: impl Into<String>) -> Self {
         Self {
             status: 1,
@@ -37,7 +37,7 @@ impl Failure {
     }
 }
 
-/// The exit status of a command, after the line on standard error where it failed.
+/// Prints the error, if any, and returns the exit status.
 pub fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -48,7 +48,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
     }
 }
 
-/// Help as it is; of an error one line that says what is wrong, and what is allowed.
+/// Prints help, or an option error as one line that says what is allowed, and returns the exit status.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         print(&error.to_string());
@@ -58,19 +58,18 @@ pub fn usage(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// What is wrong with the options, in one line.
 fn wrong(error: &clap::Error) -> String {
     let text = error.to_string();
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
     let mut wrong = lines.next().unwrap_or("wrong options").to_owned();
-    // Options that are missing are listed below the first line.
+    // clap lists missing options below the first line.
     if wrong.ends_with(':') {
         for missing in lines.take_while(|line| line.starts_with("  ")) {
             wrong.push(' ');
             wrong.push_str(missing.trim());
         }
     }
-    // So are the values that there are, and what may have been meant.
+    // Allowed values and suggestions are listed separately, too.
     let told = |kind| match error.get(kind) {
         Some(ContextValue::String(one)) => one.clone(),
         Some(ContextValue::Strings(all)) => all.join(", "),
@@ -89,35 +88,35 @@ fn wrong(error: &clap::Error) -> String {
     wrong.trim_start_matches("error: ").to_owned()
 }
 
-/// Says `line` on standard error. Where nobody reads that, the exit status has to do.
+/// Prints `line` on standard error; a closed pipe is ignored.
 pub fn complain(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Prints `text`. A reader that has had enough, such as `head`, is no fault of the command.
+/// Prints `text`; a closed pipe, such as that of `head`, is ignored.
 pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// Says `line` on standard error. Nobody there to hear it is no fault of the command either.
+/// Prints `line` on standard error; a closed pipe is ignored.
 pub fn say(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// A report as one JSON object.
+/// Formats a report as one JSON object.
 ///
 /// # Errors
-/// A number that JSON does not have.
+/// A number that JSON cannot represent.
 pub fn json(report: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string(report)
         .map(|json| json + "\n")
         .map_err(|error| Failure::input(error.to_string()))
 }
 
-/// Writes the picture that `--svg` asks for.
+/// Writes the picture of `--svg`.
 ///
 /// # Errors
-/// Names the file, and why it cannot be written.
+/// Names the file and the reason.
 pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
     std::fs::write(file, drawing).map_err(|error| {
         Failure::input(format!(
@@ -127,10 +126,10 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
     })
 }
 
-/// Whether a channel of `baud` carries relays that share it and ask a silent neighbour after `probe_after`.
+/// Checks that a channel of `baud` carries relays that share it and probe a silent neighbour after `probe_after`.
 ///
 /// # Errors
-/// The least that does, how many relays share the channel, and what else would fit.
+/// The least sufficient data rate, the number of relays on the channel, and the alternatives.
 pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<(), String> {
     load.carried(baud, probe_after).map_err(|full| {
         let least = full.least_baud;
@@ -138,10 +137,10 @@ pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<()
     })
 }
 
-/// A number of the command line, within `least` to `most`.
+/// Parses a number of the command line within `least` to `most`.
 ///
 /// # Errors
-/// The range, where it is not one of them.
+/// The allowed range.
 pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     let range = || format!("must be a number within {least:?} to {most:?}");
     let value: f64 = text.parse().map_err(|_| range())?;
@@ -152,7 +151,7 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// What reads a whole number of the command line, within `least` to `most`.
+/// Returns a parser of whole numbers of the command line within `least` to `most`.
 pub fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
     T: std::str::FromStr + std::fmt::Display + PartialOrd + Copy + Send + Sync,
@@ -166,10 +165,10 @@ where
     }
 }
 
-/// A file of the command line that is written to. Standard output, which `-` stands for elsewhere, has the report.
+/// Parses the name of an output file; `-` is rejected, because standard output carries the report.
 ///
 /// # Errors
-/// What to say instead of `-`, and that it must not be empty.
+/// The name is empty or `-`, with the alternative.
 pub fn file(text: &str) -> Result<PathBuf, String> {
     match text {
         "" => Err("must be the name of a file".to_owned()),

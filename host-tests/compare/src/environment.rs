@@ -1,20 +1,18 @@
-//! Python with the packages of the other solvers, in a virtual environment of its own.
+//! Virtual environment of Python with the packages of the other solvers.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where it is unless told otherwise: beside what is built.
+/// Default folder of the environment: in the target folder.
 pub(crate) const USUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/compare");
 
-/// The packages, each with its version.
 const REQUIREMENTS: &str = include_str!("../rivals/requirements.txt");
 const REQUIREMENTS_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/requirements.txt");
 
-/// The interpreter in `venv`; makes the environment and installs the packages where they are not there yet.
 pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     let python = venv.join("bin").join("python");
-    // Written last: an environment without it was not finished, or is of other versions.
+    // Written last: without it the environment is incomplete, or has other versions.
     let finished = venv.join("requirements.txt");
     if python.exists() && std::fs::read_to_string(&finished).is_ok_and(|text| text == REQUIREMENTS)
     {
@@ -58,11 +56,8 @@ pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Why a command did not succeed.
 enum Trouble {
-    /// There is no such program.
     Missing,
-    /// What it said last.
     Failed(String),
 }
 
@@ -74,12 +69,12 @@ fn succeed(command: &mut Command) -> Result<(), Trouble> {
     if output.status.success() {
         return Ok(());
     }
-    // venv complains on standard output.
+    // venv reports errors on standard output.
     let mut said = output.stderr;
     said.extend(output.stdout);
     let text = String::from_utf8_lossy(&said);
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    // Of pip the first error; of anything else the last line.
+    // Of pip the first error; of other programs the last line.
     let first = lines.clone().find(|line| line.starts_with("ERROR"));
     let line = first.or_else(|| lines.next_back()).unwrap_or_default();
     Err(Trouble::Failed(line.trim().to_owned()))

@@ -1,21 +1,17 @@
-//! Where and when a run was made, and the clock of the processor.
+//! Machine and date of a run, and the clock for processor time.
 
 use std::process::Command;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-/// The machine and the day of a run.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Machine {
-    /// The day, UTC, as the machine has it.
     pub(crate) date: String,
-    /// Model of the processor.
     pub(crate) processor: String,
 }
 
 impl Machine {
-    /// This one, today.
     pub(crate) fn this() -> Self {
         Self {
             date: date().unwrap_or_else(|| "an unknown day".to_owned()),
@@ -36,16 +32,15 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Counts the time of this thread on the processor: what other programs take of the machine in between is not ours.
+/// Clock for the processor time of this thread, which excludes other programs.
 ///
-/// As Linux accounts for it, to some milliseconds; wall-clock time elsewhere.
+/// As accounted by Linux, to some milliseconds; wall-clock time elsewhere.
 pub(crate) struct Clock {
     started: Instant,
     on_cpu_s: Option<f64>,
 }
 
 impl Clock {
-    /// Starts to count.
     pub(crate) fn start() -> Self {
         Self {
             started: Instant::now(),
@@ -53,19 +48,17 @@ impl Clock {
         }
     }
 
-    /// Time since the start, s.
     pub(crate) fn elapsed_s(&self) -> f64 {
         let on_cpu_s = on_cpu_s()
             .zip(self.on_cpu_s)
             .map(|(now, before)| now - before);
-        // A kernel that does not account for it says 0.
+        // A kernel without accounting reports 0.
         on_cpu_s
             .filter(|time_s| *time_s > 0.0)
             .unwrap_or_else(|| self.started.elapsed().as_secs_f64())
     }
 }
 
-/// What this thread has had of the processor since it began, s.
 fn on_cpu_s() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;

@@ -1,15 +1,15 @@
-//! `cargo compare`: this crate's placements beside those of the optimisers that a user would take instead.
+//! `cargo compare`: this crate's placements compared with those of general-purpose optimisers.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `problem` | what is solved, and its true optima |
-//! | `own` | this crate's chains, and the time they take |
+//! | `problem` | the problems and their true optima |
+//! | `own` | this crate's chains and times |
 //! | `environment` | Python with SciPy and NLopt |
-//! | `rivals` | their chains, and the time they take |
-//! | `results` | everything that came out, as `--json` prints it |
-//! | `score` | what a chain is worth, whoever found it |
-//! | `table` | that as markdown |
-//! | `machine` | where and when |
+//! | `rivals` | the other solvers' chains and times |
+//! | `results` | the results, as printed by `--json` |
+//! | `score` | evaluation of a chain, independent of the solver |
+//! | `table` | the results as markdown |
+//! | `machine` | machine and date |
 
 mod environment;
 mod machine;
@@ -41,19 +41,19 @@ use rivals::{Rivals, SOLVERS};
     disable_version_flag = true
 )]
 struct Options {
-    /// Most time on the processor that a solver of Python has for one problem, seconds, 1 to 600
+    /// Processor time limit of a Python solver per problem, seconds, 1 to 600
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=600))]
     limit: u16,
-    /// One JSON object with every chain on standard output instead of the table
+    /// Print one JSON object with every chain instead of the table
     #[arg(long)]
     json: bool,
     /// Score the chains of an earlier --json again; nothing is solved, and Python is not needed
     #[arg(long, value_name = "FILE", conflicts_with_all = ["limit", "venv"])]
     from: Option<PathBuf>,
-    /// Put an excerpt into FILE in place of the table there, between the lines of the two comments that say where it is
+    /// Replace the table in FILE, between the two comments that mark it, with an excerpt
     #[arg(long, value_name = "FILE")]
     into: Option<PathBuf>,
-    /// Where the virtual environment of Python is, or is made; without it beside what is built, target/compare
+    /// Folder of Python's virtual environment, created if necessary; target/compare by default
     #[arg(long, value_name = "DIR")]
     venv: Option<PathBuf>,
 }
@@ -79,13 +79,12 @@ fn run(options: &Options) -> Result<String, Failure> {
     table::table(&results).map_err(Failure::input)
 }
 
-/// What stands around the table in RESULTS.md.
+/// Marks around the table in RESULTS.md.
 const MARKS: [&str; 2] = [
     "<!-- cargo compare --into host-tests/RESULTS.md -->\n",
     "<!-- end of that -->\n",
 ];
 
-/// Puts `excerpt` between the two marks in `file`.
 fn put(file: &Path, excerpt: &str) -> Result<(), Failure> {
     let wrong = |why: String| Failure::input(format!("--into {}: {why}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
@@ -111,7 +110,6 @@ fn read(file: &Path) -> Result<Results, Failure> {
     results.map_err(|error| Failure::input(format!("--from {}: {error}", file.display())))
 }
 
-/// Solves every problem by everything there is, one after the other.
 fn solve(options: &Options) -> Result<Results, Failure> {
     let problems = problem::all();
     // Hidden unless standard error is a terminal.
@@ -142,7 +140,7 @@ fn solve(options: &Options) -> Result<Results, Failure> {
     })
 }
 
-/// This crate first: its time is what the others' is compared with, so it is taken right before theirs.
+/// Solves one problem with every solver; this crate first, because the others' times are compared with its time.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
     let level = table::level(problem, &runs)?;

@@ -1,4 +1,4 @@
-//! This crate's chains, and the time they take on this machine.
+//! This crate's chains and their times on this machine.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -20,11 +20,11 @@ use crate::results::{Answer, Found, Mark, Run};
 /// Relative tolerance on the achieved SIR: that of `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
 
-/// So many batches of runs are timed, each of them over this long: the clock of the processor goes in steps of milliseconds.
+/// Number and duration of timed batches: the processor clock has a resolution of milliseconds.
 const BATCHES: usize = 5;
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
-/// What this crate does about the problem; the first is what the other solvers are compared with.
+/// Solves the problem with this crate; the first run is the reference for the other solvers.
 pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
     let (mission, _) = briefed.map_err(|error| error.to_string())?;
@@ -58,7 +58,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     Ok(runs)
 }
 
-/// The chain from the mission alone, as the head solves it: at most about fifty passes of N hops, and N^2 / 2 hops for places.
+/// Solves the chain from the mission, as the leader does: at most about fifty passes of N hops, and N^2 / 2 hops for positions.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target can be met".to_owned();
     let common = |_| mission.config().common;
@@ -68,14 +68,13 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// The chain from the mission alone by the joint method, as every relay solves it: from all of its starts.
+/// Solves the chain from the mission by the joint method, as every relay does, from all of its starts.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));
     places.ok_or_else(|| "no target can be met".to_owned())
 }
 
-/// The chain that simulated relays settle on: what every one of them computes, and every frame they exchange.
 fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
     let outcome: Outcome = chain::run(setup).map_err(|error| error.to_string())?;
     let places = outcome.relays.iter().map(|relay| relay.setpoint).collect();
@@ -85,9 +84,9 @@ fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
         .ok_or_else(|| format!("the chain ended {:?}", outcome.ending))
 }
 
-/// The time of `work` on the processor, s, the median of some batches as with the other solvers, and what it gives.
+/// Returns the median processor time of `work` over several batches, s, and its result.
 fn timed<T>(work: impl Fn() -> Result<T, String>) -> Result<(f64, T), String> {
-    // Not timed: the first touch of code and memory.
+    // Not timed: the first run fills the caches.
     let result = work()?;
     let mut times = [0.0; BATCHES];
     for time_s in &mut times {

@@ -1,4 +1,4 @@
-//! What is solved: relays at a common altitude, relays that choose their altitudes, and those with room to the side as well.
+//! The problems: relays at a common altitude, with free altitudes, and with lateral room as well.
 
 use std::fmt;
 
@@ -7,28 +7,24 @@ use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::{Link, Station, path_loss_factor};
 use uav_relay_scenario::{Interference, Scenario};
 
-/// What relays choose.
+/// Degrees of freedom of the relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Choice {
-    /// Their places, at the altitude they hold.
+    /// Positions along the line, at a fixed altitude.
     Places,
-    /// Their places and their altitudes.
     Altitudes,
-    /// Their places, their altitudes and how far they go to either side.
     Sides,
 }
 
-/// The best places of a number of relays.
+/// The best placement of a number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(crate) struct Problem {
-    /// What they choose.
     pub(crate) choice: Choice,
-    /// Number of relays.
     pub(crate) relays: u16,
 }
 
-/// The true optima (linear SIR) by number of relays, from an independent program, to nine or ten digits.
+/// True optima (linear SIR) by number of relays, from an independent program, to nine or ten digits.
 const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (
         Choice::Places,
@@ -51,7 +47,6 @@ const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (Choice::Sides, &[(8, 1.543_032_046), (50, 9.002_614_360)]),
 ];
 
-/// Every problem, in the order of the tables.
 pub(crate) fn all() -> Vec<Problem> {
     let of = |(choice, optima): (Choice, &[(u16, f64)])| {
         let relays = optima.iter().map(|(relays, _)| *relays);
@@ -74,14 +69,13 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// The true optimum, linear SIR; `None` for a problem that is not one of [`all`].
+    /// Returns the true optimum, linear SIR; `None` for a problem that is not one of [`all`].
     pub(crate) fn optimum(self) -> Option<f64> {
         let (_, optima) = OPTIMA.iter().find(|(choice, _)| *choice == self.choice)?;
         let known = optima.iter().find(|(relays, _)| *relays == self.relays)?;
         Some(known.1)
     }
 
-    /// The scenario that is solved, as `cargo chain` reads it.
     pub(crate) fn scenario(self) -> Result<Scenario, String> {
         match self.choice {
             Choice::Places => Ok(Scenario::default()),
@@ -96,7 +90,7 @@ impl Problem {
         }
     }
 
-    /// The same for the judge and the other solvers, and where relays may fly across the line.
+    /// Returns the problem for the reference and the other solvers, and the corridor.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {
@@ -120,9 +114,9 @@ impl Problem {
             y_i: source.y_m,
             mu_los,
             mu_nlos: factor(channel.excess_loss_nlos_db),
-            // All scenarios see the ground in line of sight.
+            // All scenarios have line of sight between ground and air.
             eta: mu_los,
-            // They are without noise, as the other solvers are.
+            // Without noise, like the other solvers.
             noise_w: 0.0,
             relays: vec![station; usize::from(self.relays)],
         };

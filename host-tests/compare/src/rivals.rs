@@ -1,4 +1,4 @@
-//! The solvers of SciPy and NLopt: one Python process that is handed a problem a line.
+//! Solvers of SciPy and NLopt: a Python process that receives one problem per line.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
@@ -14,21 +14,17 @@ use crate::score::GOOD;
 
 const PROGRAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/serve.py");
 
-/// What an answer may take by the clock on the wall: the limit is on the processor's time, of which a busy machine gives a
-/// share, and there are steps that cannot be cut.
+/// Returns the wall-clock limit of an answer: a busy machine grants a share of the processor, and some steps cannot be cut.
 fn patience(limit_s: f64) -> Duration {
     Duration::from_secs_f64(20.0 * limit_s + 60.0)
 }
 
-/// One solver.
 #[derive(Clone, Copy)]
 pub(crate) struct Solver {
     name: &'static str,
-    /// Its name in the table.
     pub(crate) title: &'static str,
 }
 
-/// All of them.
 pub(crate) const SOLVERS: [Solver; 5] = [
     Solver {
         name: "scipy-slsqp-one",
@@ -52,7 +48,6 @@ pub(crate) const SOLVERS: [Solver; 5] = [
     },
 ];
 
-/// The Python process, warm.
 pub(crate) struct Rivals {
     child: Child,
     tasks: ChildStdin,
@@ -66,8 +61,7 @@ impl Rivals {
     pub(crate) fn start(python: &Path, limit_s: f64) -> Result<Self, String> {
         let mut child = Command::new(python)
             .args(["-B", "-W", "ignore", PROGRAM])
-            // Threads cost more than they bring at this size: SciPy's SLSQP took fifteen times as long
-            // with two on a busy machine.
+            // At this size threads cost more than they gain: with two on a busy machine SciPy's SLSQP took fifteen times as long.
             .env("OPENBLAS_NUM_THREADS", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -105,12 +99,11 @@ impl Rivals {
         Ok(rivals)
     }
 
-    /// What Python says it runs.
     pub(crate) const fn versions(&self) -> &Versions {
         &self.versions
     }
 
-    /// Has `solver` solve `problem`, and say when it first met `level`, linear SIR.
+    /// Solves `problem` with `solver`, which reports when it first reaches `level`, linear SIR.
     pub(crate) fn run(
         &mut self,
         solver: Solver,
@@ -133,7 +126,7 @@ impl Rivals {
     }
 
     fn ask(&mut self, task: &Value) -> Result<Value, String> {
-        // A process that has died shows below, in what it does not answer.
+        // If the process has died, the missing answer shows it.
         _ = writeln!(self.tasks, "{task}");
         match self.answers.recv_timeout(patience(self.limit_s)) {
             Ok(line) => serde_json::from_str(&line).map_err(|error| error.to_string()),
@@ -141,7 +134,7 @@ impl Rivals {
         }
     }
 
-    /// Ends the process; the last line it wrote to standard error.
+    /// Kills the process and returns the last line of its standard error.
     fn last_words(&mut self) -> String {
         _ = self.child.kill();
         let mut text = String::new();
@@ -160,7 +153,6 @@ impl Drop for Rivals {
     }
 }
 
-/// The problem in numbers.
 fn link(problem: Problem) -> Result<Value, String> {
     let (link, room) = problem.link()?;
     let relay = link.relays.first().ok_or("a problem without relays")?;

@@ -1,4 +1,4 @@
-//! What a chain is worth: the SIR of its places by formulas that no solver here shares, if it keeps the rules.
+//! Evaluation of a chain: its SIR by formulas that no solver shares, if it satisfies the constraints.
 
 use std::fmt;
 
@@ -7,31 +7,30 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Found, Mark};
 
-/// How far below the optimum a chain is good enough, relative: the tolerance of the relays' mission.
+/// Relative difference from the optimum at which a chain is good enough: the tolerance of the relays' mission.
 pub(crate) const GOOD: f64 = 1e-4;
 
-/// By how much a place may be off, m: what an f32 rounds away at a kilometre, sixteen times over.
+/// Tolerance of positions, m: sixteen times the rounding of an f32 at a kilometre.
 const SLACK_M: f64 = 1e-3;
 
-/// By how much a solver's own figure may differ, relative: what the f32 formulas of a relay round away, ten times over.
+/// Relative tolerance of a solver's reported SIR: ten times the rounding of a relay's f32 formulas.
 const SIR_SLACK: f64 = 1e-5;
 
 /// Why a chain does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
-    /// It has another number of relays.
     Count(usize),
     /// A relay is not between transmitter and receiver: its index from 1, and x in m.
     Outside(usize, f64),
-    /// A relay is farther to the side than there is room: its index from 1, and y in m.
+    /// A relay exceeds the lateral room: its index from 1, and y in m.
     Side(usize, f64),
     /// A relay is not in the band of altitudes: its index from 1, and h in m.
     Altitude(usize, f64),
-    /// A relay stands behind the one before it: its index from 1.
+    /// A relay is behind its predecessor: its index from 1.
     Order(usize),
-    /// A relay is too close to the one before it: its index from 1, and their distance in m.
+    /// A relay is too close to its predecessor: its index from 1, and their distance in m.
     Separation(usize, f64),
-    /// The solver reports another SIR than its chain has: its figure, and the chain's.
+    /// The solver's reported SIR, and the differing one of its chain.
     Sir(f64, f64),
 }
 
@@ -51,13 +50,13 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// SIR (linear) of the worst hop of a chain of [x, y, h] in m.
+/// Returns the SIR (linear) of the worst hop of a chain of [x, y, h] in m.
 pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {
         return Err(count);
     }
-    // Not a number is within no range.
+    // NaN is outside every range.
     let within =
         |low: f64, value: f64, high: f64| (low - SLACK_M..=high + SLACK_M).contains(&value);
     for (relay, [x_m, y_m, h_m]) in (1..).zip(chain) {
@@ -90,27 +89,23 @@ pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f
     sir(link, &places).ok_or(count)
 }
 
-/// The chain in the numbers of a set-point.
 fn rounded(chain: &[[f64; 3]]) -> Vec<[f64; 3]> {
     #[expect(clippy::cast_possible_truncation, reason = "what this is about")]
     let flown = |place: &[f64; 3]| place.map(|value| f64::from(value as f32));
     chain.iter().map(flown).collect()
 }
 
-/// What a solver's chain is worth.
 pub(crate) struct Score {
-    /// SIR of the worst hop, linear.
     pub(crate) sir: f64,
-    /// The same of its places as set-points: in m, in f32.
+    /// SIR of the worst hop with positions rounded to f32 setpoints, linear.
     pub(crate) flown: f64,
-    /// When the solver first had a chain that is good enough, s; `None` if it never had.
+    /// Time of the first chain that is good enough, s; `None` if there was none.
     pub(crate) good_after_s: Option<f64>,
-    /// When it first had one as good as the chain that it is compared with, s.
+    /// Time of the first chain as good as the reference, s.
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// The score of what a solver found, which is compared with a chain of `level`, linear SIR; its own word is taken for the time
-/// alone.
+/// Returns the score of a solver's result against a chain of `level` (linear SIR): times are trusted, SIRs recomputed.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -1,4 +1,4 @@
-//! The results as tables in markdown, and what has to be known to read them.
+//! The results as tables in markdown, with notes.
 
 use std::fmt::Write as _;
 
@@ -47,7 +47,6 @@ rounded.
 in f64, by formulas that no solver shares; a chain that breaks order, room or least separation does not count.
 ";
 
-/// What RESULTS.md shows, in its order.
 const EXCERPT: [(Choice, u16, &str); 6] = [
     (Choice::Places, 8, "8 relays at 20 m"),
     (Choice::Places, 50, "50 relays at 20 m"),
@@ -62,7 +61,6 @@ const EXCERPT_HEAD: &str = "\
 | --- | --- | --- | --- | --- | --- |
 ";
 
-/// The tables and the notes.
 pub(crate) fn table(results: &Results) -> Result<String, String> {
     let mut text = String::new();
     for (choice, title) in TITLES {
@@ -82,7 +80,6 @@ pub(crate) fn table(results: &Results) -> Result<String, String> {
     Ok(text)
 }
 
-/// The table of RESULTS.md.
 pub(crate) fn excerpt(results: &Results) -> Result<String, String> {
     let mut text = EXCERPT_HEAD.to_owned();
     for (choice, relays, title) in EXCERPT {
@@ -103,7 +100,6 @@ pub(crate) fn excerpt(results: &Results) -> Result<String, String> {
     Ok(text)
 }
 
-/// Where and when, and by what.
 fn circumstances(results: &Results) -> String {
     let (machine, versions) = (&results.machine, &results.versions);
     format!(
@@ -117,7 +113,7 @@ fn circumstances(results: &Results) -> String {
     )
 }
 
-/// SIR (linear) of the chain that all others of the problem are compared with: the first.
+/// Returns the SIR (linear) of the problem's first chain, with which the others are compared.
 pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
     let (link, room) = problem.link()?;
     match runs.first().map(|own| &own.answer) {
@@ -128,7 +124,6 @@ pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
     }
 }
 
-/// The cells of a chain that counts.
 struct Line {
     sir: String,
     short: String,
@@ -139,10 +134,9 @@ struct Line {
     all: String,
 }
 
-/// A solver, and its line or why it has none.
+/// A solver, with its line or the reason for having none.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
-/// The lines of one problem in the table.
 fn rows(solved: &Solved) -> Result<String, String> {
     let mut text = String::new();
     for (solver, line) in lines(solved)? {
@@ -164,7 +158,7 @@ fn rows(solved: &Solved) -> Result<String, String> {
     Ok(text)
 }
 
-/// The solvers of one problem; what each came to, or why that does not count.
+/// Returns each solver of one problem with its line, or the reason why it does not count.
 fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;
     let optimum = problem
@@ -176,7 +170,7 @@ fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
         Answer::Error(_) => None,
     });
     let own_s = own_s.ok_or_else(|| format!("{problem}: nothing to compare with"))?;
-    // Where that does not count, nobody is compared with it.
+    // Without a valid first chain the others have no reference.
     let level = level(problem, &solved.runs).unwrap_or(f64::INFINITY);
     let of = |Run { answer, .. }: &Run| match answer {
         Answer::Error(why) => Err(plain(why)),
@@ -205,12 +199,12 @@ fn line(found: &Found, score: &Score, optimum: f64, own_s: f64) -> Line {
     }
 }
 
-/// Text that fits in a cell.
+/// Replaces characters that a table cell cannot contain.
 fn plain(why: &str) -> String {
     why.replace(['|', '\n'], " ")
 }
 
-/// What is missing to the optimum, relative; that is known to nine digits.
+/// Formats the relative difference from the optimum, which is known to nine digits.
 fn short(by: f64) -> String {
     if by.abs() < 1e-8 {
         "less than 1e-8".to_owned()
@@ -219,7 +213,7 @@ fn short(by: f64) -> String {
     }
 }
 
-/// A time in s to two digits, and how many times our own that is.
+/// Formats a time in s to two digits, with the ratio to this crate's time.
 fn time(time_s: f64, own_s: f64) -> String {
     let (value, unit) = match time_s {
         ..1e-3 => (time_s * 1e6, "µs"),
@@ -233,7 +227,6 @@ fn time(time_s: f64, own_s: f64) -> String {
     )
 }
 
-/// A number above 0, rounded to two digits.
 fn two_digits(value: f64) -> String {
     let size = 10_f64.powf(value.log10().floor() - 1.0);
     let rounded = (value / size).round() * size;

@@ -1,4 +1,4 @@
-//! A frame, taken apart.
+//! Decodes a frame.
 
 use uav_relay::CRC_32C;
 use uav_relay::wire::auth::TAG;
@@ -11,28 +11,28 @@ use crate::refusal::Refusal;
 use crate::value::Fields;
 use crate::walk::walk;
 
-/// A frame, taken apart as far as it goes.
+/// A frame, decoded as far as possible.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame<'f> {
-    /// How many bytes it has on the wire.
+    /// Length on the wire, bytes.
     pub len: usize,
-    /// Who sends it to whom; `None` unless version and CRC are right.
+    /// Header; `None` unless version and CRC are right.
     pub header: Option<Header>,
-    /// What it is called: the message, or `Handshake`.
+    /// Name of the message, or `Handshake`.
     pub name: Option<&'f str>,
-    /// Whether it is a handshake.
+    /// True for a handshake.
     pub handshake: bool,
-    /// What it says, as far as it can be read.
+    /// Fields, as far as they can be decoded.
     pub fields: Fields<'f>,
     /// Header and body, if a tag follows, and the tag.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
-    /// Why it is refused, if it is.
+    /// Reason for rejection, if any.
     pub refusal: Option<Refusal>,
 }
 
-/// Takes a frame apart: `wire` is it as it is on the wire, its delimiter last, or the first bytes of one of `len`.
+/// Decodes a frame: `wire` are its bytes with the final delimiter, or the first bytes of a frame of `len`.
 ///
-/// Whether it is refused the library itself says; the tables tell what it says, and why.
+/// The library decides whether it is rejected; the tables provide its fields and the reason.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     let mut frame = Frame {
         len,
@@ -50,7 +50,6 @@ pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     frame
 }
 
-/// The frame without COBS.
 fn unstuffed(wire: &[u8], len: usize) -> Result<Vec<u8>, Refusal> {
     if wire.len() < len {
         return Err(Refusal::Oversized(len));
@@ -110,7 +109,6 @@ fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
     };
 }
 
-/// Why the library does not open it.
 fn broken(error: FrameError, plain: &[u8]) -> Refusal {
     match (error, plain.split_last_chunk::<4>()) {
         (FrameError::Crc, Some((checked, check))) => {

@@ -1,14 +1,14 @@
-//! Frames of uav-relay field by field: what each says, by the tables of `FORMAT.md`, or why it is refused.
+//! Decoder of uav-relay frames: each field by the tables of `FORMAT.md`, or the reason for rejection.
 //!
-//! | module | one idea |
+//! | module | content |
 //! | --- | --- |
-//! | [`mod@format`] | the tables of `FORMAT.md`, read |
-//! | [`value`], [`walk`] | what a field says; a body field by field |
-//! | [`frame`], [`refusal`] | a frame, taken apart; why one is no message |
-//! | [`members`] | whether tags are right |
-//! | [`source`] | frames from a capture or a stream of bytes |
+//! | [`mod@format`] | the tables of `FORMAT.md` |
+//! | [`value`], [`walk`] | values of fields; decoding of a body |
+//! | [`frame`], [`refusal`] | a decoded frame; reasons for rejection |
+//! | [`members`] | verification of tags |
+//! | [`source`] | frames from a capture or a byte stream |
 //! | [`shown`] | a frame as text and as JSON |
-//! | [`dissector`] | the same tables for Wireshark |
+//! | [`dissector`] | the Wireshark dissector |
 
 pub mod dissector;
 pub mod format;

@@ -1,4 +1,4 @@
-//! Whether tags are right: with the key of the network, and the nonces that the handshakes have told.
+//! Verifies tags with the network key and the nonces of captured handshakes.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -7,21 +7,21 @@ use uav_relay::Key;
 use crate::frame::Frame;
 use crate::value::Value;
 
-/// What is known of a tag.
+/// Result of verifying a tag.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TagCheck {
-    /// It is right.
+    /// The tag is right.
     Right,
-    /// It is not.
+    /// The tag is wrong.
     Wrong,
-    /// There is no key.
+    /// The key is not known.
     NoKey,
-    /// The handshakes of these two have not been seen.
+    /// The handshake of the two nodes was not captured.
     NoHandshake,
 }
 
 impl TagCheck {
-    /// In words.
+    /// Returns the result as text.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Right => "tag right",
@@ -31,7 +31,7 @@ impl TagCheck {
         }
     }
 
-    /// One word for it, for programs.
+    /// Returns the result as one word, for programs.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -42,13 +42,13 @@ impl TagCheck {
     }
 }
 
-/// How many of the latest nonces of a node toward another are tried: frames of the one before may still be on the way.
+/// Number of latest nonces per direction that are tried: frames before a new handshake may still be in flight.
 const TRIED: usize = 4;
 
-/// What one node is to another in a network.
+/// Network, sender and destination.
 type Pair = (u16, u16, u16);
 
-/// The nonces of all that have shaken hands.
+/// Nonces of all captured handshakes.
 #[derive(Debug, Default)]
 pub struct Members {
     key: Option<Key>,
@@ -56,7 +56,7 @@ pub struct Members {
 }
 
 impl Members {
-    /// Those of a network with this key, if it is known.
+    /// Creates an empty table, for a network with this key, if known.
     pub fn new(key: Option<[u8; 32]>) -> Self {
         Self {
             key: key.map(Key::new),
@@ -64,12 +64,12 @@ impl Members {
         }
     }
 
-    /// Whether there is a key.
+    /// Returns true if the key is known.
     pub const fn has_key(&self) -> bool {
         self.key.is_some()
     }
 
-    /// What is known of the tag of `frame`; `None` if it has none. Nonces of a handshake that is right are remembered.
+    /// Verifies the tag of `frame`; `None` if it has none. Stores the nonces of valid handshakes.
     pub fn check(&mut self, frame: &Frame<'_>) -> Option<TagCheck> {
         let (signed, tag) = frame.tag.as_ref()?;
         let Some(key) = &self.key else {

@@ -1,32 +1,32 @@
-//! Why a frame is no message.
+//! Reasons for rejecting a frame.
 
 use std::fmt;
 
-/// Why a frame is refused: what a receiver would find first.
+/// Reason for rejecting a frame: the first one that a receiver would find.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Refusal {
     /// The stream ends before the delimiter.
     Unended,
-    /// More bytes than any frame has: on the wire so many.
+    /// The frame exceeds the largest length; with its length on the wire.
     Oversized(usize),
-    /// The delimiter comes inside a COBS run.
+    /// The delimiter is inside a COBS run.
     Truncated,
-    /// Too few bytes for header and CRC, or the tag: so many without COBS.
+    /// The frame is too short for header and CRC, or the tag; with its length without COBS.
     Short(usize),
-    /// The CRC that it has, and the one of its bytes.
+    /// The CRC is wrong: the received and the computed one.
     Crc(u32, u32),
-    /// Another version of the format, or flags that this one does not have.
+    /// The version of the format or its flags are unknown.
     Version(u8, u8),
-    /// There is no message of this tag.
+    /// The tag of the message is unknown.
     UnknownTag(u8),
-    /// The body is not the one encoding of any message.
+    /// The body is not the canonical encoding of any message.
     Malformed(String),
-    /// A number is outside its range.
+    /// A number is out of range.
     Range,
 }
 
 impl Refusal {
-    /// One word for it, for programs.
+    /// Returns the reason as one word, for programs.
     pub const fn word(&self) -> &'static str {
         match self {
             Self::Unended => "unended",

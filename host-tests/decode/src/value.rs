@@ -1,44 +1,44 @@
-//! What a field says.
+//! Values of fields.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::format::Field;
 
-/// What a field says.
+/// Value of a field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Value<'f> {
-    /// A whole number from 0 on.
+    /// An unsigned integer.
     Unsigned(u64),
-    /// A whole number.
+    /// A signed integer.
     Signed(i64),
     /// A digest.
     Digest(u16),
-    /// A view: its number and the node that has proposed it.
+    /// A view: its number and its proposer.
     View(u32),
     /// An f32.
     Single(f32),
     /// An f64.
     Double(f64),
-    /// Yes or no.
+    /// A Boolean.
     Bool(bool),
-    /// The names of the flags that are set, and all of them.
+    /// Flags that are set, and the names of all.
     Flags(u8, &'f [String]),
     /// A value, and the word for it.
     Word(u8, Option<&'f str>),
-    /// None of an Option.
+    /// An empty Option.
     None,
-    /// Several.
+    /// A list or array.
     List(Vec<Value<'f>>),
-    /// Fields of its own.
+    /// A group of fields.
     Group(Fields<'f>),
 }
 
-/// Fields and what they say, in order.
+/// Fields with their values, in order.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Fields<'f>(pub Vec<(&'f Field, Value<'f>)>);
 
 impl<'f> Fields<'f> {
-    /// What the field of this name says.
+    /// Returns the value of the field with this name.
     pub fn get(&self, name: &str) -> Option<&Value<'f>> {
         let mut all = self.0.iter();
         all.find(|(field, _)| field.name == name)
@@ -46,7 +46,7 @@ impl<'f> Fields<'f> {
     }
 }
 
-/// The names of the bits that are set; `bit 7` for one without a name.
+/// Returns the names of the bits that are set; `bit 7` for one without a name.
 pub(crate) fn set(bits: u8, names: &[String]) -> Vec<String> {
     let set = (0..8).filter(|bit| bits >> bit & 1 == 1);
     let name = |bit: usize| match names.get(bit) {

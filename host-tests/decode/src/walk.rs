@@ -1,9 +1,8 @@
-//! A body field by field.
+//! Decodes a body field by field.
 
 use crate::format::{Field, Kind};
 use crate::value::{Fields, Value};
 
-/// What is left of a body.
 struct Rest<'b>(&'b [u8]);
 
 impl Rest<'_> {
@@ -17,7 +16,7 @@ impl Rest<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    /// A postcard varint in its one form.
+    /// Reads a postcard varint in its canonical form.
     fn varint(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
@@ -42,7 +41,7 @@ impl Rest<'_> {
     }
 }
 
-/// The fields of `body`, and why it has no more of them if it should. What is left over is wrong, too.
+/// Decodes the fields of `body`; also returns an error if bytes are missing or left over.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

@@ -1,11 +1,11 @@
-//! Reference values computed by an independent program, as data for tests.
+//! Reference values of an independent program, as test data.
 
 use serde::Deserialize;
 use serde_json::Value;
 
 use crate::reference::{Link, Station};
 
-/// The optimum (linear SIR) of the default scenario by number of relays, from the same program, to nine digits.
+/// Optimum (linear SIR) of the default scenario by number of relays, from the independent program, to nine digits.
 pub const OPTIMA: [(u16, f64); 12] = [
     (1, 1.490_121_51),
     (2, 1.616_583_02),
@@ -21,7 +21,7 @@ pub const OPTIMA: [(u16, f64); 12] = [
     (100, 40.441_345_0),
 ];
 
-/// The scenario of a case, SI units; the field names of the file are kept.
+/// Scenario of a case, SI units, with the field names of the file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Params {
     /// Transmit power of Tx, watts.
@@ -55,19 +55,19 @@ pub struct Params {
     pub eta: f64,
 }
 
-/// One evaluation: what was evaluated, with which arguments, and what came out.
+/// A reference evaluation: function, arguments and result.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Case {
-    /// What is evaluated.
+    /// Name of the evaluated function.
     #[serde(rename = "fn")]
     pub function: String,
-    /// The scenario.
+    /// Scenario.
     pub params: Params,
-    /// The arguments, by name.
+    /// Arguments by name.
     pub args: Value,
-    /// The value, or values by name.
+    /// Result: a value, or values by name.
     pub out: Value,
-    /// Relative tolerance the value itself is good for in f64.
+    /// Relative accuracy of the value.
     pub rtol: f64,
     /// Name of the case, unique in the file.
     pub id: String,
@@ -78,18 +78,18 @@ struct File {
     cases: Vec<Case>,
 }
 
-/// Every case of the file, in its order.
+/// Returns the cases of the file, in its order.
 ///
 /// # Errors
-/// When the file that was built in does not parse.
+/// If the built-in file does not parse.
 pub fn load() -> Result<Vec<Case>, serde_json::Error> {
     serde_json::from_str::<File>(include_str!("../data/reference.json")).map(|file| file.cases)
 }
 
-/// The cases that evaluate `function`, in file order.
+/// Returns the cases of `function`, in file order.
 ///
 /// # Errors
-/// As [`load`].
+/// Those of [`load`].
 pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
     Ok(load()?
         .into_iter()
@@ -98,7 +98,7 @@ pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
 }
 
 impl Case {
-    /// The scenario with `n` relays at the common altitude.
+    /// Returns the scenario with `n` relays at the common altitude.
     pub fn link(&self, n: usize) -> Link {
         let p = &self.params;
         Link {
@@ -122,43 +122,43 @@ impl Case {
         }
     }
 
-    /// The number of relays the case asks for, its argument `N`.
+    /// Returns the number of relays, the argument `N`.
     pub fn relays(&self) -> Option<usize> {
         self.args.get("N")?.as_u64()?.try_into().ok()
     }
 
-    /// The argument `name` as a number.
+    /// Returns the argument `name` as a number.
     pub fn arg(&self, name: &str) -> Option<f64> {
         number(self.args.get(name)?)
     }
 
-    /// The argument `name` as a list of numbers.
+    /// Returns the argument `name` as a list of numbers.
     pub fn arg_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.args.get(name)?)
     }
 
-    /// The result, where it is one number.
+    /// Returns the result if it is one number.
     pub fn value(&self) -> Option<f64> {
         number(&self.out)
     }
 
-    /// The result, where it is one list.
+    /// Returns the result if it is one list.
     pub fn values(&self) -> Option<Vec<f64>> {
         list(&self.out)
     }
 
-    /// The part `name` of the result as a number.
+    /// Returns the part `name` of the result as a number.
     pub fn part(&self, name: &str) -> Option<f64> {
         number(self.out.get(name)?)
     }
 
-    /// The part `name` of the result as a list of numbers.
+    /// Returns the part `name` of the result as a list of numbers.
     pub fn part_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.out.get(name)?)
     }
 }
 
-/// A JSON number, or one of the words that stand for what JSON cannot write.
+/// Reads a JSON number, or a word for a value that JSON cannot represent.
 fn number(value: &Value) -> Option<f64> {
     match value.as_str() {
         Some("nan") => Some(f64::NAN),

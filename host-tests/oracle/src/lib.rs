@@ -1,12 +1,14 @@
-//! What placements are judged by: f64 optimisers that share no formula with `uav-relay`, values of an independent program, and random
-//! scenarios weighted toward where formulas break. No product depends on it.
+//! Test oracles for placements: independent f64 optimisers, values of an independent program, and random scenarios.
 //!
-//! | module | one idea |
+//! The optimisers share no formula with `uav-relay`; the scenarios are weighted toward where formulas break. No product depends
+//! on this crate.
+//!
+//! | module | content |
 //! | --- | --- |
-//! | [`mod@reference`] | the judges |
+//! | [`mod@reference`] | reference optimisers |
 //! | [`cases`] | values of an independent program, as data |
 //! | [`random`] | random scenarios |
-//! | [`mission`] | from a judge's link to the mission that relays fly |
+//! | [`mission`] | the mission that relays fly for a reference link |
 
 pub mod cases;
 pub mod mission;

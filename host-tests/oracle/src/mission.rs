@@ -1,4 +1,4 @@
-//! From a judge's link to the mission that relays fly, and to the scene that the planner knows.
+//! Converts a reference link to the relays' mission and to the planner's scene.
 
 use uav_relay::channel::AirGround;
 use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
@@ -9,9 +9,9 @@ use uav_relay_scenario::scene::{Corridor, Relay, Scene};
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Station};
 
-/// The mission of a reference link, and what single relays hold of their own; `None` where a relay would refuse its numbers.
+/// Returns the mission of a reference link, and the relays' own profiles; `None` if a relay would reject its numbers.
 ///
-/// The relays of a link may differ: the first one's profile is what the mission has in common.
+/// The first relay's profile is the mission's common one.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(
@@ -49,7 +49,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
 
-/// The scene of a reference link, its corridor the altitude of the first relay; `None` without relays.
+/// Returns the scene of a reference link, with the first relay's altitude as its band; `None` without relays.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Station| Relay {
@@ -75,7 +75,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// The mission of a reference link in a field, whose relays are alike; `None` where a relay would refuse its numbers.
+/// Returns the mission of a reference link in a field, with identical relays; `None` if a relay would reject its numbers.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link
@@ -86,7 +86,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
             upsilon_per_w: narrow(upsilon),
         })
         .collect();
-    // Nothing hears over the ground here: any factor above both others lets eta be a mixture.
+    // The ground link is not used here: any factor above both others lets eta be a mixture.
     let mu_nlos = 2.0 * link.eta.max(link.mu_los);
     let weight = (mu_nlos - link.eta) / (mu_nlos - link.mu_los);
     let common = Profile {
@@ -115,10 +115,10 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
     Mission::try_new(config).ok()
 }
 
-/// At this carrier the wave number is 1, and the excess factors are the path-loss factors themselves.
+/// Carrier at which the wave number is 1, so that excess factors equal path-loss factors.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
-/// `link` with every number rounded to the f32 that a relay is given, so that only a relay's arithmetic is judged.
+/// Rounds every number of `link` to the f32 of relays, so that only a relay's arithmetic is tested.
 pub fn as_relays_know_it(link: &Link) -> Link {
     let round = |value: f64| f64::from(narrow(value));
     Link {

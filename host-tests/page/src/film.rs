@@ -1,4 +1,4 @@
-//! A run from its beginning to its end, as the page plays it.
+//! Recording of a run, as played by the page.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::OccupiedEntry;
@@ -11,48 +11,43 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::simulator::film::{Sent, Shot};
 use uav_relay_sim::simulator::outcome::Outcome;
 
-/// Moments that are shown, at most: those too near to each other are shown as one.
+/// Largest number of moments; moments close to each other are merged.
 const STANDS: usize = 600;
 
-/// Frames that are shown, at most: the first ones.
+/// Largest number of frames; the first ones are shown.
 const FRAMES: usize = 20_000;
 
-/// What is played.
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
-    /// Every moment in which something looks different than before, in order.
+    /// Moments at which the picture changes, in order.
     stands: Vec<StandTold>,
-    /// Who said something, and when: s, relay, and -1 toward Tx, 1 toward Rx, 0 to all in range.
+    /// Frames sent: time in s, relay, and direction: -1 toward Tx, 1 toward Rx, 0 to all in range.
     sent: Vec<(f64, u16, i8)>,
 }
 
-/// A moment.
 #[derive(Serialize)]
 struct StandTold {
-    /// When, s.
     at_s: f64,
-    /// Relays that look different than before: index, whether it is on, and x, y, h in m; without a place where it was told none.
+    /// Relays that changed: index, on or off, and x, y, h in m; `None` without an agreed position.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// SIR of every hop over those that are on and have a place, linear, against what is there then. None without a relay.
+    /// SIR of every hop between relays that are on and have a position, linear, at that time. Empty without relays.
     sirs: Vec<f32>,
-    /// Frames on any link so far.
+    /// Number of frames sent so far on all links.
     messages: u64,
-    /// The interferer that the first relay believes in: W, m, m.
+    /// Interferer as estimated by the first relay: W, m, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     believed: Option<[f32; 3]>,
 }
 
-/// What looks different from one moment on.
 #[derive(Default)]
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
-    /// Of relays that have listened: what they make of it.
+    /// Estimate of relays that locate the interferer.
     believed: Option<Belief>,
 }
 
 impl FilmTold {
-    /// The film of a run with [`Setup::film`](uav_relay_sim::simulator::setup::Setup::film).
     pub(crate) fn of(run: &Prepared<'_>, outcome: &Outcome) -> Self {
         let film = outcome.film.clone().unwrap_or_default();
         Self {
@@ -62,7 +57,6 @@ impl FilmTold {
     }
 }
 
-/// All changes, by when they are shown.
 fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     let mut changes: BTreeMap<Instant, Change> = BTreeMap::new();
     for shot in shots {
@@ -78,7 +72,7 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     thinned(changes)
 }
 
-/// The same with moments that are too near to each other as one, the later one of them.
+/// Merges moments that are close to each other into the later one.
 fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
     let mut all = all;
     let mut apart_us = 1_000;

@@ -1,10 +1,10 @@
-//! What the page calls: a run of `cargo chain`, by the same options and the same scenario, with the same report.
+//! Functions that the page calls: a run of `cargo chain` with the same options, scenario and report.
 //!
-//! | function | takes | gives |
+//! | function | arguments | result |
 //! | --- | --- | --- |
-//! | [`chain`] | options as on the command line, and a scenario | the report of `cargo chain --json`, and the run from its beginning to its end |
+//! | [`chain`] | options as on the command line, and a scenario | the report of `cargo chain --json`, and the recorded run |
 
-// On a microcontroller there is no browser: a plain `cargo build --target thumbv7em-none-eabihf --examples` leaves this package empty.
+// A microcontroller has no browser: `cargo build --target thumbv7em-none-eabihf --examples` leaves this package empty.
 #![cfg(not(target_os = "none"))]
 
 mod film;
@@ -20,31 +20,29 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use film::FilmTold;
 
-/// How messages call the scenario of the page.
 const NAME: &str = "the page";
 
-/// Happenings of the simulator from one look at its clock to the next.
+/// Simulator events between two checks of the virtual clock.
 const HAPPENINGS: u64 = 20_000;
 
-/// A run that takes longer, s of virtual time, is given up: a page that does not answer helps nobody.
+/// Limit of a run, s of virtual time, so that the page stays responsive.
 const LONGEST_S: u64 = 3_600;
 
-/// What the page is told.
+/// Result for the page.
 #[derive(Serialize)]
 struct Told {
-    /// What `cargo chain --json` prints, character by character.
+    /// Output of `cargo chain --json`, character by character.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<Box<RawValue>>,
-    /// What is played.
     #[serde(skip_serializing_if = "Option::is_none")]
     film: Option<FilmTold>,
-    /// What is wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     wrong: Option<String>,
 }
 
-/// Runs a chain by `options`, separated by spaces as on the command line of `cargo chain`, in the scenario of that TOML text, and gives what
-/// the page is told as JSON: `report`; `film` where that is asked for; and `wrong` with one line where something is wrong.
+/// Runs a chain and returns the result as JSON: `report`, `film` if requested, and `wrong`, an error line, if something failed.
+///
+/// `options` are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML text.
 #[wasm_bindgen]
 #[must_use]
 pub fn chain(options: &str, scenario: &str, film: bool) -> String {
@@ -97,7 +95,6 @@ fn run(options: &str, scenario: &str, film: bool) -> Result<Told, Failure> {
     })
 }
 
-/// As the command prints it.
 fn raw(report: &impl Serialize) -> Result<Box<RawValue>, Failure> {
     let text = command::json(report)?;
     RawValue::from_string(text.trim_end().to_owned())

@@ -1,4 +1,4 @@
-//! A file against the table of keys: shape, known and required keys, types, ranges.
+//! Checks a file against the table of keys: shape, known and required keys, types, ranges.
 
 use toml::{Table, Value};
 
@@ -8,7 +8,6 @@ use crate::error::{Problem, ScenarioError, cut, quote};
 use crate::keys::Rule::{LinkOrNumber, Number, Whole};
 use crate::keys::{FILE, Key, Rule, names};
 
-/// A mistake in the value of a key.
 pub(super) fn mistake(
     file: &str,
     key: &str,
@@ -25,12 +24,10 @@ pub(super) fn mistake(
     }
 }
 
-/// Checks shape, known and required keys, types, and every range.
 pub(super) fn table(file: &str, table: &Table) -> Result<(), ScenarioError> {
     Check { file }.table("", table, sections())
 }
 
-/// Every section that a file may have: of the scenario, and of what is deployed with it.
 fn sections() -> impl Iterator<Item = &'static Key> + Clone {
     FILE.iter().chain(SECTIONS)
 }
@@ -50,7 +47,7 @@ impl Check<'_> {
         if let Some((name, value)) = table.iter().find(|(name, _)| !is_known(name)) {
             let meant = nearest(name, keys.clone());
             let allowed = format!("the keys {}{meant}", names(keys));
-            // The name is the file's own, and a quoted key may be as long as the file.
+            // The name comes from the file, and a quoted key may be as long as the file.
             let path = join(path, &cut(name));
             return Err(mistake(
                 self.file,
@@ -68,7 +65,7 @@ impl Check<'_> {
                     self.value(&path, value, &key.rule)?;
                 }
                 None if !key.is_missed(table) => {}
-                // An absent table is as good as an empty one: its first required key is what is missing.
+                // An absent table is treated as an empty one, so its first required key is reported as missing.
                 None => match key.rule {
                     Rule::Table(inner) => self.table(&path, &Table::new(), inner)?,
                     ref rule => {
@@ -89,7 +86,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Refuses a key beside one that says the same.
+    /// Rejects a key next to another one with the same meaning.
     fn alone(
         &self,
         path: &str,
@@ -164,16 +161,16 @@ impl Check<'_> {
             (Rule::Table(_), Value::Array(list)) if list.iter().any(Value::is_table) => {
                 fail(Problem::NoTable)
             }
-            // serde would take a list for a table, field by field; nobody who writes one means that.
+            // serde would accept a list for a table, field by field, which is never intended.
             _ => fail(Problem::WrongType),
         }
     }
 }
 
-/// How alike two names are at least, by Jaro and Winkler from 0 to 1, where one may be meant by the other.
+/// Least Jaro-Winkler similarity (0 to 1) for a suggestion.
 const ALIKE: f64 = 0.8;
 
-/// The known key that is most like an unknown one, where one is.
+/// Returns a suggestion of the known key most similar to an unknown one, or an empty text.
 fn nearest(name: &str, keys: impl IntoIterator<Item = &'static Key>) -> String {
     let alike = keys
         .into_iter()
@@ -184,7 +181,6 @@ fn nearest(name: &str, keys: impl IntoIterator<Item = &'static Key>) -> String {
         .map_or_else(String::new, |(_, key)| format!("; did you mean {key}?"))
 }
 
-/// The key a path leads to, in the file's own words.
 fn join(path: &str, name: &str) -> String {
     if path.is_empty() {
         name.to_owned()
@@ -193,7 +189,6 @@ fn join(path: &str, name: &str) -> String {
     }
 }
 
-/// A number, whether or not it was written with a decimal point.
 fn as_number(value: &Value) -> Option<f64> {
     match value {
         Value::Integer(whole) => Some(*whole as f64),
@@ -202,7 +197,7 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// The error for a table that serde refuses after [`table`] has passed it: the table of keys and the typed form differ.
+/// Creates the error for a table that serde rejects after [`table`] has accepted it: the key table and the types differ.
 pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

@@ -1,4 +1,4 @@
-//! Every key of the sections for what is deployed: as [`crate::keys`] has those of a scenario.
+//! Table of keys of the deployment sections, like [`crate::keys`] for a scenario.
 
 use crate::keys::Rule::{Choice, Number, Text, Whole};
 use crate::keys::{Keys, Range, Rule, optional, range};
@@ -6,7 +6,6 @@ use crate::keys::{Keys, Range, Rule, optional, range};
 const BAUD: Range = range(1_200.0, 4e6, "bit/s");
 const SILENCE: Range = range(1.0, 3.6e6, "ms");
 
-/// The sections.
 pub(super) const SECTIONS: Keys = &[
     optional("network", Rule::Table(NETWORK)),
     optional("companion", Rule::Table(COMPANION)),

@@ -1,37 +1,36 @@
-//! The UDP address of an autopilot, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`.
+//! UDP address of an autopilot, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`.
 //!
-//! The local port never changes from one start to the next: a PX4 answers the first address and port that it receives from, and no
-//! other until it restarts. A program that took another local port at each start would not be answered after its second start.
+//! The local port is the same at each start: a PX4 answers only the first address and port that it receives from until it
+//! restarts, so a program with a new local port at each start would get no answer after the first.
 
 use core::fmt;
 
-/// The prefix of a UDP address.
 const PREFIX: &str = "udp:";
 
-/// The ports at which PX4's simulation listens for a companion, and the first of those it sends to: both are counted by vehicle.
+/// Ports at which PX4's simulation listens for a companion, and the first port that it sends to; both are numbered by vehicle.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
 const PX4_SENDS_TO: u16 = 14_540;
 
-/// Difference between the default local port and the autopilot's port, at all other ports.
+/// Difference between the default local port and the autopilot's port, for all other ports.
 const APART: u16 = 1_000;
 
-/// The form of an address, and the allowed ports.
+/// Form of an address, and the allowed ports.
 pub const FORM: &str = "udp:HOST:PORT or udp:HOST:PORT@LOCAL, PORT and LOCAL within 1 to 65535, without @LOCAL PORT within 1 to 64535";
 
 /// A UDP port of an autopilot, and the local port to reach it from.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Endpoint {
-    /// The autopilot's host: a name, an IPv4 address, or an IPv6 address in brackets.
+    /// Host of the autopilot: a name, an IPv4 address, or an IPv6 address in brackets.
     pub host: String,
-    /// The autopilot's port.
+    /// Port of the autopilot.
     pub port: u16,
-    /// The local port.
+    /// Local port.
     pub local: u16,
     is_stated: bool,
 }
 
 impl Endpoint {
-    /// Reads an address; `None` for text that does not begin with `udp:`, which names a tty.
+    /// Parses an address; `None` for text without the prefix `udp:`, which names a serial port.
     ///
     /// ```
     /// use uav_relay_scenario::endpoint::Endpoint;
@@ -75,14 +74,14 @@ fn of_address(address: &str) -> Result<Endpoint, EndpointError> {
     })
 }
 
-/// Returns the port that `text` says in decimal digits; 0 is none.
+/// Parses a port number in decimal digits, above 0.
 fn number(text: &str) -> Option<u16> {
     let is_plain = text.bytes().all(|digit| digit.is_ascii_digit());
     let number = text.parse().ok().filter(|port| *port > 0);
     number.filter(|_| is_plain)
 }
 
-/// Returns the local port for an autopilot at `port`, where the address states none.
+/// Returns the default local port for an autopilot at `port`; `None` if it would exceed 65535.
 fn default_local(port: u16) -> Option<u16> {
     if PX4_LISTENS.contains(&port) {
         Some(port - PX4_LISTENS.start() + PX4_SENDS_TO)
@@ -91,7 +90,6 @@ fn default_local(port: u16) -> Option<u16> {
     }
 }
 
-/// Writes the address as it was given.
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { host, port, .. } = self;
@@ -107,15 +105,15 @@ impl fmt::Display for Endpoint {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum EndpointError {
-    /// There is no host.
+    /// The host is missing.
     NoHost,
-    /// There is no port, or not one within 1 to 65535.
+    /// The port is missing, or not within 1 to 65535.
     NoPort,
-    /// The local port is stated, and not within 1 to 65535.
+    /// The stated local port is not within 1 to 65535.
     NoLocal,
-    /// No local port is stated, and the default is above 65535.
+    /// The local port is not stated, and the default is above 65535.
     NoDefault {
-        /// The autopilot's port.
+        /// Port of the autopilot.
         port: u16,
     },
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a scenario file, as one line for people.
+//! Errors in a scenario file, displayed as one line.
 
 use core::fmt;
 
@@ -6,61 +6,61 @@ use toml::Value;
 
 use crate::endpoint::EndpointError;
 
-/// Longest piece of a value that is quoted, in characters: enough to recognise it by.
+/// Length at which a quoted value is cut, characters.
 const QUOTED: usize = 60;
 
 /// A mistake in a scenario file; displayed as exactly one line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScenarioError {
-    /// The file as the user named it.
+    /// File name as given by the user.
     pub file: String,
-    /// Where in the file: a key such as `relay[1].index`, or a line and column; none if the whole file is at fault.
+    /// Location: a key such as `relay[1].index`, or a line and column; `None` if the whole file is at fault.
     pub key: Option<String>,
-    /// The offending value as TOML (cut short when long); none where there is none.
+    /// Offending value as TOML, cut if long; `None` if there is none.
     pub value: Option<String>,
-    /// The kind of mistake.
+    /// Kind of mistake.
     pub problem: Problem,
-    /// What would be right: a range with its unit, or the keys of that table.
+    /// Allowed values: a range with its unit, or the keys of that table.
     pub allowed: String,
 }
 
-/// The kinds of mistakes a scenario file can have.
+/// Kind of mistake in a scenario file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Problem {
-    /// There is no such file.
+    /// The file does not exist.
     NoSuchFile,
     /// The name is that of a directory.
     Directory,
-    /// The system refused to read the file.
+    /// The system does not allow the file to be read.
     Unreadable(std::io::ErrorKind),
-    /// The file is longer than any scenario.
+    /// The file exceeds the limit of 1 MiB.
     TooLong,
     /// The file is not UTF-8 text.
     NotUtf8,
-    /// The file holds nothing but blanks and comments.
+    /// The file contains only blanks and comments.
     Empty,
     /// The file is not TOML.
     Syntax,
-    /// The table has no such key.
+    /// The key is unknown in its table.
     UnknownKey,
-    /// A key that has no default is absent.
+    /// A required key is missing.
     Missing,
-    /// Two keys say the same.
+    /// Two keys have the same meaning.
     SaidTwice,
-    /// A place on earth is no place on a line that is not.
+    /// A geographic position needs `[site]`.
     NoSite,
-    /// The text is none of those that are known.
+    /// The text is not one of the known ones.
     UnknownChoice,
-    /// The text begins like a UDP address and is none.
+    /// The UDP address is malformed.
     NoEndpoint(EndpointError),
-    /// There are more or fewer entries than another key says.
+    /// The number of entries contradicts another key.
     OtherNumber,
-    /// A table stands where a list of tables does.
+    /// A single table is given instead of a list of tables.
     NoList,
-    /// A list of tables stands where a table does.
+    /// A list of tables is given instead of a single table.
     NoTable,
-    /// The value is of another type.
+    /// The value has the wrong type.
     WrongType,
     /// The value is outside its range, NaN or infinite.
     OutOfRange,
@@ -72,11 +72,11 @@ pub enum Problem {
     NoInterference,
     /// A relay is described twice.
     DuplicateRelay,
-    /// A relay is described, but nothing about it differs.
+    /// A relay's description changes nothing.
     NothingDiffers,
-    /// The distance is not that of the sites.
+    /// The distance contradicts that of the sites.
     OtherDistance,
-    /// The places are not in order.
+    /// The positions are not in increasing order.
     Unsorted,
 }
 
@@ -132,7 +132,7 @@ impl fmt::Display for ScenarioError {
 
 impl std::error::Error for ScenarioError {}
 
-/// Escapes whatever a terminal or a log reader could take for the end of the line.
+/// Escapes characters that a terminal or log reader could treat as a line end.
 fn one_line(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -145,12 +145,10 @@ fn one_line(text: &str) -> String {
     out
 }
 
-/// A value as the file could have it, cut short when long.
 pub(super) fn quote(value: &Value) -> String {
     cut(&value.to_string())
 }
 
-/// The start of a text, with an ellipsis where something was left out.
 pub(super) fn cut(text: &str) -> String {
     match text.char_indices().nth(QUOTED) {
         Some((end, _)) => format!("{}...", text.get(..end).unwrap_or_default()),

@@ -1,4 +1,4 @@
-//! The file as serde reads it, and the checks that take several keys at once.
+//! Typed form of the file, and checks that involve several keys.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::spec::{
     Scenario,
 };
 
-/// `deny_unknown_fields` guards the table of keys: a key listed there and forgotten here fails at once.
+/// `deny_unknown_fields` guards the table of keys: a key that is listed there but missing here fails at once.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFile {
@@ -57,12 +57,10 @@ struct RawGeometry {
     altitude_m: f64,
     altitude_min_m: Option<f64>,
     altitude_max_m: Option<f64>,
-    /// Relays stay above the line unless the file gives them room beside it.
     #[serde(default)]
     lateral_min_m: f64,
     #[serde(default)]
     lateral_max_m: f64,
-    /// No separation is asked for unless the file does.
     #[serde(default)]
     min_separation_m: f64,
 }
@@ -132,13 +130,13 @@ struct RawPlan {
     places: Vec<PlannedPlace>,
 }
 
-/// The typed form of a table that [`crate::check::table`] has passed.
+/// Converts a table that [`crate::check::table`] has accepted.
 pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioError> {
     let table = table.clone();
     table.try_into().map_err(|error| unread(file, &error))
 }
 
-/// The scenario, once its keys agree with each other.
+/// Builds the scenario after checking that its keys agree with each other.
 pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError> {
     let geometry = raw.geometry;
     let altitude_m = geometry.altitude_m;
@@ -229,7 +227,7 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
     if nlos >= los {
         return Ok(spec);
     }
-    // The blame goes to a key that the file has.
+    // Reports a key that the file contains.
     let (key, value, allowed) = match raw.excess_loss_nlos_db {
         Some(_) => (
             "channel.excess_loss_nlos_db",
@@ -363,7 +361,7 @@ fn relays(
     Ok(relays)
 }
 
-/// The plan of a file whose keys have been checked: it has a place for every relay.
+/// Builds the plan and checks that it has a position for every relay.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(

@@ -1,4 +1,4 @@
-//! Interferers: their powers, and their places along the line or on earth.
+//! Interferers: powers and positions, along the line or geographic.
 
 use serde::Deserialize;
 use uav_relay::flight::axis::AROUND_M;
@@ -10,7 +10,7 @@ use crate::keys::number;
 use crate::power::Said;
 use crate::spec::{Line, Source};
 
-/// By how much a place above or below the ground may change the interference anywhere that relays or Rx may be, dB.
+/// Largest change of interference, dB, by ignoring an interferer's height, anywhere that relays or Rx may be.
 const MOST_OFF_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -27,7 +27,6 @@ pub(super) struct RawSource {
     amsl_m: Option<f64>,
 }
 
-/// Where relays may be, and the line on earth.
 pub(super) struct Room<'a> {
     pub(super) line: Option<&'a Line>,
     pub(super) distance_m: f64,
@@ -35,7 +34,7 @@ pub(super) struct Room<'a> {
     pub(super) lateral_m: [f64; 2],
 }
 
-/// The interferers of a file whose keys have been checked.
+/// Returns the interferers of a file whose keys have been checked.
 pub(super) fn sources(
     file: &str,
     raw: &[RawSource],
@@ -61,7 +60,7 @@ pub(super) fn sources(
     .collect()
 }
 
-/// Where on the line a point on earth is, m: along and to the right of it.
+/// Converts geographic coordinates to a position along the line and to its right, m.
 fn on_earth(
     file: &str,
     table: &str,
@@ -121,9 +120,9 @@ fn on_earth(
 }
 
 impl Room<'_> {
-    /// By how much the interference of one that is `above_m` over (`x_m`, `y_m`) differs from that of one on the ground, at most, dB.
+    /// Returns the largest difference, dB, of the interference from `above_m` over (`x_m`, `y_m`) and from the ground below.
     ///
-    /// At one altitude that is largest where a relay is nearest; altitudes are tried in steps. Rx is one more place.
+    /// At a given altitude it is largest for the nearest relay position; altitudes are tried in steps. Rx is a further receiver.
     fn off_by_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {
@@ -137,7 +136,7 @@ impl Room<'_> {
         let at_relays = (0..=STEPS)
             .map(|step| low + (high - low) * f64::from(step) / f64::from(STEPS))
             .map(|h| ratio_db(nearest, h));
-        // An interferer at Rx leaves nothing to hear, at any height.
+        // An interferer at Rx drowns it at any height.
         let at_rx = (x_m - self.distance_m).hypot(y_m);
         let at_rx = if at_rx > 0.0 {
             ratio_db(at_rx, 0.0)

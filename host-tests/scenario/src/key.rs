@@ -1,11 +1,11 @@
-//! A key from a file, the network's or the autopilot's: 64 hexadecimal digits, as `openssl rand -hex 32` writes them.
+//! Reads a secret key (of the network or the autopilot) from a file: 64 hexadecimal digits, as from `openssl rand -hex 32`.
 
 use std::path::Path;
 
 /// Reads the key in `file`, which `option` named.
 ///
 /// # Errors
-/// One line that names both and what is wrong with it, a file that every user of the computer can read among that; never what is in it.
+/// A line that names both and the problem, such as a file that other users can read; never the content.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     let named = |error: &str| format!("{option} {}: {error}", file.display());
     check_mode(file).map_err(|error| named(&error))?;
@@ -14,7 +14,7 @@ pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     parse(&text).map_err(named)
 }
 
-/// Refuses a file that users other than its owner and its group can read or write. A file that cannot be opened is left to the reader.
+/// Rejects a file that users other than its owner and group can read or write. Errors of access are left to the reader.
 #[cfg(unix)]
 fn check_mode(file: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt as _;
@@ -31,16 +31,16 @@ fn check_mode(file: &Path) -> Result<(), String> {
     }
 }
 
-/// Elsewhere a file has no mode.
+/// Accepts any file: other systems have no file mode.
 #[cfg(not(unix))]
 fn check_mode(_: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// The key in `text`; white space around it does not count.
+/// Parses the key in `text`; surrounding white space is ignored.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The problem.
 pub fn parse(text: &str) -> Result<[u8; 32], &'static str> {
     let text = text.trim();
     if !text.bytes().all(|digit| digit.is_ascii_hexdigit()) {

@@ -1,5 +1,6 @@
-//! Every key a scenario file may have, with what it allows: the one table that both the checks and the error
-//! messages read, so that neither can say what the other does not do.
+//! Table of all keys of a scenario file and their allowed values.
+//!
+//! The checks and the error messages both use it, so they cannot disagree.
 
 use core::fmt;
 
@@ -8,7 +9,7 @@ use toml::Table;
 use crate::endpoint::FORM;
 use crate::plan::PlannedMethod;
 
-/// A range of numbers; both ends belong to it, except a low end that is `open`.
+/// Range of numbers; both ends are included, except a low end that is `open`.
 pub(super) struct Range {
     low: f64,
     high: f64,
@@ -16,43 +17,37 @@ pub(super) struct Range {
     unit: &'static str,
 }
 
-/// What a key's value has to be.
 pub(super) enum Rule {
     Number(Range),
     Whole(Range),
     /// "los", "nlos" or a number.
     LinkOrNumber(Range),
-    /// true or false.
     Flag,
-    /// One of these texts.
     Choice(&'static [&'static str]),
-    /// A text that is not empty.
     Text,
-    /// The name of a tty, or the UDP address of an autopilot.
+    /// A serial port, or the UDP address of an autopilot.
     TtyOrUdp,
     Table(Keys),
-    /// An array of tables with at least so many entries.
+    /// An array of tables with at least this number of entries.
     Tables(Keys, usize),
 }
 
-/// Whether a table must have a key.
+/// Condition under which a key is required.
 pub(super) enum Need {
     Always,
     Never,
-    /// Unless it has one of these.
+    /// Required unless the table has one of these keys.
     Unless(&'static [&'static str]),
 }
 
-/// One key of a table.
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
-    /// Keys that say the same, or something of it: a table has no two of them.
+    /// Keys with the same or overlapping meaning, which exclude this one.
     pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
 
-/// The keys of a table.
 pub(super) type Keys = &'static [Key];
 
 pub(super) const fn range(low: f64, high: f64, unit: &'static str) -> Range {
@@ -91,7 +86,7 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Required unless the table has one of `others`, beside which it cannot stand.
+/// Creates a key that is required unless the table has one of `others`, which exclude it.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),
@@ -99,7 +94,7 @@ const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule)
     }
 }
 
-/// Optional, and not beside `others`.
+/// Creates an optional key that `others` exclude.
 const fn without(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         name,
@@ -123,7 +118,6 @@ const AMSL: Range = range(-1e3, 1e4, "m");
 const PLACE: Range = range(-1e7, 1e7, "m");
 const LOSS: Range = range(0.0, 200.0, "dB");
 
-/// The whole file.
 pub(super) const FILE: Keys = &[
     required("geometry", Rule::Table(GEOMETRY)),
     required("power", Rule::Table(POWERS)),
@@ -243,7 +237,7 @@ const BETA: Keys = &[
 ];
 
 impl Key {
-    /// Whether `table`, which does not have it, must.
+    /// Returns true if `table`, which lacks the key, must have it.
     pub(super) fn is_missed(&self, table: &Table) -> bool {
         match self.need {
             Need::Always => true,
@@ -252,7 +246,7 @@ impl Key {
         }
     }
 
-    /// The keys that would do in its place, of those of its table.
+    /// Returns the keys that may replace this one, from its table.
     pub(super) fn instead(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,
@@ -266,7 +260,6 @@ impl Key {
 }
 
 impl Range {
-    /// Whether a number belongs to the range.
     pub(super) fn holds(&self, value: f64) -> bool {
         // A NaN fails the first comparison, an infinity one of the two.
         let low = if self.open {
@@ -278,7 +271,6 @@ impl Range {
     }
 }
 
-/// A number as a person would write it: neither a row of zeros nor needless digits.
 pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if size > 0.0 && !(1e-3..1e5).contains(&size) {
@@ -323,7 +315,7 @@ impl fmt::Display for Rule {
     }
 }
 
-/// Every key of a file, as `table.key`; those of a list of tables as those of a table.
+/// Returns all keys of a file, as `table.key`; lists of tables are treated as tables.
 pub fn all() -> Vec<String> {
     let mut names = Vec::new();
     collect("", FILE, &mut names);
@@ -342,7 +334,6 @@ fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
     }
 }
 
-/// The names of some keys, for a message.
 pub(super) fn names<'a>(keys: impl IntoIterator<Item = &'a Key>) -> String {
     keys.into_iter()
         .map(|key| key.name)

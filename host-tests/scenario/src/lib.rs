@@ -1,19 +1,18 @@
-//! The scenario file of the host tools: what is agreed about the flight before any relay takes off.
+//! Scenario files of the host tools: the parameters of a flight that are known before take-off.
 //!
-//! | module | one idea |
+//! | module | content |
 //! | --- | --- |
 //! | [`Scenario`] | a scenario file, read and checked |
-//! | [`mission`] | from a scenario to the mission that relays fly |
-//! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the one that stands for them |
-//! | [`deployment`] | what the programs of a chain need beside the scenario, in sections of the same file |
-//! | [`endpoint`] | the UDP address of an autopilot |
-//! | [`key`] | the network's key, or an autopilot's, from a file |
-//! | [`number`] | from the f64 of files to the f32 of relays |
+//! | [`mission`] | the mission that relays fly in a scenario |
+//! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the hypothetical one that replaces them |
+//! | [`deployment`] | settings of a chain's programs, in sections of the same file |
+//! | [`endpoint`] | UDP address of an autopilot |
+//! | [`key`] | secret keys, from files |
+//! | [`number`] | conversion from the f64 of files to the f32 of relays |
 //!
-//! A file is read in three passes, each with one job: `check` compares its shape, its keys, their types and every range with the table in
-//! `keys`; serde makes typed values of them; `file` checks what only several keys together can break.
-//! Whatever is wrong comes back as a [`ScenarioError`], one line that names the file, the key, the value and
-//! what is allowed.
+//! A file is read in three passes: `check` compares its shape, keys, types and ranges with the table in `keys`; serde converts it
+//! to typed values; `file` checks conditions on several keys. Mistakes are reported as a [`ScenarioError`], one line that names
+//! the file, the key, the value and the allowed values.
 
 mod check;
 pub mod deployment;
@@ -44,7 +43,7 @@ pub use spec::{
     Scenario, Source,
 };
 
-/// The default scenario, as a file.
+/// Text of the default scenario file.
 pub const DEFAULT: &str = include_str!("default.toml");
 
 impl Scenario {
@@ -57,16 +56,16 @@ impl Scenario {
         Self::parse(&path.display().to_string(), &text)
     }
 
-    /// Reads a scenario from TOML text; `file_name` only serves the error message.
+    /// Parses a scenario from TOML text; `file_name` is used only in error messages.
     ///
     /// # Errors
-    /// The first mistake found: TOML that does not parse, an unknown or missing key, a value of the wrong type or
-    /// out of its range (NaN and infinities are out of every range), or keys that contradict each other.
+    /// The first mistake found: invalid TOML, an unknown or missing key, a value of the wrong type or out of its range (NaN and
+    /// infinities are out of every range), or keys that contradict each other.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
         let table = read::table_of(file_name, text)?;
         check::table(file_name, &table)?;
         let (scenario, sections) = deployment::split(table);
-        // Other programs use them; a mistake in one is a mistake here, too.
+        // Other programs use the sections, but a mistake in one is reported here too.
         deployment::from_table(file_name, &sections)?;
         let raw = file::from_table(file_name, &scenario)?;
         file::build(file_name, raw)
@@ -74,10 +73,10 @@ impl Scenario {
 }
 
 impl deployment::Deployment {
-    /// Reads both parts of a file: the scenario, and the sections.
+    /// Reads both parts of a file: the scenario and the sections.
     ///
     /// # Errors
-    /// As [`Scenario::load`], and a number of relays in `[network]` that is not that of `[plan]`.
+    /// Those of [`Scenario::load`], and a number of relays in `[network]` that differs from `[plan]`.
     pub fn load(path: &Path) -> Result<(Scenario, Self), ScenarioError> {
         let (name, text) = (path.display().to_string(), read::text_of(path)?);
         let scenario = Scenario::parse(&name, &text)?;
@@ -87,10 +86,10 @@ impl deployment::Deployment {
         Ok((scenario, sections))
     }
 
-    /// Reads the sections of a file whose plan is about to be replaced; `file_name` only serves the error message.
+    /// Parses the sections of a file whose plan is about to be replaced; `file_name` is used only in error messages.
     ///
     /// # Errors
-    /// TOML that does not parse, and any mistake in a section.
+    /// Invalid TOML, and any mistake in a section.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
         let table = read::table_of(file_name, text)?;
         check::table(file_name, &table)?;

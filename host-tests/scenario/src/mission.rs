@@ -1,4 +1,4 @@
-//! From a scenario to the mission that the relays fly.
+//! Converts a scenario to the mission that the relays fly.
 
 use std::fmt;
 
@@ -12,26 +12,26 @@ use crate::number::narrow;
 use crate::scene::Scene;
 use crate::{Interference, Scenario, Source};
 
-/// Why a scenario is no mission.
+/// Why a scenario is not a valid mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// No single interferer stands for the scenario's.
+    /// The scenario's interferers cannot be replaced by a hypothetical one.
     NoHypothetical,
-    /// The relays cannot stand that far apart on that distance.
+    /// The relays do not fit on the distance with their least separation.
     NoRoom {
-        /// How many relays.
+        /// Number of relays.
         relays: u16,
-        /// How far apart they stay at least, m.
+        /// Least separation, m.
         apart_m: f32,
-        /// How far it is from Tx to Rx, m.
+        /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The mission refuses a parameter.
+    /// The mission rejects a parameter.
     Mission(MissionError),
-    /// The channel refuses a parameter.
+    /// The channel rejects a parameter.
     Channel(ChannelError),
-    /// The field refuses its points.
+    /// The field rejects its points.
     Field(FieldError),
 }
 
@@ -60,10 +60,10 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// The mission of `uavs` relays in `scenario`, with one interferer for several, and what single relays hold of their own (index from 1).
+/// Returns the mission of `uavs` relays, with one interferer in place of several, and the relays' own profiles (index from 1).
 ///
 /// # Errors
-/// [`Refusal`] for what the relays cannot do, and for numbers they do not take.
+/// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
 pub fn mission(
     scenario: &Scenario,
     uavs: u16,
@@ -136,7 +136,7 @@ pub fn mission(
     Ok((mission, profiles))
 }
 
-/// The one interferer that stands for several in a mission; `None` where there are not several, or none stands for them.
+/// Returns the hypothetical interferer of a scenario with several; `None` with fewer, or if there is no good one.
 pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     match &scenario.interference {
         Interference::Sources(sources) if sources.len() > 1 => {
@@ -148,7 +148,7 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     }
 }
 
-/// What is wrong with a scenario that describes a relay that a chain of `uavs` does not have, in one line; `None` where it does not.
+/// Returns the error line for a described relay beyond a chain of `uavs`; `None` if there is none.
 pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
     let (index, _) = scenario.relays.last_key_value()?;
     (*index > uavs).then(|| {
@@ -156,7 +156,7 @@ pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
     })
 }
 
-/// The relays that hold an altitude of their own, by index from 1.
+/// Returns the relays with a fixed altitude of their own, by index from 1.
 pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
     scenario
         .relays
@@ -166,7 +166,7 @@ pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// The mission with the Upsilon it has at Rx everywhere: all that relays may know before they have measured.
+/// Returns the mission with the Upsilon of Rx everywhere: the knowledge of relays before any measurement.
 #[must_use]
 pub fn told_of_an_even_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -190,7 +190,7 @@ pub fn told_of_an_even_field(mission: &Mission) -> Mission {
         .unwrap_or(*mission)
 }
 
-/// The shapes of the distribution of I / `i_max_w` at `x_m`: alpha interpolated, and beta so that Upsilon is.
+/// Returns alpha and beta of the distribution of I / `i_max_w` at `x_m`: alpha and Upsilon are interpolated.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);
@@ -213,7 +213,7 @@ pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     (alpha, (upsilon - 1.0) * (alpha - 1.0))
 }
 
-/// Upsilon at the points of `spec`. A field lives as long as the program: a relay's is part of its image.
+/// Returns the field of `spec`, with a static lifetime, as in a firmware's image.
 fn field(spec: &crate::Field) -> Result<Field, FieldError> {
     let points: Option<Vec<FieldPoint>> = spec
         .beta

@@ -1,6 +1,6 @@
-//! Numbers: from the f64 of files and options to the f32 of relays, and from decibels to factors.
+//! Conversion of numbers: f64 of files to f32 of relays, decibels to factors.
 
-/// The nearest f32: what a relay works with.
+/// Returns the nearest f32, the precision of relays.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the ranges of options and scenarios lie well inside those of an f32"
@@ -9,13 +9,13 @@ pub fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// A ratio of `db` decibels.
+/// Returns the ratio that `db` decibels express.
 #[must_use]
 pub fn factor(db: f64) -> f64 {
     10_f64.powf(db / 10.0)
 }
 
-/// A power of `dbm` over a milliwatt, W.
+/// Returns the power of `dbm`, W.
 #[must_use]
 pub fn watts(dbm: f64) -> f64 {
     factor(dbm - 30.0)

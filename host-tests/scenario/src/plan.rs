@@ -1,49 +1,49 @@
-//! What a planner found: how many relays fly, by which method, and where they are expected.
+//! Section `[plan]`: number of relays, method and expected positions.
 
 use serde::Deserialize;
 
-/// A plan that a scenario file carries on, from `cargo plan --out` to `cargo provision`.
+/// A plan in a scenario file, from `cargo plan --out` to `cargo provision`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
     /// Number of relays, 1 to 1000.
     pub uavs: u16,
-    /// How the relays find their places.
+    /// Placement method of the relays.
     pub method: PlannedMethod,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1.
     pub tolerance: f64,
-    /// SIR of the worst hop at these places, in dB, -400 to 400.
+    /// SIR of the worst hop at these positions, dB, -400 to 400.
     pub sir_db: f64,
-    /// Where the relays go, relay 1 first; as many as there are relays.
+    /// Positions, relay 1 first; one per relay.
     pub places: Vec<PlannedPlace>,
 }
 
-/// How relays that fly a plan find their places.
+/// Placement method of relays that fly a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PlannedMethod {
-    /// At the altitudes they hold: Algorithm 1, in a field Algorithm 4.
+    /// Fixed altitudes: Algorithm 1, in a field Algorithm 4.
     Align,
-    /// Places, sides and altitudes together.
+    /// Positions, sides and altitudes together.
     Joint,
 }
 
-/// Where a relay goes.
+/// Position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedPlace {
-    /// Along the line from Tx, in metres.
+    /// Along the line from Tx, m.
     pub x_m: f64,
-    /// To the right of it as seen from above, in metres.
+    /// Lateral position, m; positive to the right as seen from above.
     pub y_m: f64,
-    /// Above the ground, in metres, 0.1 to 1e5.
+    /// Altitude above ground, m, 0.1 to 1e4.
     pub altitude_m: f64,
 }
 
 impl PlannedMethod {
-    /// Every method, as files have it.
+    /// Names of the methods in files.
     pub const NAMES: &'static [&'static str] = &["align", "joint"];
 
-    /// As files have it.
+    /// Returns the name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Align => "align",

@@ -1,7 +1,7 @@
-//! Powers as data sheets have them, in W or dBm and with antennas, and what becomes of them in the model.
+//! Powers as in data sheets, in W or dBm and with antenna gains, and their form in the model.
 //!
-//! The model of the channel has a path loss alone: P / (mu d^2) is received of P. Over a link between antennas of gains `G_t` and `G_r`
-//! (Friis), `P G_t G_r / (mu d^2)` is. With the interferers' `P_i G_i`, and N the receiver's own noise, the SINR there is
+//! The channel model has only a path loss: P / (mu d^2) is received of P. With antennas of gains `G_t` and `G_r` (Friis) it is
+//! `P G_t G_r / (mu d^2)`. With the interferers' `P_i G_i` and the receiver's noise N, the SINR is
 //!
 //! ```text
 //! P G_t G_r / (mu d^2)                      P G_t / (mu d^2)
@@ -9,13 +9,13 @@
 //! sum P_i G_i G_r / (mu_i d_i^2) + N   sum P_i G_i / (mu_i d_i^2) + N / G_r
 //! ```
 //!
-//! so that a sender's gain belongs to its power: what counts is its EIRP; and a receiver's gain, which signal and interference have in common,
-//! makes its noise less. Without noise it changes nothing.
+//! so a sender's gain is included in its power (its EIRP counts), and a receiver's gain, which signal and interference share,
+//! divides its noise. Without noise it has no effect.
 //!
-//! A mission has one N for all receivers. Where the relays' antennas and the receiver's differ, it is that of the lower gain: exact at the
-//! ends of its kind, and at the others the SINR is at least what is told.
+//! A mission has one N for all receivers. If the gains of the relays and of Rx differ, the lower one is used: exact for receivers
+//! with that gain, and a lower bound on the SINR at the others.
 //!
-//! An antenna has the same gain toward all it hears: one that is blind toward the interferer is not in the model.
+//! An antenna has the same gain in all directions; a null toward the interferer is not modelled.
 
 use serde::Deserialize;
 
@@ -24,7 +24,7 @@ use crate::error::{Problem, ScenarioError};
 use crate::keys::number;
 use crate::number::{factor, watts};
 
-/// EIRPs that a mission takes of Tx and of relays, W, and of interferers.
+/// EIRPs that a mission accepts for Tx and relays, W, and for interferers.
 const EIRP: [f64; 2] = [1e-6, 1e6];
 const SOURCE_EIRP: [f64; 2] = [1e-6, 1e9];
 
@@ -41,7 +41,6 @@ pub(super) struct RawPower {
     rx_gain_dbi: Option<f64>,
 }
 
-/// The senders' EIRPs, W, and the receivers' gains, dBi.
 pub(super) struct Powers {
     pub(super) tx_w: f64,
     pub(super) uav_w: f64,
@@ -49,19 +48,18 @@ pub(super) struct Powers {
     pub(super) rx_gain_dbi: f64,
 }
 
-/// A sender's power, in one of the ways in which a table says it.
+/// A sender's power in one of the forms that a table allows.
 pub(super) struct Said<'a> {
-    /// The table, such as `interferer[0].`, and the keys in it.
+    /// Name of the table, such as `interferer[0].`, and the keys in it.
     pub(super) table: &'a str,
     pub(super) in_w: (&'a str, Option<f64>),
     pub(super) in_dbm: (&'a str, Option<f64>),
     pub(super) eirp: (&'a str, Option<f64>),
-    /// The gain of its antenna, and where the file says it.
+    /// Key and value of the antenna gain.
     pub(super) gain: (&'a str, Option<f64>),
 }
 
 impl Said<'_> {
-    /// The EIRP, W, if it is said.
     fn eirp_w(&self, file: &str, [least, most]: [f64; 2]) -> Result<Option<f64>, ScenarioError> {
         let gain = self.gain.1.map_or(1.0, factor);
         let ((key, given), eirp_w) = match (self.in_w, self.in_dbm, self.eirp) {
@@ -70,7 +68,7 @@ impl Said<'_> {
             (_, _, said @ (_, Some(dbm))) => (said, watts(dbm)),
             _ => return Ok(None),
         };
-        // The keys' own ranges end where these do, but for what the last digit of a power of ten comes to.
+        // The ranges of the keys have the same limits, apart from rounding of powers of ten.
         if (least * (1.0 - 1e-9)..=most * (1.0 + 1e-9)).contains(&eirp_w) {
             return Ok(Some(eirp_w.clamp(least, most)));
         }
@@ -91,18 +89,15 @@ impl Said<'_> {
         ))
     }
 
-    /// The EIRP of Tx or of a relay, W, if it is said.
     pub(super) fn of_ours(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
         self.eirp_w(file, EIRP)
     }
 
-    /// The EIRP of an interferer, W, if it is said.
     pub(super) fn of_source(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
         self.eirp_w(file, SOURCE_EIRP)
     }
 }
 
-/// What `[power]` comes to, once its keys have been checked.
 pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError> {
     let table = "power.";
     let tx = Said {

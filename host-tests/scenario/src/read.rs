@@ -1,4 +1,4 @@
-//! From a path to a TOML table: everything that can go wrong before any key is looked at.
+//! Reads a file into a TOML table: errors that occur before keys are checked.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -8,11 +8,9 @@ use toml::Table;
 
 use crate::error::{Problem, ScenarioError, cut};
 
-/// Longest file read, in bytes: 1000 relays and as many interferers fit many times over, and a name such as
-/// `/dev/zero` still ends.
+/// Largest file size, bytes: far more than 1000 relays and as many interferers, and it bounds `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 
-/// The text of a file.
 pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
     let fail = |problem, value, allowed: &str| ScenarioError {
         file: path.display().to_string(),
@@ -47,7 +45,6 @@ pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
     })
 }
 
-/// The table a text spells.
 pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
     let fail = |key, value, problem, allowed| ScenarioError {
         file: file.to_owned(),
@@ -75,7 +72,7 @@ pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
     Ok(table)
 }
 
-/// Line and column (from 1, in characters) of a byte of a text, and the text of that line.
+/// Returns line and column (from 1, in characters) of a byte offset, and the text of that line.
 fn place(text: &str, byte: usize) -> (usize, usize, &str) {
     let before = text.get(..byte).unwrap_or(text);
     let start = before.rfind('\n').map_or(0, |newline| newline + 1);

@@ -1,36 +1,36 @@
-//! Who speaks and who disturbs: a chain of relays under several interferers whose powers add up.
+//! Scene: a chain of relays and several interferers whose powers add up.
 
 use uav_relay::channel::AirGround;
 use uav_relay::{Channel, Placement};
 
 use crate::{Interference, Scenario, Source};
 
-/// One relay of a [`Scene`].
+/// A relay of a [`Scene`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
-    /// Altitude at the start, metres, > 0.
+    /// Initial altitude, m, > 0.
     pub altitude_m: f64,
-    /// Transmit power, watts, > 0.
+    /// Transmit power, W, > 0.
     pub power_w: f64,
-    /// Whether the altitude is its own to hold, whatever the band.
+    /// True if the altitude is fixed, whatever the band.
     pub holds: bool,
 }
 
-/// Where relays may fly across the line: altitudes, and distances to the side, to the right above 0, metres.
+/// Altitudes and lateral positions open to relays, m; positive to the right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
-    /// The lowest altitude, > 0.
+    /// Lowest altitude, > 0.
     pub least_m: f64,
-    /// The highest.
+    /// Highest altitude.
     pub most_m: f64,
-    /// As far as it goes to the left, <= 0.
+    /// Limit to the left, <= 0.
     pub left_m: f64,
-    /// As far as it goes to the right, >= 0.
+    /// Limit to the right, >= 0.
     pub right_m: f64,
 }
 
 impl Corridor {
-    /// The plane above Tx-Rx, between two altitudes, metres.
+    /// Creates the plane above Tx-Rx, between two altitudes, m.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -41,44 +41,44 @@ impl Corridor {
     }
 }
 
-/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) under any number of interferers on the ground.
+/// A chain of relays from Tx at (0, 0) to Rx at (D, 0), and any number of interferers on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// Distance D from Tx to Rx, metres, > 0.
+    /// Distance D from Tx to Rx, m, > 0.
     pub distance_m: f64,
-    /// Least distance between two relays, metres, >= 0.
+    /// Least distance between two relays, m, >= 0.
     pub min_separation_m: f64,
-    /// Transmit power of Tx, watts, > 0.
+    /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,
-    /// The interferers; at least one.
+    /// Interferers; at least one.
     pub sources: Vec<Source>,
     /// Path-loss factor between two relays, 1/m^2, > 0.
     pub mu_los: f64,
-    /// Path-loss factor between two places on the ground, 1/m^2, > 0.
+    /// Path-loss factor between two points on the ground, 1/m^2, > 0.
     pub mu_nlos: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Noise power of every receiver, watts, >= 0; with any, what is called SIR is the SINR.
+    /// Noise power of every receiver, W, >= 0; if above 0, SIR means SINR.
     pub noise_w: f64,
-    /// The altitudes that relays without one of their own may be given, and how far to the side all may go.
+    /// Altitudes of relays without a fixed one, and lateral limits of all.
     pub band: Corridor,
-    /// The relays from Tx to Rx; their number is N.
+    /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,
 }
 
-/// Where a relay stands.
+/// Position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Along the line from Tx, metres.
+    /// Along the line from Tx, m.
     pub x: f64,
-    /// To the right of the line, metres.
+    /// Lateral position, m; positive to the right of the line.
     pub y: f64,
-    /// Above the ground, metres, > 0.
+    /// Above ground, m, > 0.
     pub h: f64,
 }
 
 impl From<(f64, f64)> for Place {
-    /// (x, h), right above the line.
+    /// Converts (x, h), above the line.
     fn from((x, h): (f64, f64)) -> Self {
         Self { x, y: 0.0, h }
     }
@@ -92,7 +92,7 @@ impl From<Placement> for Place {
 }
 
 impl Scene {
-    /// The scene of `relays` relays in `scenario`.
+    /// Creates the scene of `relays` relays in `scenario`.
     ///
     /// `None` for a field of interference, and for a channel or a list of interferers that no scenario file can have.
     pub fn new(scenario: &Scenario, relays: u16) -> Option<Self> {
@@ -131,7 +131,7 @@ impl Scene {
         })
     }
 
-    /// Interference power that a relay there receives, watts: the sum over all sources.
+    /// Returns the interference power at a relay, W: the sum over all sources.
     pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
         let Place { x, y, h } = at.into();
         let each = self.sources.iter().map(|source| {
@@ -141,12 +141,12 @@ impl Scene {
         each.sum()
     }
 
-    /// Interference power that Rx receives, watts; infinite with an interferer at Rx.
+    /// Returns the interference power at Rx, W; infinite with an interferer at Rx.
     pub fn interference_rx_w(&self) -> f64 {
         self.interference_on_ground_w(self.distance_m)
     }
 
-    /// The same on the line between Tx and Rx, on the ground, at `x_m`.
+    /// Returns the interference power on the ground at `x_m` on the line, W.
     pub fn interference_on_ground_w(&self, x_m: f64) -> f64 {
         let each = self.sources.iter().map(|source| {
             let dx = x_m - source.x_m;
@@ -155,9 +155,9 @@ impl Scene {
         each.sum()
     }
 
-    /// SIR (linear) of the N + 1 hops of a chain whose relay k stands at `places[k - 1]`.
+    /// Returns the SIR (linear) of the N + 1 hops of a chain with relay k at `places[k - 1]`.
     ///
-    /// Infinite where two relays share a place; empty unless there is one place per relay, and at least one relay.
+    /// Infinite if two relays share a position; empty unless there is one position per relay, and at least one relay.
     pub fn hop_sirs(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         if places.len() != self.relays.len() {
             return Vec::new();
@@ -174,21 +174,22 @@ impl Scene {
         sirs
     }
 
-    /// SIR (linear) of the worst hop of a chain; 0 where [`Scene::hop_sirs`] is empty.
+    /// Returns the SIR (linear) of the worst hop; 0 if [`Scene::hop_sirs`] is empty.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
         sirs.reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// SIR (linear) of the worst hop of a chain whose relays stand at `along`, metres from Tx, at their altitudes right above the line;
-    /// 0 where there is not one place per relay.
+    /// Returns the SIR (linear) of the worst hop with relays at `along`, m from Tx, at their own altitudes above the line.
+    ///
+    /// 0 unless there is one position per relay.
     pub fn sir_along(&self, along: &[f64]) -> f64 {
         let places = along.iter().zip(&self.relays);
         let places: Vec<(f64, f64)> = places.map(|(&x, relay)| (x, relay.altitude_m)).collect();
         self.chain_sir(&places)
     }
 
-    /// Tx, as the one who speaks.
+    /// Returns Tx as a sender.
     pub fn tx(&self) -> Sender {
         Sender {
             at: Place::from((0.0, 0.0)),
@@ -197,7 +198,7 @@ impl Scene {
         }
     }
 
-    /// A relay there, as the one who speaks to another.
+    /// Returns a relay as a sender to other relays.
     pub fn sender(&self, at: impl Into<Place>, relay: &Relay) -> Sender {
         Sender {
             at: at.into(),
@@ -206,7 +207,7 @@ impl Scene {
         }
     }
 
-    /// SIR (linear) at a relay there.
+    /// Returns the SIR (linear) at a relay.
     pub fn sir_at(&self, from: Sender, at: impl Into<Place>) -> f64 {
         let (to, by) = (at.into(), from.at);
         let signal = received_w(
@@ -219,7 +220,7 @@ impl Scene {
         signal / (self.interference_w(to) + self.noise_w)
     }
 
-    /// SIR (linear) at Rx of what `relay`, the last one, sends from there.
+    /// Returns the SIR (linear) at Rx of the last relay, `relay`, at `at`.
     pub fn sir_at_rx(&self, at: impl Into<Place>, relay: &Relay) -> f64 {
         let Place { x, y, h } = at.into();
         let signal = received_w(relay.power_w, self.eta, self.distance_m - x, y, h);
@@ -227,16 +228,15 @@ impl Scene {
     }
 }
 
-/// One who speaks to a relay: where, and how loud.
+/// A sender to relays: position, power and path-loss factor.
 #[derive(Debug, Clone, Copy)]
 pub struct Sender {
-    /// Where.
+    /// Position.
     pub at: Place,
     power_w: f64,
     factor: f64,
 }
 
-/// Relay `index` of a scenario, from 1.
 fn relay(scenario: &Scenario, index: u16) -> Relay {
     let own = scenario.relays.get(&index);
     let altitude_m = own.and_then(|own| own.altitude_m);
@@ -247,7 +247,7 @@ fn relay(scenario: &Scenario, index: u16) -> Relay {
     }
 }
 
-/// Power received over a squared-distance path loss, watts; the offsets in metres.
+/// Returns the received power over a squared-distance path loss, W; offsets in metres.
 fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }

@@ -1,4 +1,4 @@
-//! Where the ground's two ends are on earth, and the distance that follows from it.
+//! Geographic positions of Tx and Rx, and the distance between them.
 
 use serde::Deserialize;
 use uav_relay::Geodetic;
@@ -25,7 +25,7 @@ struct RawSite {
     amsl_m: f64,
 }
 
-/// The line between the two sites, if there are sites, and the distance from Tx to Rx: the one given, or that of the sites.
+/// Returns the geographic line, if there are sites, and the distance from Tx to Rx: the given one, or that of the sites.
 pub(super) fn line(
     file: &str,
     sites: Option<RawSites>,
@@ -59,7 +59,7 @@ pub(super) fn line(
 fn on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
     let geoid_m = sites.geoid_m;
     let sites @ [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
-        // Their ranges have been checked.
+        // The ranges have been checked.
         Geodetic::from_degrees(site.lat_deg, site.lon_deg, site.amsl_m).unwrap_or_default()
     });
     let axis = Axis::try_new(tx, rx).map_err(|error| {

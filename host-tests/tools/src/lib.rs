@@ -1,14 +1,14 @@
-//! What is run before a flight, and on what is published: the planner, the configuration of drones, the figures.
+//! Host tools: the planner, the provisioning of drones, flash images, and the figures that are published.
 //!
-//! | module | one idea |
+//! | module | content |
 //! | --- | --- |
-//! | [`plan`] | how many relays a link needs, and where they go, without a message |
-//! | [`multi_interferer`] | the best chain against several interferers whose powers add up |
-//! | [`image`] | what a board is flashed with, as `.bin`, `.hex` and `.uf2` |
-//! | [`provision`] | the configuration block of one drone |
-//! | [`figures`] | every figure of the paper's evaluation, and this project's own |
-//! | [`listening`] | chains that find their interferer, in random scenes |
-//! | [`baseline`] | the placements that figures compare with |
+//! | [`plan`] | how many relays a link needs and where they go, computed without messages |
+//! | [`multi_interferer`] | the best chain against the sum of several interferers |
+//! | [`image`] | flash images as `.bin`, `.hex` and `.uf2` |
+//! | [`provision`] | the configuration block of a drone |
+//! | [`figures`] | the figures of the paper's evaluation, and further ones |
+//! | [`listening`] | chains that locate an unknown interferer, in random scenes |
+//! | [`baseline`] | baseline placements for the figures |
 
 pub mod baseline;
 pub mod figures;

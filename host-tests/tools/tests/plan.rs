@@ -1,4 +1,4 @@
-//! `cargo plan` as a person and a program meet it.
+//! `cargo plan`, run as a program: table and JSON output.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -34,7 +34,6 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The exit status and the one line on standard error.
 fn refusal(arguments: &[&str]) -> (i32, String) {
     let output = plan(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
@@ -48,7 +47,7 @@ fn number(value: &Value) -> f64 {
         .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// The scenario of a reference case with the paper's channel, as a file.
+/// Returns the scenario of a reference case with the paper's channel, as a file.
 fn scenario(case: &Case, interference: &str) -> tempfile::NamedTempFile {
     let p = &case.params;
     let mut text = String::new();
@@ -77,7 +76,7 @@ fn interferer(case: &Case) -> String {
     )
 }
 
-/// The cases of `function` in the paper's channel, which is that of a file without one.
+/// Returns the cases of `function` with the paper's channel, the default of a scenario file.
 fn with_the_papers_channel(function: &str) -> Vec<Case> {
     let mut cases = cases::of(function).unwrap();
     cases.retain(|case| (case.params.mu_los - 7_191.811_792).abs() < 1e-3);
@@ -120,7 +119,7 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
     }
 }
 
-/// With room beside the line the only relay goes there, and no place is better.
+/// The only relay leaves the line if there is lateral room, and no position is better.
 #[test]
 fn one_relay_aside_is_the_judges_of_three_dimensions() {
     let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
@@ -142,7 +141,7 @@ fn one_relay_aside_is_the_judges_of_three_dimensions() {
     let best = optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
     let sir = number(&report["sir"]);
     assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
-    // Without a free altitude it stays above the line.
+    // With a given altitude it stays above the line.
     let report = json(&["--scenario", side, "--uavs", "1"]);
     assert_eq!(report["theorem"].as_u64(), Some(1), "{report}");
 }
@@ -165,11 +164,10 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
         );
         assert!(number(&report["sir"]) >= case.arg("gamma").unwrap() * (1.0 - 1e-5));
         assert_eq!(report["proven"].as_bool(), Some(true));
-        // The same in dB.
         let db = format!("{:?}", 10.0 * case.arg("gamma").unwrap().log10());
         let again = json(&["--scenario", path, "--target-sir-db", &db]);
         assert_eq!(again["uavs"], report["uavs"], "{}", case.id);
-        // One fewer cannot have it.
+        // One fewer relay misses the target.
         let fewer = report["uavs"].as_u64().unwrap() - 1;
         if fewer > 0 {
             let best = json(&["--scenario", path, "--uavs", &fewer.to_string()]);
@@ -182,7 +180,6 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
     }
 }
 
-/// All hops share one frequency: the rate of the worst hop is divided by the slots, one for each hop.
 #[test]
 fn rates_are_divided_by_the_slots() {
     for relays in [1_u32, 4, 8] {
@@ -216,7 +213,7 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
     let report = json(&["--target-rate-bps", "6e6", "--bandwidth-hz", "1e7"]);
     assert_eq!(report["uavs"].as_u64(), Some(1), "{report}");
     assert!(number(&report["rate_bps"]) >= 6e6);
-    // Twelve relays give every hop 20 Mbit/s, while it sends; the chain carries a thirteenth of it.
+    // Twelve relays give each hop 20 Mbit/s while it sends, but the chain carries only a thirteenth of it.
     let (status, line) = refusal(&["--target-rate-bps", "2e7", "--bandwidth-hz", "1e7"]);
     assert_eq!(status, 1, "{line}");
     for part in [
@@ -226,7 +223,7 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
     ] {
         assert!(line.contains(part), "{part}: {line}");
     }
-    // In noise alone more relays carry more, up to a number.
+    // In noise alone more relays carry more, up to some number.
     let file = tempfile::NamedTempFile::new().unwrap();
     let noisy = "[geometry]\ndistance_m = 10000\naltitude_m = 20\n[power]\ntx_w = 1\nuav_w = 1\n[channel]\nexcess_loss_los_db = 30\n\
                  excess_loss_nlos_db = 50\n[noise]\nbandwidth_hz = 1e7\n[[interferer]]\npower_w = 1e-6\nx_m = 5000\ny_m = 1e6\n";
@@ -244,7 +241,7 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
         let rate = number(&ask(&["--uavs", &beside.to_string()])["rate_bps"]);
         assert!(rate <= number(&one["best_rate_bps"]), "{beside}: {rate}");
     }
-    // The fewest that do, and not those that carry most.
+    // The fewest relays that meet the target, not the number with the largest rate.
     let half = 0.5 * (number(&one["rate_bps"]) + number(&one["best_rate_bps"]));
     let met = ask(&["--target-rate-bps", &format!("{half:?}")]);
     let uavs = met["uavs"].as_u64().unwrap();
@@ -319,7 +316,7 @@ fn wrong_input_is_named_in_one_line_with_status_2() {
     assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
 }
 
-/// It flies nothing, and finds the mistake before whoever does.
+/// The planner flies nothing, but finds the mistake before the flight.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let drone = include_str!("../../../examples/drone.toml");
@@ -347,12 +344,12 @@ fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
             .contains("gives every hop an SIR of 60 dB: the most is 20.980 dB, with "),
         "{report}"
     );
-    // That much can be had, and no more.
+    // The reported maximum can be met, and nothing above it.
     let told = format!("{:?}", most * (1.0 - 1e-5));
     assert!(number(&json(&["--target-sir", &told])["sir"]) >= most * (1.0 - 1e-4));
     let more = format!("{:?}", most * 1.001);
     assert_eq!(refusal(&["--target-sir", &more]).0, 1);
-    // Too many for the distance.
+    // More relays than the distance allows.
     let (status, line) = refusal(&["--uavs", "1000"]);
     assert!(status == 1 && line.contains("min_separation_m"), "{line}");
 }
@@ -388,7 +385,7 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
         x.map(|x| format!("[[interferer]]\npower_w = 40.0\nx_m = {x:?}\ny_m = {y:?}\n"))
             .concat()
     };
-    // Next to each other: one stands for both.
+    // Interferers next to each other: the hypothetical one is good enough.
     let file = scenario(case, &two([490.0, 510.0], 400.0));
     let path = file.path().to_str().unwrap();
     let near = json(&["--scenario", path, "--uavs", "8"]);
@@ -411,7 +408,7 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
     );
     let alone = json(&["--uavs", "8"]);
     assert!((number(&near["sir"]) / number(&alone["sir"]) - 1.0).abs() < 0.01);
-    // Far apart: none does, and the plan's places are better than its.
+    // Interferers far apart: no hypothetical one is good enough, and the plan's positions are better.
     let file = scenario(case, &two([100.0, 900.0], 150.0));
     let path = file.path().to_str().unwrap();
     let far = json(&["--scenario", path, "--uavs", "8"]);
@@ -435,7 +432,7 @@ fn the_joint_optimum_comes_out_where_altitudes_are_free() {
         "{free}"
     );
     assert_eq!(free["proven"].as_bool(), Some(false));
-    // Choosing altitudes takes no more relays.
+    // Free altitudes need no more relays.
     let given = json(&["--scenario", altitudes, "--target-sir", "2"]);
     let fewer = json(&[
         "--scenario",

@@ -1,9 +1,9 @@
-//! What the commands of the project have in common.
+//! Shared parts of the project's development commands.
 
 pub mod number;
 pub mod stack;
 pub mod template;
 pub mod toolchain;
 
-/// The fuzz targets that `cargo ci` runs: all that there are, by name.
+/// Names of all fuzz targets, which `cargo ci` runs.
 pub const FUZZ_TARGETS: [&str; 6] = ["deframe", "frame", "relay", "chain", "scenario", "mavlink"];

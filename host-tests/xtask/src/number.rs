@@ -1,6 +1,6 @@
-//! Numbers for people to read.
+//! Formatting of numbers for people.
 
-/// A whole number in groups of three digits.
+/// Formats a whole number in groups of three digits.
 pub fn spaced(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();

@@ -1,33 +1,33 @@
-//! The most stack an image can use, from its machine code.
+//! Upper bound on an image's stack, from its machine code.
 //!
-//! Reads the disassembly of `llvm-objdump`: what each function pushes, which functions it calls. A call through a pointer
-//! may reach any function whose address stands in the image's constants, and is taken to reach the hungriest of them. An
-//! interrupt may come at the deepest point; handlers of one priority do not nest. Recursion has no bound and is an error.
+//! Parses the disassembly of `llvm-objdump`: stack use and calls of each function. A call through a pointer may reach any
+//! function whose address is in the image's constants; the one with the largest stack is assumed. An interrupt may occur at the
+//! deepest point; handlers of one priority do not nest. Recursion has no bound and is an error.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What one function does to the stack.
+/// Stack use and calls of one function.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Function {
-    /// Name, as the linker knows it.
+    /// Linker name.
     pub name: String,
-    /// Bytes it takes for itself.
+    /// Size of its own frame, bytes.
     pub frame: u64,
-    /// Addresses of functions it calls or jumps to.
+    /// Addresses of functions that it calls or jumps to.
     pub calls: BTreeSet<u64>,
-    /// Whether it calls through a pointer.
+    /// True if it calls through a pointer.
     pub indirect: bool,
 }
 
-/// Why there is no bound.
+/// Reason why there is no bound.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StackError {
-    /// A function can come back to itself.
+    /// A function can call itself, directly or not.
     Recursion(String),
-    /// A frame of a size that is not a constant.
+    /// The size of a frame is not constant.
     Dynamic(String),
-    /// There is no function of that name.
+    /// The function does not exist.
     Unknown(String),
 }
 
@@ -43,7 +43,7 @@ impl std::fmt::Display for StackError {
 
 impl std::error::Error for StackError {}
 
-/// The functions of an image by address, and those whose address is a constant somewhere.
+/// Functions of an image by address, and those whose address is a constant.
 #[derive(Clone, Debug, Default)]
 pub struct Calls {
     functions: BTreeMap<u64, Function>,
@@ -51,8 +51,9 @@ pub struct Calls {
 }
 
 impl Calls {
-    /// Reads `disassembly` (`llvm-objdump -d --no-show-raw-insn`); `constants` are the words of the read-only data, in which
-    /// the address of a Thumb function has its lowest bit set.
+    /// Parses `disassembly` (`llvm-objdump -d --no-show-raw-insn`).
+    ///
+    /// `constants` are the words of the read-only data, in which the address of a Thumb function has its lowest bit set.
     ///
     /// # Errors
     /// [`StackError::Dynamic`] for a function that moves the stack pointer by a register.
@@ -78,7 +79,7 @@ impl Calls {
         }
         let starts: BTreeSet<u64> = functions.keys().copied().collect();
         for (own, function) in &mut functions {
-            // Jumps inside a function are no calls.
+            // Ignores jumps inside a function.
             function.calls.retain(|to| to != own && starts.contains(to));
         }
         let pointed_at = constants
@@ -102,10 +103,10 @@ impl Calls {
             .ok_or_else(|| StackError::Unknown(name.to_owned()))
     }
 
-    /// The most stack that `name` and all it calls can use, bytes, and the path there.
+    /// Returns the largest stack of `name` and all functions it calls, bytes, and the call path.
     ///
     /// # Errors
-    /// [`StackError`] where there is no such function or no bound.
+    /// [`StackError`] if the function does not exist or has no bound.
     pub fn deepest(&self, name: &str) -> Result<(u64, Vec<String>), StackError> {
         let mut known = BTreeMap::new();
         let from = self.address_of(name)?;
@@ -163,14 +164,13 @@ impl Calls {
     }
 }
 
-/// `08000194 <name>:`
+/// Parses `08000194 <name>:`.
 fn heading(line: &str) -> Option<(u64, &str)> {
     let (address, rest) = line.split_once(" <")?;
     let name = rest.strip_suffix(">:")?;
     Some((u64::from_str_radix(address, 16).ok()?, name))
 }
 
-/// One line of code: `address: <tab> mnemonic <tab> operands`.
 fn instruction(line: &str, function: &mut Function) -> Result<(), StackError> {
     let mut parts = line.split('\t').map(str::trim).skip(1);
     let (Some(mnemonic), operands) = (parts.next(), parts.next().unwrap_or("")) else {
@@ -199,13 +199,13 @@ fn instruction(line: &str, function: &mut Function) -> Result<(), StackError> {
     Ok(())
 }
 
-/// How many registers `{r4, r5, lr}` names; objdump never abbreviates ranges here, but a reader may.
+/// Returns the number of registers in `{r4, r5, lr}`; objdump does not abbreviate ranges here.
 fn registers(operands: &str) -> u64 {
     let list = operands.split_once('{').map_or("", |(_, list)| list);
     list.split(',').count() as u64
 }
 
-/// The number behind `#` or `#-`, decimal or hexadecimal.
+/// Parses the number after `#` or `#-`, decimal or hexadecimal.
 fn immediate(operands: &str) -> Option<u64> {
     let (_, text) = operands.split_once('#')?;
     let text = text.trim_start_matches('-');
@@ -219,7 +219,7 @@ fn immediate(operands: &str) -> Option<u64> {
     }
 }
 
-/// The address of `0x8000194 <name> @ imm = #0x10`.
+/// Parses the address of `0x8000194 <name> @ imm = #0x10`.
 fn target(operands: &str) -> Option<u64> {
     let word = operands
         .split([' ', ','])

@@ -4,25 +4,25 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-/// The folder of the files that all templates have, in the folder of the templates.
+/// Folder of the files that all templates share, in the folder of the templates.
 const COMMON: &str = "common";
 
-/// The dependency on this crate, as it is written in each template: the folder of the crate relative to that of the firmware.
+/// Dependency on this crate in each template: its folder relative to that of the firmware.
 const CRATE: &str = "path = \"../uav-relay\"";
 
-/// The main loops that there is a template for, by the name of their folder.
+/// Main loops with a template, by the name of their folder.
 pub const TEMPLATES: [&str; 3] = ["blocking", "rtic", "embassy"];
 
-/// The root of the checkout.
+/// Returns the root of the checkout.
 pub fn checkout() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     own.ancestors().nth(2).unwrap_or(own).to_owned()
 }
 
-/// Writes the template `name` into `folder`, which must be empty or missing, with a dependency on the crate of this checkout.
+/// Writes the template `name` into `folder`, with a dependency on the crate of this checkout.
 ///
 /// # Errors
-/// Where the folder has files already or is a part of this checkout, or where a file cannot be read or written.
+/// If `folder` is not empty or inside this checkout, or if a file cannot be read or written.
 pub fn generate(name: &str, folder: &Path) -> io::Result<()> {
     if fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some()) {
         let text = format!("{} is not empty", folder.display());
@@ -47,7 +47,6 @@ pub fn generate(name: &str, folder: &Path) -> io::Result<()> {
     fs::write(manifest, text.replace(CRATE, &format!("path = \"{path}\"")))
 }
 
-/// Copies a folder and the folders in it.
 fn copy(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
@@ -62,7 +61,6 @@ fn copy(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Returns the path from one folder to another one. Both are absolute.
 fn relative(from: &Path, to: &Path) -> PathBuf {
     let [from, to] = [from, to].map(|path| path.components().collect::<Vec<Component<'_>>>());
     let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();

@@ -1,9 +1,9 @@
-//! Where rustup keeps what comes with a compiler.
+//! Programs of the Rust toolchain.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// The path of `name`, a program of the component llvm-tools, if that is installed.
+/// Returns the path of `name`, a program of the component llvm-tools, if it is installed.
 pub fn llvm_tool(name: &str) -> Option<PathBuf> {
     let output = Command::new("rustc")
         .args(["--print", "target-libdir"])
@@ -13,7 +13,7 @@ pub fn llvm_tool(name: &str) -> Option<PathBuf> {
     Some(lib.parent()?.join("bin").join(name)).filter(|path| path.exists())
 }
 
-/// Whether a command succeeds, unseen.
+/// Returns true if a command succeeds; hides its output.
 pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     let status = Command::new(program)
         .args(arguments)

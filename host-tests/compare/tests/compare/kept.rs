@@ -1,15 +1,14 @@
-//! The run that is kept, and what is said where something is missing.
+//! The stored run, and error messages for missing programs.
 
 use super::*;
 
-/// The table of RESULTS.md is what the command makes of the run that is kept beside the rivals.
 #[test]
 fn the_results_have_the_run_that_is_kept() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = std::fs::read_to_string(root.join("../RESULTS.md")).unwrap();
     let folder = TempDir::new().unwrap();
     let copy = folder.path().join("RESULTS.md");
-    // Nothing of the table is left in the copy.
+    // The copy has no table.
     let begin = readme.find("<!-- cargo compare").unwrap();
     let begin = begin + readme[begin..].find('\n').unwrap() + 1;
     let end = readme.find("<!-- end of that -->").unwrap();
@@ -33,8 +32,9 @@ fn the_results_have_the_run_that_is_kept() {
     );
 }
 
-/// Eight and fifty relays that choose their altitudes: in the kept run SLSQP, from the start that suits it best, takes at least twenty
-/// times as long to the same SIR. With room to the side this crate has more than twice as many starts to try.
+/// SLSQP from its best start takes at least twenty times as long, with eight and fifty relays and free altitudes.
+///
+/// With lateral room this crate has more than twice as many starts to try.
 #[test]
 fn the_kept_run_is_twenty_times_as_fast_as_one_good_start() {
     let kept = include_str!("../../rivals/measured.json");
@@ -73,7 +73,7 @@ fn json_is_given_back_as_it_was() {
     );
 }
 
-/// Runs the command with nothing on PATH but what `folder` has, its virtual environment to be in there too.
+/// Runs the command with only `folder` on PATH, which also contains the virtual environment.
 fn with_path(folder: &Path) -> Output {
     let venv = folder.join("venv");
     Command::new(env!("CARGO_BIN_EXE_compare"))
@@ -90,7 +90,6 @@ fn without_python_it_says_so() {
     assert!(line.starts_with("python3 is not on PATH: "), "{line}");
 }
 
-/// Programs that do nothing stand in for Python: one that fails, one that succeeds.
 #[cfg(target_os = "linux")]
 #[test]
 fn without_venv_pip_or_packages_it_says_so() {
@@ -113,7 +112,7 @@ fn without_venv_pip_or_packages_it_says_so() {
         "{line}"
     );
 
-    // An environment that is finished but does not answer.
+    // A complete environment whose Python does not answer.
     std::fs::remove_file(bin.join("python")).unwrap();
     symlink("/bin/true", bin.join("python")).unwrap();
     let line = refusal(&with_path(folder.path()), 1);

@@ -1,4 +1,4 @@
-//! `cargo compare` without Python: what chains are worth to it, how it lays out its tables, how it fails where Python is not.
+//! `cargo compare` without Python: scores, tables, and errors if Python is missing.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -25,7 +25,7 @@ fn compare(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// The one line on standard error, and that the exit status is `status`.
+/// Returns the single line on standard error, after checking the exit status.
 fn refusal(output: &Output, status: i32) -> String {
     let text = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!(text.lines().count(), 1, "{text}");
@@ -34,7 +34,6 @@ fn refusal(output: &Output, status: i32) -> String {
     text
 }
 
-/// Results with these runs of one problem, in the form of `--json`.
 fn results(choice: &str, relays: u16, runs: &[Value]) -> Value {
     json!({
         "machine": { "date": "2000-01-01", "processor": "Some CPU" },
@@ -44,7 +43,6 @@ fn results(choice: &str, relays: u16, runs: &[Value]) -> Value {
     })
 }
 
-/// What `--from` says of `results`.
 fn rescored(results: &Value, more: &[&str]) -> Output {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("results.json");
@@ -59,7 +57,7 @@ fn table(results: &Value) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The best chain of eight relays at 20 m by the independent program: its SIR, and [x, y, h] of every relay.
+/// Returns SIR and [x, y, h] of the best chain of eight relays at 20 m, by the independent program.
 fn best_of_eight() -> (f64, Vec<[f64; 3]>) {
     let cases = cases::of("gamma_star").unwrap();
     let found = cases.iter().find(|case| {
@@ -77,7 +75,7 @@ fn run(solver: &str, time_s: f64, sir: f64, chain: &[[f64; 3]]) -> Value {
     json!({ "solver": solver, "answer": { "found": found } })
 }
 
-/// The line of solver "rival" in the table of eight relays, behind its name.
+/// Returns the line of solver "rival" in the table of eight relays, after its name.
 fn line_of_rival(rival: Value) -> String {
     let (sir, chain) = best_of_eight();
     let own = run("own", 1e-5, sir, &chain);
@@ -174,7 +172,7 @@ fn the_sir_is_that_of_the_places() {
         line.starts_with(&format!("{worse:.6} | {short:.1e} |")),
         "{line}"
     );
-    // What a solver says of itself is not believed.
+    // A solver's reported SIR is not trusted.
     let line = line_of_rival(run("rival", 1.0, sir, &moved));
     assert!(
         line.starts_with("does not count: it reports SIR 2.465536, and has 2.3"),
@@ -251,7 +249,7 @@ fn a_chain_that_breaks_a_rule_does_not_count() {
     ] {
         assert_eq!(line, format!("does not count: {reason} | | | | | | |"));
     }
-    // What an f32 rounds away is forgiven.
+    // Rounding to f32 is tolerated.
     let line = broken(&|chain| chain[4][0] = chain[5][0] - 3.9995);
     assert!(!line.contains("m from the one before it"), "{line}");
 }
@@ -266,7 +264,7 @@ fn good_enough_is_checked() {
     assert!(line_of_rival(rival.clone()).contains("| 500 ms (50 000) |"));
     rival["answer"]["found"]["good"]["chain"] = json!(moved);
     assert!(line_of_rival(rival.clone()).contains("| never |"));
-    // On a level with the first line is what has its SIR.
+    // A chain is on a level with the first line if it has its SIR.
     rival["answer"]["found"]["level"] = json!({ "after_s": 0.25, "chain": chain });
     assert!(line_of_rival(rival.clone()).contains("| 250 ms (25 000) |"));
     rival["answer"]["found"]["level"]["chain"] = json!(moved);

@@ -1,13 +1,11 @@
-//! The tables for Wireshark: a dissector in Lua, of data that is written from them and an engine that reads it.
+//! Generates the Wireshark dissector in Lua: the tables as data, and an engine that reads them.
 
 use std::fmt::Write as _;
 
 use crate::format::{Field, Format, Kind, Layout};
 
-/// What reads the data.
 const ENGINE: &str = include_str!("engine.lua");
 
-/// What the file begins with.
 const HEAD: &str = "\
 -- Frames of uav-relay in Wireshark. Written by `cargo decode --dissector` from the tables of FORMAT.md: do not edit it.
 --
@@ -15,7 +13,7 @@ const HEAD: &str = "\
 -- or copy it to the folder that Help > About Wireshark > Folders calls `Personal Lua Plugins`.
 ";
 
-/// The dissector.
+/// Returns the dissector.
 pub fn lua(format: &Format) -> String {
     let mut out = HEAD.to_owned();
     out.push_str("\nlocal messages = {\n");
@@ -100,7 +98,6 @@ fn inner(name: &str, more: &str, of: &Kind, indent: usize, out: &mut String) {
     out.push_str(" }");
 }
 
-/// A string as Lua writes it.
 fn string(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

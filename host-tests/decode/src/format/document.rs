@@ -1,9 +1,9 @@
-//! From the document to the fields of every message.
+//! Parses the document into the fields of every message.
 
 use super::rows::{Row, Table, last_number, rows, tables};
 use super::{Field, Format, Kind, Layout};
 
-/// What stands below the heading that begins with `from`, up to the next one of its level or above.
+/// Returns the text below the heading that begins with `from`, up to the next heading of its level or above.
 fn section<'a>(document: &'a str, from: &str) -> Option<&'a str> {
     let (_, rest) = document.split_once(from)?;
     let end = ["\n## ", "\n### "].iter().filter_map(|to| rest.find(to));
@@ -20,7 +20,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
             .iter()
             .find(|table| table.head.first() == Some(&"offset"))
         else {
-            // The same layout as that of the one before.
+            // A message without a table has the layout of the previous one.
             let before = messages.last().ok_or("the first message has no table")?;
             let fields = before.fields.clone();
             messages.push(Layout {
@@ -50,7 +50,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
     })
 }
 
-/// With the rows of another message where one says `as bytes 1 to 18 of a Sweep`.
+/// Inserts the rows of another message for `as bytes 1 to 18 of a Sweep`.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {
@@ -107,7 +107,6 @@ fn fields(rows: &[Row], tables: &[Table<'_>]) -> Result<Vec<Field>, String> {
     Ok(all)
 }
 
-/// What a list is of.
 fn item(row: &Row, all: &[Table<'_>]) -> Result<Kind, String> {
     if row.kind != "seats" {
         return plain(&row.kind);
@@ -142,7 +141,7 @@ fn kind(row: &Row, tables: &[Table<'_>]) -> Result<Kind, String> {
     plain(&row.kind)
 }
 
-/// The words for the values of a field that says them: `turn: 0 look, 1 stop, 2 move`.
+/// Returns the words for the values of a field, as in `turn: 0 look, 1 stop, 2 move`.
 fn words(field: &str) -> Option<Vec<String>> {
     let (_, list) = field.split_once(": ")?;
     let between = if list.contains("; ") { "; " } else { ", " };

@@ -1,98 +1,97 @@
-//! The tables of `FORMAT.md`: which messages there are, and the fields of each.
+//! Tables of `FORMAT.md`: the messages and their fields.
 
 mod document;
 mod rows;
 
-/// The document itself.
 const DOCUMENT: &str = include_str!("../../../../src/wire/FORMAT.md");
 
-/// What a field is on the wire.
+/// Type of a field on the wire.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// One byte.
+    /// Unsigned, one byte.
     U8,
-    /// Two bytes.
+    /// Unsigned, two bytes.
     U16,
-    /// Eight bytes.
+    /// Unsigned, eight bytes.
     U64,
-    /// Four bytes.
+    /// Unsigned, four bytes.
     U32,
     /// Four bytes, two's complement.
     I32,
-    /// binary32.
+    /// IEEE 754 binary32.
     F32,
-    /// binary64.
+    /// IEEE 754 binary64.
     F64,
-    /// One byte, 00 or 01.
+    /// Boolean in one byte, 00 or 01.
     Bool,
-    /// A u16 that stands for a mission, a view or a line.
+    /// A u16 digest of a mission, view or line.
     Digest,
-    /// A u32: the number of a view and the node that has proposed it.
+    /// A u32: number of a view and its proposer.
     View,
-    /// One byte; the names of its bits, the lowest first.
+    /// Flags in one byte, with the names of its bits, lowest first.
     Flags(Vec<String>),
-    /// One byte; the words for its values, from 0 on.
+    /// Enumeration in one byte, with the words for its values, from 0 on.
     Words(Vec<String>),
-    /// So many of a kind.
+    /// A fixed number of items.
     Array(usize, Box<Kind>),
-    /// 00 for none; 01 and one of a kind.
+    /// 00 for none; 01 and an item.
     Option(Box<Kind>),
-    /// How many, as a varint, at most so many; then these.
+    /// A varint count, at most this one, and the items.
     List(u64, Box<Kind>),
-    /// Some fields, one after the other.
+    /// Consecutive fields.
     Group(Vec<Field>),
 }
 
-/// A row of a table.
+/// A field: a row of a table.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Field {
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// What it is on the wire.
+    /// Type on the wire.
     pub kind: Kind,
-    /// What it says.
+    /// Meaning.
     pub meaning: String,
-    /// Its unit; empty if it has none.
+    /// Unit; empty if none.
     pub unit: String,
-    /// Which values are in range, in words.
+    /// Valid range, in words.
     pub range: String,
 }
 
-/// What a body consists of, its first byte aside.
+/// Layout of a message body after its tag.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Layout {
-    /// The name of the message.
+    /// Name of the message.
     pub name: String,
-    /// Its fields, in order.
+    /// Fields in order.
     pub fields: Vec<Field>,
 }
 
-/// All messages, and the handshake.
+/// The messages and the handshake.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Format {
-    /// The messages, each at its tag.
+    /// Messages, indexed by tag.
     pub messages: Vec<Layout>,
-    /// The handshake.
+    /// Handshake.
     pub handshake: Layout,
 }
 
 impl Format {
-    /// The format as `FORMAT.md` has it.
+    /// Parses `FORMAT.md`.
     ///
     /// # Errors
-    /// Names the row that cannot be read; a test sees to it that there is none.
+    /// Names the row that cannot be parsed; a test ensures that there is none.
     pub fn load() -> Result<Self, String> {
         document::read(DOCUMENT)
     }
 
-    /// The message of this tag.
+    /// Returns the message of this tag.
     pub fn message(&self, tag: u8) -> Option<&Layout> {
         self.messages.get(usize::from(tag))
     }
 }
 
 impl Field {
-    /// Of a unit that is a multiple, such as 0.1 s: how many of the base unit it is (10 of them make one), and that.
+    /// Returns the factor and the base unit of a scaled unit: (10, "s") for 0.1 s.
     pub fn scale(&self) -> Option<(f64, &str)> {
         let (number, base) = self.unit.split_once(' ')?;
         let multiple: f64 = number.parse().ok()?;

@@ -1,6 +1,5 @@
-//! Rows of the tables, as they stand in the document.
+//! Rows of the document's tables.
 
-/// One row of a table of fields.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) offset: String,
@@ -12,7 +11,6 @@ pub(super) struct Row {
     pub(super) range: String,
 }
 
-/// A table: its head and its rows.
 pub(super) struct Table<'a> {
     pub(super) head: Vec<&'a str>,
     pub(super) rows: Vec<Vec<&'a str>>,
@@ -23,7 +21,6 @@ fn cells(line: &str) -> Vec<&str> {
     inner.split('|').map(str::trim).collect()
 }
 
-/// The tables in `text`, in order.
 pub(super) fn tables(text: &str) -> Vec<Table<'_>> {
     let mut all: Vec<Table<'_>> = Vec::new();
     let mut inside = false;
@@ -45,7 +42,6 @@ pub(super) fn tables(text: &str) -> Vec<Table<'_>> {
     all
 }
 
-/// The rows of a table of fields, the tag aside.
 pub(super) fn rows(table: &Table<'_>) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in &table.rows {
@@ -67,7 +63,6 @@ pub(super) fn rows(table: &Table<'_>) -> Result<Vec<Row>, String> {
     Ok(all)
 }
 
-/// The last whole number in a cell.
 pub(super) fn last_number(cell: &str) -> Option<usize> {
     let mut numbers = cell.split(|digit: char| !digit.is_ascii_digit());
     numbers.rfind(|digits| !digits.is_empty())?.parse().ok()

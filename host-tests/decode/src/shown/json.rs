@@ -6,7 +6,7 @@ use uav_relay_capture::Direction;
 use super::{Shown, hex};
 use crate::value::Fields;
 
-/// The line. Numbers are as on the wire; the unit of a field is what its name ends in.
+/// The JSON object. Numbers are as on the wire; a field's name ends in its unit.
 #[derive(Serialize)]
 struct Line<'a> {
     frame: u64,
@@ -52,10 +52,10 @@ struct Tag {
     check: &'static str,
 }
 
-/// The frame as a line of JSON.
+/// Returns the frame as a line of JSON.
 ///
 /// # Errors
-/// A number that JSON does not have.
+/// A number that JSON cannot represent.
 pub fn json(shown: &Shown<'_>) -> Result<String, serde_json::Error> {
     let Shown {
         number,

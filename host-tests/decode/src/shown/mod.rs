@@ -12,20 +12,19 @@ use crate::source::Packet;
 pub use json::json;
 pub use text::text;
 
-/// A frame, and all that is known of it.
+/// A frame with its context.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
-    /// Which one of its source, from 1.
+    /// Number of the frame in its source, from 1.
     pub number: u64,
-    /// As it came.
+    /// Frame as captured.
     pub packet: &'a Packet<'a>,
-    /// What it says.
+    /// Decoded frame.
     pub frame: &'a Frame<'a>,
-    /// What is known of its tag, if it has one.
+    /// Result of verifying its tag, if it has one.
     pub tag: Option<TagCheck>,
 }
 
-/// Bytes in hexadecimal.
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         _ = write!(text, "{byte:02x}");

@@ -1,4 +1,4 @@
-//! A frame as text: a line on it, and one for each field.
+//! A frame as text: a header line, and one line per field.
 
 use std::fmt::Write as _;
 
@@ -9,11 +9,10 @@ use crate::format::Field;
 use crate::refusal::Refusal;
 use crate::value::{Fields, Value, set};
 
-/// Columns that names of fields and what they say take, unless they are longer.
 const NAME: usize = 18;
 const VALUE: usize = 14;
 
-/// The frame as text.
+/// Returns the frame as text.
 pub fn text(shown: &Shown<'_>) -> String {
     let Shown {
         number,
@@ -54,7 +53,7 @@ pub fn text(shown: &Shown<'_>) -> String {
         _ = write!(out, "  ({})", packet.comment);
     }
     out.push('\n');
-    // Where a number is outside its range, that is what to look at.
+    // Ranges are shown if a number is out of range.
     let ranges = frame.refusal == Some(Refusal::Range);
     lines(&frame.fields, 4, ranges, &mut out);
     if frame.refusal.is_some() {
@@ -98,7 +97,6 @@ fn lines(fields: &Fields<'_>, indent: usize, ranges: bool, out: &mut String) {
     }
 }
 
-/// What a field says, as a person reads it.
 fn said(field: &Field, value: &Value<'_>) -> String {
     match value {
         Value::Unsigned(number) => scaled(field, number.to_string(), *number as f64),
@@ -119,12 +117,12 @@ fn said(field: &Field, value: &Value<'_>) -> String {
             let values: Vec<String> = values.iter().map(|value| said(field, value)).collect();
             format!("[{}]", values.join(", "))
         }
-        // A group has lines of its own.
+        // A group has its own lines.
         Value::Group(_) => String::new(),
     }
 }
 
-/// With the number of base units where the unit is a multiple of one: `50 (5 s)`.
+/// Adds the value in base units if the unit is scaled: `50 (5 s)`.
 fn scaled(field: &Field, text: String, number: f64) -> String {
     match field.scale() {
         Some((per, base)) => format!("{text} ({} {base})", number / per),

@@ -1,4 +1,4 @@
-//! Frames from a pcapng capture.
+//! Reads frames from a pcapng capture.
 
 use std::io::{ErrorKind, Read};
 use std::time::Duration;
@@ -14,11 +14,10 @@ use uav_relay_capture::{Cut, Direction, LINK_TYPE, Piece};
 
 use super::{Item, Packet, Trouble};
 
-/// An interface of a capture.
 struct Interface {
     name: String,
     is_ours: bool,
-    /// As the file has it: a power of ten, or with the top bit of two, whose inverse a unit of time is.
+    /// Time resolution as in the file: 10^-n s, or 2^-n s with the top bit set.
     resolution: u8,
 }
 
@@ -87,7 +86,7 @@ fn interface(block: &InterfaceDescriptionBlock<'_>) -> Interface {
     interface
 }
 
-/// The frames of a packet: one, in a capture of ours.
+/// Passes on the frames of a packet: exactly one in this project's captures.
 fn pieces<E>(
     packet: &EnhancedPacketBlock<'_>,
     interface: &Interface,
@@ -108,7 +107,7 @@ fn pieces<E>(
             _ => {}
         }
     }
-    // What the packet lacks counts for its last piece.
+    // Bytes that the packet lacks are counted for its last piece.
     let missing = usize::try_from(packet.original_len)
         .unwrap_or(usize::MAX)
         .saturating_sub(packet.data.len());
@@ -132,7 +131,7 @@ fn pieces<E>(
     }
 }
 
-/// The time of a packet. The reader takes its units for nanoseconds, whatever they are.
+/// Converts the time of a packet, because the reader assumes nanoseconds whatever the resolution.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

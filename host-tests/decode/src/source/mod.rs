@@ -1,4 +1,4 @@
-//! Frames from a capture or from a stream of bytes, each as soon as it is whole.
+//! Reads frames from a capture or a byte stream, each as soon as it is complete.
 
 mod capture;
 
@@ -7,55 +7,55 @@ use std::time::Duration;
 
 use uav_relay_capture::{Cut, Direction, Piece};
 
-/// A capture begins with these bytes; no frame does: the second one of its header, here 0d, would have to be 1x.
+/// First bytes of a capture. No frame starts with them: the second header byte, here 0d, would be 1x.
 const CAPTURE: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
 
-/// What comes out of a source.
+/// An item of a source.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Item<'a> {
-    /// What a capture says of all that follows.
+    /// Comment of a capture.
     Comment(&'a str),
     /// A frame.
     Packet(Packet<'a>),
 }
 
-/// A frame as it came.
+/// A frame as captured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Packet<'a> {
-    /// When its last byte was on the wire, since 1970; a capture knows that.
+    /// Time of its last byte, since 1970; only in captures.
     pub at: Option<Duration>,
-    /// Where, as the capture calls it; empty if nobody knows.
+    /// Interface name in the capture; empty if unknown.
     pub interface: &'a str,
-    /// Which way it went.
+    /// Direction.
     pub direction: Direction,
-    /// What is said of it; empty if nothing is.
+    /// Comment; empty for none.
     pub comment: &'a str,
-    /// Its bytes on the wire, or the first of them.
+    /// Bytes on the wire, possibly truncated.
     pub wire: &'a [u8],
-    /// How many there were.
+    /// Original length.
     pub len: usize,
 }
 
-/// Why a source could not be read to its end.
+/// Error of reading a source.
 #[derive(Debug)]
 pub enum Trouble<E> {
-    /// It cannot be read.
+    /// The source cannot be read.
     Read(io::Error),
-    /// It is no sound capture.
+    /// The capture is malformed.
     Capture(String),
-    /// Whoever took the frames has had enough.
+    /// The consumer stopped with this error.
     Taken(E),
 }
 
-/// Hands all that is in `input` to `take`: of a capture, or else of a stream of bytes.
+/// Passes all items of `input`, a capture or a byte stream, to `take`.
 ///
 /// # Errors
-/// [`Trouble`]; all that came before it has been handed over.
+/// [`Trouble`]; the items before it have been passed on.
 pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,
 ) -> Result<(), Trouble<E>> {
-    // As few bytes as it takes to tell: a frame on a line may be all that comes.
+    // Reads no more bytes than needed, because a single frame on a line may be all that comes.
     let mut begin = Vec::new();
     while begin.len() < CAPTURE.len() && CAPTURE.starts_with(&begin) {
         let mut byte = [0];
@@ -99,7 +99,6 @@ fn stream<E>(
     }
 }
 
-/// A piece of a stream, of which nothing else is known.
 fn bare(piece: Piece<'_>) -> Item<'_> {
     Item::Packet(Packet {
         at: None,

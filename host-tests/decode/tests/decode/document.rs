@@ -1,4 +1,4 @@
-//! The examples of FORMAT.md, and its frames with tags.
+//! Examples of FORMAT.md, and its frames with tags.
 
 use super::{lines, name};
 
@@ -16,7 +16,6 @@ fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// The bytes on the wire of every section whose heading begins with `heading`.
 fn wires(heading: &str) -> Vec<Vec<u8>> {
     let sections = DOCUMENT.split(heading).skip(1);
     let block = |section: &str| {
@@ -70,7 +69,7 @@ fn of_every_row_of_the_rejection_table_it_is_said_why() {
             stream.extend(bytes(byte).repeat(times.parse().unwrap()));
         }
         stream.push(0);
-        // What an intact frame leads to is counted on top.
+        // Counters for frames that are intact but not accepted.
         let on_top = [
             "mission",
             "view",
@@ -92,10 +91,10 @@ fn of_every_row_of_the_rejection_table_it_is_said_why() {
             "oversized" => why == "oversized",
             "truncated" => why == "truncated" || why == "short",
             "crc" => why == "crc",
-            // Here everybody knows tags.
+            // The decoder accepts tags in every network.
             "version" => why == "version" || line["tag"].is_object(),
             "malformed" => ["malformed", "range", "unknown_tag"].contains(&why),
-            // What is wrong with the others only their receiver knows.
+            // Only the receiver can detect the others.
             _ => why == "none",
         };
         assert!(fits, "{counted}: {line}");

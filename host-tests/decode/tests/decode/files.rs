@@ -1,4 +1,4 @@
-//! Captures and other files, whole and not.
+//! Captures and other files, complete and damaged.
 
 use std::time::Duration;
 
@@ -6,7 +6,6 @@ use uav_relay_capture::{Capture, Direction, Frame};
 
 use super::{HEARTBEAT, decode, lines, name, piped, refusal};
 
-/// A capture of two frames, `comment` said of it all.
 fn capture(comment: &str) -> Vec<u8> {
     let mut capture = Capture::new(Vec::new(), "a test", comment).unwrap();
     let port = capture.interface("ttyUSB0", "").unwrap();

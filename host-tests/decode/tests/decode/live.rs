@@ -1,11 +1,11 @@
-//! Frames as they come: each at once, with noise between them, into a pipe whose reader has had enough.
+//! Live input: each frame is printed at once, with noise in between, into a pipe that closes.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::Stdio;
 
 use super::{HEARTBEAT, decode, lines};
 
-/// Were a frame kept back, this would wait for ever, or until whoever runs it gives up.
+/// Blocks until the test times out if a frame is buffered.
 #[test]
 fn each_frame_is_printed_before_the_next_one_comes() {
     let mut child = decode().arg("--json").spawn().unwrap();
@@ -72,7 +72,7 @@ fn a_reader_that_has_had_enough_ends_it_quietly() {
         let mut child = decode().args(arguments).spawn().unwrap();
         drop(child.stdout.take());
         let mut input = child.stdin.take().unwrap();
-        // It may be gone before all of it is written.
+        // The reader may be gone before all of it is written.
         let frames = HEARTBEAT.repeat(10_000);
         _ = input.write_all(&frames);
         drop(input);

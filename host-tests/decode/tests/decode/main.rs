@@ -1,4 +1,4 @@
-//! `cargo decode` as a person and a program meet it: live, with noise in between, with keys, into a pipe that closes.
+//! `cargo decode`, run as a program: live input, noise, keys, and a pipe that closes.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -29,14 +29,12 @@ fn decode() -> Command {
     command
 }
 
-/// What comes of `input` on standard input.
 fn piped(arguments: &[&str], input: &[u8]) -> Output {
     let mut child = decode().args(arguments).spawn().unwrap();
     child.stdin.take().unwrap().write_all(input).unwrap();
     child.wait_with_output().unwrap()
 }
 
-/// Its lines on standard output, where it succeeds and says nothing on standard error.
 fn lines(arguments: &[&str], input: &[u8]) -> Vec<String> {
     let output = piped(arguments, input);
     let error = String::from_utf8_lossy(&output.stderr);
@@ -48,7 +46,7 @@ fn lines(arguments: &[&str], input: &[u8]) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// The line on standard error, with status 2.
+/// Returns the line on standard error of a run that exits with status 2.
 fn refusal(arguments: &[&str], input: &[u8]) -> String {
     let output = piped(arguments, input);
     let text = String::from_utf8(output.stderr).unwrap();

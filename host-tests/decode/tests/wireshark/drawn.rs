@@ -1,11 +1,11 @@
-//! Frames at random: of the right shape whatever their numbers are, and hurt ones.
+//! Random frames: well-formed with arbitrary numbers, and damaged ones.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::CRC_32C;
 use uav_relay_decode::format::{Field, Format, Kind};
 
-/// A frame of the message of tag `kind`; one above the last is a handshake.
+/// Returns a random frame of the message with tag `kind`; one above the last is a handshake.
 pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let (fields, flags, mut body) = match format.messages.get(kind) {
         Some(message) => (
@@ -19,7 +19,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
     around(&body, flags, rng)
 }
 
-/// A frame around any body, with a random header of these flags and a random tag if they are not 0.
+/// Returns a frame around a body, with a random header with these flags and a random tag if they are not 0.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let first = 0x1000 | rng.random_range(0..4_095_u16);
     let second = flags << 12 | rng.random_range(0..4_095_u16);
@@ -81,7 +81,7 @@ fn one(kind: &Kind, rng: &mut ChaCha8Rng, out: &mut Vec<u8>) {
     }
 }
 
-/// The same, hurt: bytes changed, missing or too many, the end cut off.
+/// Damages a frame: changes, removes or adds bytes, or cuts off the end.
 pub(crate) fn hurt(mut wire: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(0..wire.len() - 1);
     match rng.random_range(0..5) {

@@ -1,6 +1,6 @@
-//! The dissector in `tshark`: it names and says what `cargo decode` does, of random frames of every kind and of frames that are hurt.
+//! The dissector in `tshark` shows the same names and values as `cargo decode`, for random and damaged frames of every kind.
 //!
-//! Without `tshark` these tests fail and say what to type.
+//! Without `tshark` these tests fail and say how to install it.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -29,10 +29,8 @@ const DISSECTOR: &str = concat!(
     "/../../examples/wireshark/uav_relay.lua"
 );
 
-/// Frames of each message, and of the handshake.
 const EACH: usize = 200;
 
-/// Frames that are hurt.
 const HURT: usize = 2_000;
 
 #[test]
@@ -44,7 +42,6 @@ fn the_dissector_is_that_of_the_tables() {
     );
 }
 
-/// What `tshark` shows of these frames, each in a packet of its own.
 fn dissected(frames: &[Vec<u8>]) -> Vec<pdml::Packet> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("frames.pcapng");
@@ -115,7 +112,6 @@ fn random_frames_of_every_kind_say_what_cargo_decode_says() {
     println!("{} frames, {fields} fields", frames.len());
 }
 
-/// The frames of the rejection table of FORMAT.md.
 fn rejected() -> Vec<Vec<u8>> {
     let document = include_str!("../../../../src/wire/FORMAT.md");
     let (_, section) = document.split_once("\n## Rejected").unwrap();
@@ -148,7 +144,7 @@ fn hurt_frames_are_refused_for_the_same_reason() {
             drawn::hurt(wire, &mut rng)
         })
         .collect();
-    // Whole bodies that are none: random bytes with a right CRC.
+    // Invalid bodies: random bytes with a valid CRC.
     frames.extend((0..HURT).map(|_| {
         let body: Vec<u8> = (0..rng.random_range(0..40)).map(|_| rng.random()).collect();
         drawn::around(&body, rng.random_range(0..4), &mut rng)

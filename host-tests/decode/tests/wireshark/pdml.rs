@@ -1,4 +1,4 @@
-//! What `tshark` shows, as it says it in PDML.
+//! Output of `tshark` in PDML.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,6 @@ use roxmltree::{Document, Node};
 use uav_relay_decode::format::Kind;
 use uav_relay_decode::value::{Fields, Value};
 
-/// A field as it is shown.
 #[derive(Debug)]
 pub(crate) struct Shown {
     name: String,
@@ -15,19 +14,16 @@ pub(crate) struct Shown {
     bytes: String,
 }
 
-/// The fields of one frame, in order.
 #[derive(Debug)]
 pub(crate) struct Packet(Vec<Shown>);
 
 impl Packet {
-    /// What the field of this name shows.
     pub(crate) fn get(&self, name: &str) -> Option<&str> {
         let mut all = self.0.iter();
         all.find(|shown| shown.name == name)
             .map(|shown| shown.show.as_str())
     }
 
-    /// The fields of a message.
     pub(crate) fn of<'p>(&'p self, message: &str) -> impl Iterator<Item = &'p Shown> {
         let prefix = format!("{message}.");
         self.0
@@ -36,7 +32,6 @@ impl Packet {
     }
 }
 
-/// What `tshark` shows of `file` with `dissector`.
 pub(crate) fn packets(file: &Path, dissector: &Path) -> Vec<Packet> {
     let output = Command::new("tshark")
         .arg("-X")
@@ -76,14 +71,13 @@ fn fields(packet: Node<'_, '_>) -> Vec<Shown> {
     all.collect()
 }
 
-/// What a field should show.
 #[derive(Debug)]
 pub(crate) struct Wanted<'f> {
     name: String,
     value: Value<'f>,
 }
 
-/// What the fields should show, in order, with the lengths of lists and every flag.
+/// Returns the expected fields in order, with the lengths of lists and every flag.
 pub(crate) fn flat<'f>(prefix: &str, fields: &Fields<'f>) -> Vec<Wanted<'f>> {
     let mut all = Vec::new();
     for (field, value) in &fields.0 {
@@ -126,7 +120,7 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 impl Wanted<'_> {
-    /// Whether `shown` is that: of a number that Wireshark rounds to six digits the bytes as well.
+    /// Asserts that `shown` matches; compares bytes where Wireshark rounds numbers to six digits.
     pub(crate) fn is(&self, shown: &Shown) {
         assert_eq!(shown.name, self.name);
         let show = shown.show.as_str();

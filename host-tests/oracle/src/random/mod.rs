@@ -24,32 +24,32 @@ use rand::{Rng, RngExt};
 
 use crate::reference::{Link, Station, path_loss_factor};
 
-/// How far the relays of a chain differ from one another.
+/// Differences between the relays of a chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chain {
-    /// All alike.
+    /// Identical relays.
     Alike,
-    /// Each with its own power.
+    /// Own powers.
     OwnPower,
-    /// Each with its own altitude.
+    /// Own altitudes.
     OwnAltitude,
-    /// Each with its own power and altitude.
+    /// Own powers and altitudes.
     Own,
-    /// Alike in half of the links; the other three with equal chance.
+    /// Identical in half of the links; the other three with equal chance.
     Any,
 }
 
-/// What to draw.
+/// Kind of links to draw.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Style {
-    /// The smallest and largest number of relays, >= 1.
+    /// Smallest and largest number of relays, >= 1.
     pub relays: RangeInclusive<u32>,
-    /// How the relays differ.
+    /// Differences between the relays.
     pub chain: Chain,
 }
 
 impl Style {
-    /// 1 to 50 relays, all alike: one altitude, one power.
+    /// 1 to 50 identical relays.
     pub const ALIKE: Self = Self {
         relays: 1..=50,
         chain: Chain::Alike,
@@ -91,7 +91,7 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     }
 }
 
-/// The same link with noise of 1e-6 to 1e4 of what of the interferer arrives at some place along it, and at most what a mission takes.
+/// Adds noise of 1e-6 to 1e4 of the interference at a random place along the link, within a mission's limit.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);
     let altitude_m = link.relays.first().map_or(1.0, |relay| relay.altitude_m);
@@ -104,7 +104,7 @@ pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     }
 }
 
-/// The seed of a random test: the environment variable `SEED` if it holds a number, else `default`; printed either way.
+/// Returns the seed of a random test: the environment variable `SEED` if it is a number, else `default`; prints it.
 pub fn seed(default: u64) -> u64 {
     let seed = std::env::var("SEED")
         .ok()
@@ -114,7 +114,7 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
-/// A number between `low` and `high`, both > 0, uniform in its logarithm.
+/// Draws a number between `low` and `high`, both > 0, uniform in its logarithm.
 pub fn log_uniform(rng: &mut impl Rng, low: f64, high: f64) -> f64 {
     rng.random_range(low.ln()..=high.ln())
         .exp()
@@ -164,7 +164,7 @@ fn along(rng: &mut impl Rng, d: f64) -> f64 {
     }
 }
 
-/// Y as a share of D.
+/// Draws Y as a share of D.
 fn aside(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..100) {
         0..25 => 0.0,

@@ -1,11 +1,11 @@
-//! One hop with its sender held still: the SIR as a function of the receiver's place, and bisections on it.
+//! One hop with a fixed sender: the SIR as a function of the receiver's position, and bisections on it.
 
 use super::link::{Link, meets, received_w};
 
-/// Halvings after which any f64 interval in metres has collapsed to neighbours, with room to spare.
+/// Bisection steps: more than enough to collapse any f64 interval in metres to adjacent numbers.
 const HALVINGS: usize = 200;
 
-/// A hop that ends at a relay; `x` in its methods is that relay's place in metres.
+/// A hop that ends at a relay; `x` in its methods is that relay's position in metres.
 pub(super) struct Hop<'a> {
     link: &'a Link,
     sender_w: f64,
@@ -16,7 +16,7 @@ pub(super) struct Hop<'a> {
 }
 
 impl<'a> Hop<'a> {
-    /// Hop `k` in 1..=N with relay k-1 at `from_x`; hop 1 is sent from Tx at 0.
+    /// Creates hop `k` in 1..=N with relay k-1 at `from_x`; hop 1 is sent from Tx at 0.
     pub(super) fn new(link: &'a Link, k: usize, from_x: f64) -> Option<Self> {
         let before = k.checked_sub(1)?;
         let own_h = link.relays.get(before)?.altitude_m;
@@ -42,7 +42,7 @@ impl<'a> Hop<'a> {
         )
     }
 
-    /// Received power over received interference and noise (linear).
+    /// Returns the received power over interference and noise (linear).
     pub(super) fn sir(&self, x: f64) -> f64 {
         let signal = received_w(
             self.sender_w,
@@ -70,9 +70,9 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// The SIR's slope, times what leaves a concave function of the place beyond the sender (see [`super`]): above 0 where it rises.
+    /// Returns a value with the sign of the SIR's slope at `x`, concave in `x` beyond the sender (see [`super`]).
     ///
-    /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of what is heard with the signal.
+    /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of the total disturbance.
     fn rise(&self, x: f64) -> f64 {
         let (dx, dh) = (x - self.sender_x, self.own_h - self.sender_h);
         let (ix, iy, ih) = (x - self.link.x_i, self.link.y_i, self.own_h);
@@ -84,7 +84,7 @@ impl<'a> Hop<'a> {
     }
 
     fn rises(&self, x: f64) -> bool {
-        // At the sender's own place, at one altitude with it, the SIR is infinite: from there it only falls.
+        // At the sender's own position and altitude the SIR is infinite, so from there it falls.
         if x > self.sender_x {
             self.rise(x) > 0.0
         } else {
@@ -92,7 +92,7 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// The turning points of the SIR from `low` to `high`, both at or past the sender, rising; at most two.
+    /// Returns the turning points of the SIR from `low` to `high`, both at or beyond the sender, rising; at most two.
     ///
     /// The SIR is monotone between them. About 60 slope evaluations, with noise 300.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
@@ -104,7 +104,7 @@ impl<'a> Hop<'a> {
         if first || !(self.link.noise_w > 0.0) {
             return Vec::new();
         }
-        // It may rise in between, about the top of a concave function.
+        // It may rise in between, around the maximum of a concave function.
         let (mut from, mut to) = (low, high);
         for _ in 0..HALVINGS {
             let third = (to - from) / 3.0;
@@ -123,7 +123,6 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// The largest SIR between `low` and `high`, both at or past the sender.
     pub(super) fn peak(&self, low: f64, high: f64) -> f64 {
         let turns = self.turns(low, high);
         let ends = self.sir(low).max(self.sir(high));
@@ -131,9 +130,9 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// The last place on the way from `inside` to `outside` (either direction, metres) at which `holds` is still true.
+/// Returns the last point from `inside` towards `outside` (either direction, metres) at which `holds` is still true.
 ///
-/// `holds` is taken to be true at `inside`, false at `outside`, and to change once. Exact to neighbouring f64 values.
+/// `holds` must be true at `inside`, false at `outside`, and change once. Exact to adjacent f64 values.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

@@ -1,42 +1,44 @@
-//! A chain of relays as the judges see it, and what one power comes to at one distance.
+//! A chain of relays for the reference optimisers, and the received power over a distance.
 
-/// One relay: where it flies and how loud it speaks.
+/// A relay: altitude and transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Station {
-    /// Altitude above the ground of Tx, Rx and the interferer, metres, > 0.
+    /// Altitude above the ground of Tx, Rx and the interferer, m, > 0.
     pub altitude_m: f64,
-    /// Transmit power, watts, > 0.
+    /// Transmit power, W, > 0.
     pub power_w: f64,
 }
 
-/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) under one interferer on the ground.
+/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) with one interferer on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
-    /// Tx-Rx distance D, metres, > 0.
+    /// Tx-Rx distance D, m, > 0.
     pub distance_m: f64,
-    /// Least distance between neighbours, metres, >= 0; carried along, not enforced by the searches.
+    /// Least distance between neighbours, m, >= 0; not enforced by the searches.
     pub min_separation_m: f64,
-    /// Transmit power of Tx, watts, > 0.
+    /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,
-    /// Transmit power of the interferer, watts, > 0.
+    /// Transmit power of the interferer, W, > 0.
     pub interferer_w: f64,
-    /// Interferer's coordinate along Tx-Rx, metres; any finite value.
+    /// Interferer's coordinate along Tx-Rx, m; any finite value.
     pub x_i: f64,
-    /// Interferer's offset from the Tx-Rx plane, metres; any finite value.
+    /// Interferer's offset from the Tx-Rx plane, m; any finite value.
     pub y_i: f64,
     /// Path-loss factor between two relays, 1/m^2, > 0.
     pub mu_los: f64,
-    /// Path-loss factor between two places on the ground, 1/m^2, > 0.
+    /// Path-loss factor between two points on the ground, 1/m^2, > 0.
     pub mu_nlos: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Noise power of every receiver, watts, >= 0; with any, what is called SIR is the SINR.
+    /// Noise power of every receiver, W, >= 0; if above 0, SIR means SINR.
     pub noise_w: f64,
-    /// The relays from Tx to Rx; their number is N.
+    /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Station>,
 }
 
-/// Free-space path-loss factor (4 pi f / c)^2 times an excess loss, 1/m^2; `carrier_hz` > 0, `excess` >= 1 (linear).
+/// Returns the free-space path-loss factor (4 pi f / c)^2 times an excess loss, 1/m^2.
+///
+/// `carrier_hz` > 0, `excess` >= 1 (linear).
 pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
     const LIGHT_M_PER_S: f64 = 299_792_458.0;
     let waves = 4.0 * std::f64::consts::PI * carrier_hz / LIGHT_M_PER_S;
@@ -44,7 +46,7 @@ pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
 }
 
 impl Link {
-    /// The paper's multi-hop scenario with `n` relays: 80 W Tx, 1 W relays at 20 m, 80 W interferer at (500, 400) m, D = 1 km.
+    /// Returns the paper's multi-hop scenario: 80 W Tx, `n` 1 W relays at 20 m, 80 W interferer at (500, 400) m, D = 1 km.
     pub fn paper(n: usize) -> Self {
         let mu_los = path_loss_factor(2e9, 10_f64.powf(0.01));
         Self {
@@ -68,26 +70,25 @@ impl Link {
         }
     }
 
-    /// Number of relays N.
+    /// Returns the number of relays N.
     pub fn len(&self) -> usize {
         self.relays.len()
     }
 
-    /// Whether there is no relay at all; every search then finds nothing.
+    /// Returns true if there are no relays; every search then finds nothing.
     pub fn is_empty(&self) -> bool {
         self.relays.is_empty()
     }
 }
 
-/// Power received over a squared-distance path loss, watts; the offsets in metres.
+/// Returns the received power over a squared-distance path loss, W; offsets in metres.
 pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }
 
-/// Whether an SIR counts as meeting a target.
+/// Returns true if an SIR meets a target, with a tolerance of a few units in the last place.
 ///
-/// A few units in the last place are forgiven, so that a constant SIR (interferer at Tx) that equals the target on paper
-/// meets it in f64 wherever it is evaluated.
+/// Otherwise rounding would decide for a constant SIR (interferer at Tx) that equals the target.
 pub(super) fn meets(sir: f64, target: f64) -> bool {
     sir >= target * (1.0 - 4.0 * f64::EPSILON)
 }

@@ -1,29 +1,30 @@
-//! An f64 judge of placements that shares no formula with `uav-relay`.
+//! Reference f64 optimisers of placements that share no formula with `uav-relay`.
 //!
-//! The crate solves a quadratic for the reach of a node. Here nothing is solved: the SIR of a hop is computed from received
-//! powers, and whatever is asked about it (how far a node may stand, the best target of a chain) is found by bisecting that
-//! function. A slip in the crate's algebra therefore cannot repeat itself here.
+//! The crate solves a quadratic for the reach of a node. Here the SIR of a hop is computed from received powers, and derived
+//! quantities (how far a node may be, the best target of a chain) are found by bisecting that function. A mistake in the crate's
+//! algebra therefore cannot repeat itself here.
 //!
-//! The only analysis used is the *number* of turning points. With d >= 0 the distance past the sender, a hop's SIR is a
+//! The only analysis used is the *number* of turning points. With d >= 0 the distance beyond the sender, a hop's SIR is a
 //! quotient of two quadratics with equal leading coefficients, so its derivative has the sign of a quadratic in d, and the
-//! product of that quadratic's roots is -(height difference)^2 <= 0: at most one turning point lies beyond the sender. So the
-//! SIR only falls, only rises, forms one valley (interferer ahead) or one hill (interferer behind), and bisection is safe.
+//! product of that quadratic's roots is -(height difference)^2 <= 0: at most one turning point is beyond the sender. So the SIR
+//! only falls, only rises, forms one valley (interferer ahead) or one hill (interferer behind), and bisection is safe.
 //!
-//! With noise nu = N eta / P it has the sign of u d^2 - (u^2 + a^2 - b^2) d - u b^2 - nu d s^2, s = (d - u)^2 + a^2, where u is how
-//! far the interferer is ahead, a how far aside, b the difference in height. Over d that is concave for u > 0, so there are at most two
-//! turning points, a valley and then a hill; for u < 0 each of its terms falls, so there is at most one.
+//! With noise nu = N eta / P the derivative has the sign of u d^2 - (u^2 + a^2 - b^2) d - u b^2 - nu d s^2, s = (d - u)^2 + a^2:
+//! the interferer is u ahead and a sideways, and b is the difference in height. Over d that is concave for u > 0, so there are at
+//! most two turning points, a valley and then a hill; for u < 0 each of its terms falls, so there is at most one.
 //!
-//! Order of travel: a relay never stands behind the one before it (0 <= `x_1` <= ... <= `x_N` <= D). The least separation is
-//! carried for the tests that check it, and ignored by every search here but that of [`joint`].
+//! No relay is behind its predecessor (0 <= `x_1` <= ... <= `x_N` <= D). The least separation is stored for the tests that check
+//! it, and ignored by every search here except that of [`joint`].
 //!
 //! - `Link::feasible` extends the chain greedily, as the on-board protocol does. It is exact when all altitudes are equal.
-//! - `Link::placement` keeps the whole set of places each node can reach. It is exact for any altitudes, which the greedy
+//! - `Link::placement` keeps the whole set of positions each node can reach. It is exact for any altitudes, which the greedy
 //!   chain is not: close to the interferer a climb may be impossible that was possible earlier.
-//! - [`joint::optimum`] chooses altitudes and offsets to the side too. It is a numerical search: no proof, and it does solve
-//!   quadratics on the way, but what it reports is the SIR of the places it found.
+//! - [`joint::optimum`] also chooses altitudes and lateral positions. It is a numerical search without proof, and it solves
+//!   quadratics
+//!   on the way, but it reports the SIR of the positions it found.
 //!
-//! Cost: a reach takes about 60 SIR evaluations when the node may start from where the search starts, at most about 150 when
-//! a hilltop has to be found first. An optimum takes about 50 to 60 chains.
+//! Cost: a reach takes about 60 SIR evaluations if the node may start where the search starts, at most about 150 if a maximum has
+//! to be found first. An optimum takes about 50 to 60 chains.
 
 mod hop;
 pub mod joint;

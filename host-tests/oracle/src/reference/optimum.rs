@@ -3,17 +3,16 @@
 use super::hop::Hop;
 use super::link::Link;
 
-/// Relative width at which the bracket of a target is narrow enough.
+/// Relative bracket width at which the bisection of the target ends.
 const TOLERANCE: f64 = 1e-13;
 
-/// Targets below this are not told from zero.
 const LEAST_TARGET: f64 = 1e-250;
 
 impl Link {
-    /// The largest target (linear) that any chain meets, to 1e-13 relative; `None` where every chain has an SIR of zero or
-    /// there is no relay.
+    /// Returns the largest target (linear) that any chain meets, to 1e-13 relative.
     ///
-    /// Greedy chains decide when all relays share one altitude, the exact sets otherwise. About 50 to 60 chains.
+    /// `None` without relays, or if every chain has an SIR of zero. Uses greedy chains if all relays share one altitude, the
+    /// exact sets otherwise. About 50 to 60 chains.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -24,16 +23,16 @@ impl Link {
         }
     }
 
-    /// The target (linear) at which [`Link::feasible`] gives up, to 1e-13 relative; `None` as for [`Link::optimum`].
+    /// Returns the target (linear) above which [`Link::feasible`] fails, to 1e-13 relative; `None` as for [`Link::optimum`].
     ///
-    /// The optimum itself when all relays share one altitude. Otherwise at most the optimum, and only one of the targets where
-    /// the greedy chain stops working: it may fail at a target and succeed at a larger one.
+    /// The optimum itself if all relays share one altitude. Otherwise at most the optimum, and only one of the targets at which
+    /// the greedy chain fails: it may fail at a target and succeed at a larger one.
     pub fn farthest_optimum(&self) -> Option<f64> {
         self.largest_target(|target| self.feasible(target).is_some())
     }
 
     fn largest_target(&self, feasible: impl Fn(f64) -> bool) -> Option<f64> {
-        // No chain beats the best SIR of its first hop.
+        // No chain is better than the best SIR of its first hop.
         let mut above = 2.0 * Hop::new(self, 1, 0.0)?.peak(0.0, self.distance_m);
         let mut below = above / 16.0;
         while !feasible(below) {
@@ -43,7 +42,7 @@ impl Link {
             }
         }
         while above - below > TOLERANCE * below {
-            // The geometric mean: the targets span many decades.
+            // Geometric mean, because the targets span many decades.
             let middle = below * (above / below).sqrt();
             if feasible(middle) {
                 below = middle;
@@ -54,10 +53,9 @@ impl Link {
         Some(below)
     }
 
-    /// Where the fixed step starts (linear): the lesser of the SIRs above Tx and above Rx.
+    /// Returns the first target of the fixed step (linear): the lesser of the SIRs above Tx and above Rx.
     ///
-    /// With the interferer behind Tx (X < 0) hop 1 is best farther out, and its best SIR over [0, D] takes the place of the
-    /// one above Tx.
+    /// With the interferer behind Tx (X < 0) hop 1 is better farther out, and its best SIR over [0, D] replaces the one above Tx.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -68,11 +66,11 @@ impl Link {
         Some(near.min(self.sir_rx(self.distance_m)?))
     }
 
-    /// The paper's fixed step: how many targets were tried, the feasible one included, and that target (linear).
+    /// Runs the paper's fixed step: returns the number of targets tried, the feasible one included, and that target (linear).
     ///
-    /// The targets are `gamma_0` - i `epsilon`, i = 0, 1, ...; `gamma_0` is the lesser of the SIRs above Tx and above Rx (for
-    /// X < 0, of hop 1's best over [0, D] and the SIR above Rx), `epsilon` the step (linear, > 0). `None` when the targets run out before one is feasible. Costs one greedy chain a
-    /// target, hence `gamma_0` / `epsilon` of them at most.
+    /// The targets are `gamma_0` - i `epsilon`, i = 0, 1, ...; `gamma_0` is the lesser of the SIRs above Tx and above Rx (for X <
+    /// 0, of hop 1's best over [0, D] and the SIR above Rx), `epsilon` the step (linear, > 0). `None` if no target is feasible.
+    /// Costs one greedy chain per target, at most `gamma_0` / `epsilon`.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

@@ -1,13 +1,13 @@
-//! How far a single node may stand, and the greedy chain built from that.
+//! Reach of a single node, and the greedy chain built from it.
 
 use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
 
 impl Link {
-    /// The farthest place in [`from_x`, D], metres, at which relay `k` in 1..=N meets `target` (linear, > 0) while relay k-1
-    /// stands at `from_x` (for k = 1 Tx stands at 0); `None` when no place does.
+    /// Returns the farthest position in [`from_x`, D], m, at which relay `k` in 1..=N meets `target` (linear, > 0).
     ///
-    /// About 60 SIR evaluations, at most about 150.
+    /// Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None` if no position meets the target. About 60 SIR evaluations, at most
+    /// about 150.
     pub fn farthest(&self, k: usize, from_x: f64, target: f64) -> Option<f64> {
         let end = self.distance_m;
         if !(0.0..=end).contains(&from_x) {
@@ -18,7 +18,7 @@ impl Link {
         if meets(end) {
             return Some(end);
         }
-        // Between two turning points there is at most one crossing: the last place is beyond the last of them that meets the target.
+        // At most one crossing is between two turning points, so the farthest is beyond the last one that meets the target.
         let mut outside = end;
         for inside in hop.turns(from_x, end).into_iter().rev().chain([from_x]) {
             if meets(inside) {
@@ -29,9 +29,9 @@ impl Link {
         None
     }
 
-    /// The largest distance from Rx, metres, at which the last relay meets `target` (linear, > 0) at Rx; it may exceed D.
+    /// Returns the largest distance from Rx, m, at which the last relay meets `target` (linear, > 0) at Rx; may exceed D.
     ///
-    /// `None` when the target is missed even above Rx, or is not positive. About 60 SIR evaluations.
+    /// `None` if the target is missed even above Rx, or is not positive. About 60 SIR evaluations.
     pub fn rx_reach(&self, target: f64) -> Option<f64> {
         let sir = |distance: f64| self.sir_rx(self.distance_m - distance);
         let meets = |distance: f64| sir(distance).is_some_and(|sir| meets(sir, target));
@@ -45,11 +45,11 @@ impl Link {
         Some(bisect(0.0, outside, meets))
     }
 
-    /// Places, metres, of the chain in which each relay in turn goes as far as `target` (linear, > 0) lets it; `None` when a
-    /// relay has no place or Rx is out of the last one's reach.
+    /// Returns the positions, m, of the chain in which each relay in turn goes as far as `target` (linear, > 0) allows.
     ///
-    /// This is what the on-board protocol does with the same target. When all relays share one altitude, `None` proves that
-    /// no chain meets the target; otherwise see [`Link::placement`]. N reaches.
+    /// `None` if a relay has no position or Rx is out of the last one's reach. The on-board protocol does the same with a target.
+    /// If all relays share one altitude, `None` proves that no chain meets the target; otherwise see [`Link::placement`]. N
+    /// reaches.
     pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {
         let mut from = 0.0;
         let mut x = Vec::with_capacity(self.len());

@@ -1,24 +1,22 @@
-//! Brute force over the places themselves, for chains of one or two relays: no target, no reach, nothing greedy.
+//! Brute-force search over the positions of one or two relays, without targets or reaches.
 
 use super::link::Link;
 
 /// Golden-section steps per refined cell: the cell shrinks by about 2e-9.
 const STEPS: usize = 42;
 
-/// Peaks of the sampled function that are refined.
 const PEAKS: usize = 4;
 
 impl Link {
-    /// The best chain SIR (linear) over all ordered placements, by nested grids of `points` places (>= 16) per relay that are
-    /// then refined; 0 without relays.
+    /// Returns the best chain SIR (linear) over all ordered placements, on refined nested grids; 0 without relays.
     ///
-    /// Never more than the optimum but for rounding, and less by what the grid misses. Costs about (4 `points` + 170)^N SIR
-    /// evaluations: use it for N of 1 or 2.
+    /// `points` (>= 16) is the number of grid points per relay. Never more than the optimum except for rounding; the grid may
+    /// miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
     }
 
-    /// The best worst SIR of hops `k`..=N+1 with relay k-1 at `from_x`.
+    /// Returns the best worst SIR of hops `k`..=N+1 with relay k-1 at `from_x`.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
         let worst_hop = |x: f64| {
             let here = self.sir_relay(k, from_x, x).unwrap_or(0.0);
@@ -32,7 +30,7 @@ impl Link {
         maximum(&self.grid(from_x, points), worst_hop)
     }
 
-    /// Places from `from_x` to D: evenly spaced, and ever closer to either end and to the interferer, where things happen fast.
+    /// Returns points from `from_x` to D: evenly spaced, and denser near both ends and the interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);
@@ -54,7 +52,7 @@ impl Link {
     }
 }
 
-/// The largest value of `f`, sampled at the sorted places `x` and refined around the best few local maxima of the samples.
+/// Returns the largest value of `f`, sampled at the sorted points `x` and refined around the best few local maxima.
 fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<(f64, f64)> = x.iter().map(|&x| (x, f(x))).collect();
     let place = |i: Option<usize>| i.and_then(|i| samples.get(i)).copied();
@@ -78,7 +76,6 @@ fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
         })
 }
 
-/// The largest value met by a golden-section search of [`low`, `high`].
 fn golden(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let ratio = (5_f64.sqrt() - 1.0) / 2.0;
     let (mut a, mut b) = (high - ratio * (high - low), low + ratio * (high - low));

@@ -1,9 +1,9 @@
-//! Exact feasibility for relays at altitudes of their own: the whole set of places each node can reach.
+//! Exact feasibility for relays at different altitudes: the whole set of positions each node can reach.
 //!
-//! A node's set is a sorted list of closed intervals. A place can be reached if the hop from the *nearest* reachable place at
-//! or before it meets the target: a nearer sender is louder, and the interference at the receiver does not depend on it. So
-//! the next set has two kinds of pieces: places inside an interval of the last set (sender straight below or above), and
-//! places in the gap after an interval (sender at the interval's end).
+//! A node's set is a sorted list of closed intervals. A position can be reached if the hop from the *nearest* reachable position
+//! at or before it meets the target: a nearer sender is received more strongly, and the interference at the receiver does not
+//! depend on it. So the next set has two kinds of pieces: positions inside an interval of the last set (sender straight below or
+//! above), and positions in the gap after an interval (sender at the interval's end).
 
 use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
@@ -11,10 +11,10 @@ use super::link::{Link, meets};
 type Interval = (f64, f64);
 
 impl Link {
-    /// Places, metres, of a chain that meets `target` (linear, > 0), each relay as far toward Rx as its successors allow;
-    /// `None` only if there is no such chain, whatever the altitudes.
+    /// Returns positions, m, of a chain that meets `target` (linear, > 0), each relay as far toward Rx as possible.
     ///
-    /// Per relay and interval about 300 SIR evaluations; the intervals are seldom more than three.
+    /// `None` only if there is no such chain, whatever the altitudes. Per relay and interval about 300 SIR evaluations; there are
+    /// seldom more than three intervals.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let first = Hop::new(self, 1, 0.0)?;
         let turns = first.turns(0.0, self.distance_m);
@@ -25,7 +25,7 @@ impl Link {
             let next = self.next_set(k, sets.last()?, target);
             sets.push(next);
         }
-        // The SIR at Rx rises all the way to D, so the last place of the last set is the one to try.
+        // The SIR at Rx rises all the way to D, so only the last position of the last set needs to be tried.
         let mut limit = sets.last()?.last()?.1;
         if !meets(self.sir_rx(limit)?, target) {
             return None;
@@ -39,7 +39,7 @@ impl Link {
         Some(x)
     }
 
-    /// The set of relay `k` in 2..=N from that of relay k-1.
+    /// Returns the set of relay `k` in 2..=N from that of relay k-1.
     fn next_set(&self, k: usize, set: &[Interval], target: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set
@@ -48,7 +48,7 @@ impl Link {
             .map(|next| next.0)
             .chain([self.distance_m]);
         for (&(start, end), gap_end) in set.iter().zip(gap_ends) {
-            // Straight above one another the signal is constant, and the interference peaks abreast of the interferer.
+            // Straight above one another the signal is constant, and the interference is largest abreast of the interferer.
             let abreast = self.x_i.clamp(start, end);
             pieces.extend(where_true(start, &[abreast], end, |x| {
                 self.sir_relay(k, x, x)
@@ -64,7 +64,7 @@ impl Link {
     }
 }
 
-/// The part of [`low`, `high`] on which `holds`, given that it changes at most once between two of its `turns`, which rise.
+/// Returns the part of [`low`, `high`] on which `holds`, which changes at most once between two of the rising `turns`.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());
@@ -79,7 +79,6 @@ fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -
     merge(&pieces.flatten().collect::<Vec<_>>())
 }
 
-/// Joins intervals, sorted by their starts, that touch.
 fn merge(pieces: &[Interval]) -> Vec<Interval> {
     let mut merged: Vec<Interval> = Vec::with_capacity(pieces.len());
     for &(start, end) in pieces {
@@ -91,7 +90,6 @@ fn merge(pieces: &[Interval]) -> Vec<Interval> {
     merged
 }
 
-/// The last place of `set` that is not beyond `limit`.
 fn last_at_or_before(set: &[Interval], limit: f64) -> Option<f64> {
     set.iter()
         .rev()

@@ -1,18 +1,17 @@
-//! The SIR of every hop, from received powers; with noise, the SINR.
+//! SIR of every hop, from received powers; with noise, the SINR.
 
 use super::hop::Hop;
 use super::link::{Link, received_w};
 
 impl Link {
-    /// SIR (linear) of hop `k` in 1..=N measured at relay `k` standing at `x` metres, its sender at `from_x` metres.
+    /// Returns the SIR (linear) of hop `k` in 1..=N at relay `k` at `x` metres, with its sender at `from_x` metres.
     ///
-    /// Hop 1 is sent by Tx, which stands at 0: `from_x` is then not looked at. `None` for any other `k`. Infinite when sender
-    /// and receiver coincide.
+    /// Hop 1 is sent by Tx at 0, whatever `from_x`. `None` for any other `k`. Infinite if sender and receiver coincide.
     pub fn sir_relay(&self, k: usize, from_x: f64, x: f64) -> Option<f64> {
         Hop::new(self, k, from_x).map(|hop| hop.sir(x))
     }
 
-    /// SIR (linear) of hop N+1, measured at Rx, the last relay standing at `x` metres; `None` without relays.
+    /// Returns the SIR (linear) of hop N+1 at Rx, with the last relay at `x` metres; `None` without relays.
     pub fn sir_rx(&self, x: f64) -> Option<f64> {
         let last = self.relays.last()?;
         let signal = received_w(
@@ -32,9 +31,9 @@ impl Link {
         Some(signal / (interference + self.noise_w))
     }
 
-    /// SIR (linear) of the N+1 hops of a chain whose relay k stands at `x[k-1]` metres.
+    /// Returns the SIR (linear) of the N+1 hops of a chain with relay k at `x[k-1]` metres.
     ///
-    /// Empty when `x` does not hold exactly one place per relay, or there is no relay.
+    /// Empty without relays, or unless `x` has one position per relay.
     pub fn sir_hops(&self, x: &[f64]) -> Vec<f64> {
         if x.len() != self.len() {
             return Vec::new();
@@ -48,7 +47,7 @@ impl Link {
         sir
     }
 
-    /// SIR (linear) of the chain: that of its worst hop; 0 where [`Link::sir_hops`] is empty.
+    /// Returns the SIR (linear) of the worst hop; 0 if [`Link::sir_hops`] is empty.
     pub fn chain_sir(&self, x: &[f64]) -> f64 {
         self.sir_hops(x).into_iter().reduce(f64::min).unwrap_or(0.0)
     }

@@ -1,4 +1,4 @@
-//! `cargo page`: the page in one file, `page/index.html` in the target folder, which needs no server and nothing from elsewhere.
+//! `cargo page`: builds the page as one file, `page/index.html` in the target folder, without a server or external resources.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -11,10 +11,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use wasm_bindgen_cli_support::Bindgen;
 
-/// What a browser runs.
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// The scripts of the page, each after those that it needs.
+/// Scripts of the page, each after those that it needs.
 const SCRIPTS: [&str; 7] = [
     "drawing.js",
     "wish.js",
@@ -25,7 +24,7 @@ const SCRIPTS: [&str; 7] = [
     "page.js",
 ];
 
-/// What the page begins with, as its `wish.js` says it: its outcome is part of the page, so that it is to be seen before the code is there.
+/// First run of the page, as in its `wish.js`: its outcome is embedded, so that it is visible before the code is loaded.
 const FIRST_OPTIONS: &str = "--uavs 8 --method align";
 const FIRST_SCENARIO: &str = "[geometry]
 distance_m = 1000.0
@@ -69,7 +68,7 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     let wasm = target.join(TARGET).join("browser/uav_relay_page.wasm");
     let folder = target.join("page");
     std::fs::create_dir_all(&folder)?;
-    // A script that is no module: a page that was opened as a file may load none.
+    // A plain script, because a page opened as a file may not load modules.
     Bindgen::new()
         .input_path(wasm)
         .no_modules(true)?
@@ -96,7 +95,7 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     Ok(file)
 }
 
-/// Returns the target folder as cargo has it: `target`, or that of `CARGO_TARGET_DIR` or of a configuration file.
+/// Returns cargo's target folder: `target`, or that of `CARGO_TARGET_DIR` or of a configuration file.
 fn target_directory(cargo: &mut Command, root: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let output = cargo
         .current_dir(root)
@@ -107,14 +106,12 @@ fn target_directory(cargo: &mut Command, root: &Path) -> Result<PathBuf, Box<dyn
     Ok(folder.ok_or("cargo metadata: no target_directory")?.into())
 }
 
-/// By gzip, which a browser unpacks by itself.
 fn packed(code: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(code)?;
     encoder.finish()
 }
 
-/// Adds the target where rustup lacks it.
 fn add_target() -> Result<(), Box<dyn Error>> {
     let libraries = Command::new("rustc")
         .args(["--print", "target-libdir", "--target", TARGET])
@@ -139,7 +136,6 @@ mod tests {
 
     use super::*;
 
-    /// The page is built where cargo builds, wherever the user has it build.
     #[test]
     fn the_page_follows_the_target_folder_of_cargo() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"))

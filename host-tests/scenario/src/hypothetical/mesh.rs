@@ -1,25 +1,25 @@
-//! Places along a line, closer together the nearer they are to something sharp.
+//! Graded mesh on a line: cells are smaller near points of rapid change.
 
-/// Something sharp: within about `width` of `at`, things change.
+/// A point of rapid change, at a scale of about `width`.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
-    /// Where it is.
+    /// Position.
     pub at: f64,
-    /// How near to it the mesh is finest.
+    /// Scale of the finest cells.
     pub width: f64,
 }
 
 impl Centre {
-    /// The length over which what comes from this centre changes at `x`.
+    /// Returns the length scale of changes at `x` caused by this centre.
     fn scale(&self, x: f64) -> f64 {
         (x - self.at).hypot(self.width)
     }
 }
 
-/// The ends of the cells, rising from `low` to `high`: none is wider than 1.5 times `widest`, nor than about 1.5 times `step`
-/// (below 1) of the distance to a centre.
+/// Returns the cell ends from `low` to `high`, rising.
 ///
-/// About (high - low) / widest places, and 2 ln(2 (high - low) / width) / step more for every centre of its own.
+/// Cells are at most 1.5 times `widest` wide, and at most about 1.5 times `step` (below 1) of the distance to a centre. About
+/// (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step more per centre.
 pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -> Vec<f64> {
     let mut ends = vec![low];
     let mut at = low;
@@ -28,7 +28,7 @@ pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -
             .iter()
             .map(|centre| step * centre.scale(at))
             .fold(widest, f64::min);
-        // What is left is no cell of its own when it is less than half of one.
+        // A remainder of less than half a cell is merged with the last cell.
         at = if at + 1.5 * width < high {
             at + width
         } else {

@@ -1,12 +1,12 @@
-//! The one hypothetical interferer that comes closest to several: the paper's "Extension to Multiple Sources of Interference".
+//! The hypothetical interferer closest to several: the paper's "Extension to Multiple Sources of Interference".
 //!
-//! Minimised is the integral, over [0, D] and the altitude band, of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - the same summed over the
-//! true sources|. The best p_H for a place is a weighted median ([`Raster::weigh`]); the place is searched for on a grid, and
-//! from the best valleys of the grid and the true sources themselves by simplexes. No proof that the best valley is among
-//! them: a test holds the result against 20 000 places drawn at random in each of 20 scenes.
+//! Minimises the integral, over [0, D] and the altitude band, of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - the same summed over the
+//! true sources|. The best p_H at a position is a weighted median ([`Raster::weigh`]); the position is searched on a grid, then
+//! by simplexes from the grid's best local minima and from the true sources. The global minimum may be missed: a test compares
+//! the result with 20 000 random positions in each of 20 scenes.
 //!
-//! The paper asks for x_H in [0, D]. Interferers that all lie beyond Rx are no better met by one at Rx, so here x_H may go out to
-//! the outermost interferer. y_H is 30 times the size of the scene at most: there the shape is even to a thousandth.
+//! The paper restricts x_H to [0, D]. Interferers that are all beyond Rx are not well represented there, so here x_H may reach
+//! the outermost interferer. y_H is at most 30 times the size of the scene, where the interference is uniform to a thousandth.
 
 pub mod mesh;
 mod raster;
@@ -18,49 +18,49 @@ use mesh::{Centre, graded};
 pub use raster::{Raster, Weighed};
 use simplex::{Corner, minimise};
 
-/// About how many places the grid search looks at.
+/// Approximate number of points of the grid search.
 const COARSE: usize = 400;
 
-/// About how many the search ends with.
+/// Approximate number of points at the end of the search.
 const FINE: usize = 4_000;
 
-/// Steps along the line and aside in which both sides are compared.
+/// Steps along the line and sideways at which both sides are compared.
 const ALONG: u32 = 64;
 const ASIDE: u32 = 8;
 
-/// About how many the error that is reported was measured on.
+/// Approximate number of points for the reported error.
 const REPORTED: usize = 60_000;
 
-/// The largest y_H over the size of the scene.
+/// Largest y_H relative to the size of the scene.
 const FAR: f64 = 30.0;
 
-/// Step of the grid in asinh(y_H / least altitude): a factor of 1.4 once y_H is above that altitude.
+/// Grid step in asinh(y_H / least altitude): a factor of 1.4 once y_H is above that altitude.
 const RISE: f64 = 0.35;
 
-/// Valleys of the grid that are followed, and as many true sources.
+/// Number of the grid's local minima that are refined, and of the true sources.
 const VALLEYS: usize = 6;
 
-/// Of those, how many are followed to the end.
 const FINALISTS: usize = 3;
 
-/// One interferer in place of several, and how well it stands for them.
+/// A hypothetical interferer in place of several, and its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothetical {
-    /// Transmit power p_H, watts, > 0.
+    /// Transmit power p_H, W, > 0.
     pub power_w: f64,
-    /// Coordinate x_H along the line from Tx to Rx, metres.
+    /// Position x_H along the line from Tx to Rx, m.
     pub x_m: f64,
-    /// Offset y_H from that line, metres: to its right above 0.
+    /// Lateral position y_H, m; positive to the right of the line.
     pub y_m: f64,
-    /// Mean absolute error of the interference that a relay receives, watts.
+    /// Mean absolute error of the interference at a relay, W.
     pub mean_abs_error_w: f64,
-    /// The integral of the absolute error over that of the true interference; 0 is perfect.
+    /// Integral of the absolute error over that of the true interference; 0 is perfect.
     pub relative_error: f64,
 }
 
 impl Hypothetical {
-    /// The same on that side of the line on which it errs less, for relays with room from `least_m` to `most_m` (metres)
-    /// beside the line. Above the line both sides are the same.
+    /// Chooses the side of the line with the smaller error, for lateral room from `least_m` to `most_m`, m.
+    ///
+    /// Above the line both sides are equal.
     #[must_use]
     pub fn sided(self, scene: &Scene, least_m: f64, most_m: f64) -> Self {
         let other = Self {
@@ -78,7 +78,7 @@ impl Hypothetical {
                 h,
             })
             .collect();
-        // By factors: what is next to an interferer would else outweigh all the rest.
+        // Compares ratios: otherwise the surroundings of an interferer would dominate.
         let error = |one: &Self| -> f64 {
             let each = places.iter().map(|at| {
                 let (dx, dy) = (at.x - one.x_m, at.y - one.y_m);
@@ -94,7 +94,7 @@ impl Hypothetical {
         }
     }
 
-    /// As an interferer of a scenario.
+    /// Returns the interferer as a source of a scenario.
     pub fn source(&self) -> Source {
         Source {
             power_w: self.power_w,
@@ -104,21 +104,21 @@ impl Hypothetical {
     }
 }
 
-/// The best place found on a given raster.
+/// Best position found on a given raster.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// x_H, metres.
+    /// x_H, m.
     pub x_m: f64,
-    /// y_H, metres, >= 0.
+    /// y_H, m, >= 0.
     pub y_m: f64,
-    /// The best power there, and the error that it leaves on the raster.
+    /// Best power there, and the remaining error on the raster.
     pub weighed: Weighed,
 }
 
-/// The hypothetical interferer of a scene; `None` without interferers.
+/// Returns the hypothetical interferer of a scene; `None` without interferers.
 ///
-/// In usual scenes about 1 500 weighings of 400 places, 600 of 4 000 and one of 60 000. The errors are good to 3e-5, relative:
-/// `the_rasters_are_fine_enough` in `host-tests/tests/several`.
+/// Usually about 1 500 evaluations of 400 points, 600 of 4 000 and one of 60 000. The errors are accurate to 3e-5, relative
+/// (`the_rasters_are_fine_enough` in `host-tests/tests/several`).
 pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
     let place = (found.x_m, found.y_m);
@@ -133,7 +133,7 @@ pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     })
 }
 
-/// The place whose error on `raster` is the least that was found; `None` without interferers or without places.
+/// Returns the position with the least error found on `raster`; `None` without interferers or points.
 pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     if scene.sources.is_empty() || raster.is_empty() {
         return None;
@@ -150,7 +150,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
         .take(FINALISTS)
         .map(|corner| space.descend(raster, corner.at, 0.2, 1e-6, 40))
         .min_by(|a, b| a.value.total_cmp(&b.value))?;
-    // A simplex that has shrunk to a line stays on it: begun anew it goes on.
+    // Restarts the simplex, because one that has collapsed to a line would stay on it.
     let close = space.descend(raster, near.at, 0.05, 1e-9, 80);
     let best = space.descend(raster, close.at, 0.01, 1e-12, 80);
     let (x_m, y_m) = space.place(best.at);
@@ -161,7 +161,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     })
 }
 
-/// Where to begin: the deepest valleys of the grid and the true sources that err least, as places of `space`.
+/// Returns the starting points: the grid's deepest local minima and the best true sources, in the coordinates of `space`.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -214,8 +214,7 @@ fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The places that are searched: x in metres, and u = asinh(y / least altitude), which is even in y below that altitude and
-/// in log y above.
+/// Search space: x in metres, and u = asinh(y / least altitude), linear in y below that altitude and logarithmic above.
 struct Space {
     distance_m: f64,
     low: f64,
@@ -241,12 +240,10 @@ impl Space {
         }
     }
 
-    /// The place of this very source.
     fn inside(&self, source: &Source) -> (f64, f64) {
         (source.x_m, (source.y_m.abs() / self.unit).asinh())
     }
 
-    /// The nearest place that is allowed, (x, y) in metres.
     fn place(&self, (x, u): (f64, f64)) -> (f64, f64) {
         let x = x.clamp(self.low, self.high);
         (x, self.unit * u.clamp(0.0, self.most_u).sinh())
@@ -257,7 +254,7 @@ impl Space {
         raster.weigh(x, y).error
     }
 
-    /// Places along x: a sixteenth of D apart midway, farther apart the farther out.
+    /// Returns the grid along x: spacing D / 16 in the middle, wider further out.
     fn columns(&self) -> Vec<f64> {
         let half = 0.5 * self.distance_m;
         let middle = Centre {
@@ -267,12 +264,11 @@ impl Space {
         graded(self.low, self.high, &[middle], 0.125, self.high - self.low)
     }
 
-    /// Places along u.
     fn rows(&self) -> Vec<f64> {
         graded(0.0, self.most_u, &[], 0.0, RISE)
     }
 
-    /// A simplex from `start`, its size `share` of the length over which things change there.
+    /// Minimises by a simplex from `start`, with a size of `share` of the local length scale.
     fn descend(
         &self,
         raster: &Raster,
@@ -283,7 +279,7 @@ impl Space {
     ) -> Corner {
         let (x, y) = self.place(start);
         let dx = share * 0.5 * y.hypot(self.unit).min(0.1 * self.distance_m);
-        // Toward the inside: at a border, a step outward is none.
+        // Steps inwards, because a step across the border has no effect.
         let dx = if x + dx > self.high { -dx } else { dx };
         let du = share * RISE;
         let du = if start.1 + du > self.most_u { -du } else { du };

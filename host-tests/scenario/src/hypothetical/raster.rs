@@ -1,15 +1,13 @@
-//! Where the true sum and a hypothetical interferer are compared: weighted places in the x-h plane.
+//! Quadrature points in the x-h plane for the error of a hypothetical interferer.
 
 use super::mesh::{Centre, graded};
 use crate::scene::Scene;
 
-/// The widest cell over its distance to the nearest source.
+/// Largest cell width relative to the distance to the nearest source.
 const WIDEST_STEP: f64 = 0.9;
 
-/// Steps that are tried to come near the number of places asked for.
 const TRIES: u32 = 6;
 
-/// One place of a [`Raster`].
 #[derive(Debug, Clone, Copy)]
 struct Node {
     x: f64,
@@ -19,7 +17,7 @@ struct Node {
     truth: f64,
 }
 
-/// A quadrature over [0, D] x altitude band, or over the line where the band is a single altitude.
+/// Quadrature over [0, D] x altitude band, or over the line if the band is a single altitude.
 #[derive(Debug, Clone)]
 pub struct Raster {
     nodes: Vec<Node>,
@@ -27,20 +25,20 @@ pub struct Raster {
     total: f64,
 }
 
-/// A hypothetical interferer at a given place, with the power that fits best there.
+/// Best power of a hypothetical interferer at a given position, and its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weighed {
-    /// That power, watts, > 0.
+    /// Transmit power, W, > 0.
     pub power_w: f64,
     /// Integral of the absolute difference from the true sum of p / distance^2: W over an area, W/m over a line.
     pub error: f64,
 }
 
-/// A place or altitude, and how much of the line it stands for.
+/// A coordinate and its quadrature weight.
 type Share = (f64, f64);
 
 impl Raster {
-    /// The midpoint rule on `columns` x `rows` equal cells; `rows` counts for 1 where the band is a single altitude.
+    /// Creates a midpoint rule on `columns` x `rows` equal cells; one row if the band is a single altitude.
     pub fn even(scene: &Scene, columns: u32, rows: u32) -> Self {
         let midpoints = |low: f64, high: f64, count: u32| -> Vec<Share> {
             let cell = (high - low) / f64::from(count);
@@ -57,9 +55,9 @@ impl Raster {
         Self::of(scene, &rows, |_| midpoints(0.0, scene.distance_m, columns))
     }
 
-    /// Two Gauss points a cell both ways, in cells that shrink toward the sources, and toward `also` (x, y in metres) if given.
+    /// Creates a two-point Gauss rule per cell and direction, with cells that shrink toward sources and `also` (x, y in metres).
     ///
-    /// At most about `most` places, > 100 (more where the sources are so many that their number alone asks for it).
+    /// At most about `most` points, > 100, unless the number of sources alone requires more.
     pub fn graded(scene: &Scene, also: Option<(f64, f64)>, most: usize) -> Self {
         let sharp: Vec<(f64, f64)> = scene
             .sources
@@ -67,7 +65,7 @@ impl Raster {
             .map(|source| (source.x_m, source.y_m.abs()))
             .chain(also)
             .collect();
-        // Places go with 1 / step^2 over an area, with 1 / step along a line.
+        // The number of points grows with 1 / step^2 over an area, with 1 / step along a line.
         let is_area = scene.band.most_m > scene.band.least_m;
         let mut step = WIDEST_STEP;
         let mut raster = Self::with_step(scene, &sharp, step);
@@ -86,7 +84,7 @@ impl Raster {
     fn with_step(scene: &Scene, sharp: &[(f64, f64)], step: f64) -> Self {
         let band = scene.band;
         let rows = if band.most_m > band.least_m {
-            // Lines of equal power are circles about (x, y = 0, h = 0): above a source, its offset is the width.
+            // Lines of equal power are circles about (x, y = 0, h = 0), so above a source the width is its offset.
             let centres: Vec<Centre> = sharp
                 .iter()
                 .map(|&(_, width)| Centre { at: 0.0, width })
@@ -128,30 +126,30 @@ impl Raster {
         }
     }
 
-    /// Number of places.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Whether there is no place at all.
+    /// Returns true if there are no points.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// What is integrated over: m^2, or m along a line.
+    /// Returns the area of integration, m^2, or its length, m.
     pub fn area(&self) -> f64 {
         self.area
     }
 
-    /// Integral of the true sum of p / distance^2, in the unit of [`Weighed::error`].
+    /// Returns the integral of the true sum of p / distance^2, in the unit of [`Weighed::error`].
     pub fn total(&self) -> f64 {
         self.total
     }
 
-    /// The power that fits best for a hypothetical interferer at (`x`, `y`), metres, and the error that remains.
+    /// Returns the best power of a hypothetical interferer at (`x`, `y`), m, and the remaining error.
     ///
-    /// With the shape g = 1 / distance^2 and the true sum S, the integral of |p g - S| is that of g |p - S/g|: its minimum
-    /// over p is the median of S/g, weighted by g. Linear in the number of places.
+    /// With the shape g = 1 / distance^2 and the true sum S, the integral of |p g - S| is that of g |p - S/g|: its minimum over p
+    /// is the median of S/g, weighted by g. Linear in the number of points.
     pub fn weigh(&self, x: f64, y: f64) -> Weighed {
         let shape = |node: &Node| {
             let dx = node.x - x;
@@ -179,7 +177,7 @@ impl Raster {
     }
 }
 
-/// Two points a cell: exact for cubic functions.
+/// Two-point Gauss rule per cell: exact for cubic functions.
 fn gauss(ends: &[f64]) -> Vec<Share> {
     let cells = ends.iter().zip(ends.iter().skip(1));
     cells
@@ -191,15 +189,13 @@ fn gauss(ends: &[f64]) -> Vec<Share> {
         .collect()
 }
 
-/// The true sum over the shape at one place.
+/// True sum over the shape at one point.
 struct Ratio {
     value: f64,
     weight: f64,
 }
 
-/// The value at which the weights below and above balance; 0 without values. The order of `ratios` is lost.
-///
-/// Each round looks at half of what the last one did.
+/// Returns the weighted median in linear time; 0 without values. Reorders `ratios`.
 fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     let mut half = 0.5 * ratios.iter().map(|ratio| ratio.weight).sum::<f64>();
     let mut median = 0.0;

@@ -1,13 +1,12 @@
-//! A simplex search in the plane, after Nelder and Mead: for a function without usable slopes, near one of its minima.
+//! Nelder-Mead simplex search in the plane, near a minimum of a function without usable derivatives.
 
-/// A corner of the simplex and the value there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
     pub(super) at: (f64, f64),
     pub(super) value: f64,
 }
 
-/// The best corner met from `start`, whose neighbours are `steps` away; never worse than `start`.
+/// Returns the best corner found from `start` with initial `steps`; never worse than `start`.
 ///
 /// Ends when the values at the corners agree to `tolerance` (relative), or after `most` steps of at most four evaluations.
 pub(super) fn minimise(
@@ -49,7 +48,7 @@ pub(super) fn minimise(
         corners = sorted(if tried.value < worst.value {
             [best, middle, tried]
         } else {
-            // Nothing gained along that line: draw everything toward the best.
+            // No improvement along that line: shrinks the simplex toward the best corner.
             let drawn = |other: Corner| corner(between(best.at, other.at, 0.5));
             [best, drawn(middle), drawn(worst)]
         });
@@ -58,7 +57,7 @@ pub(super) fn minimise(
     best
 }
 
-/// The point `share` of the way from `from` to `to`; beyond it for a share above 1.
+/// Interpolates from `from` to `to`; extrapolates for a share above 1.
 fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
     (
         from.0 + share * (to.0 - from.0),
@@ -70,7 +69,7 @@ fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
 mod tests {
     use super::minimise;
 
-    /// Around a narrow pit everything between the corners is higher than they are: only shrinking leads into it.
+    /// Around a narrow pit everything between the corners is higher than they are: only shrinking reaches it.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

@@ -1,21 +1,20 @@
-//! Relays where the signal alone says: the chain that makes the weakest received signal as strong as it can be.
+//! Interference-blind baseline: the chain that maximises the weakest received signal.
 //!
-//! The signal of a hop is p_t / (eta (d^2 + h^2)) from Tx, p_u / (mu_LoS d^2) between relays and p_u / (eta (d^2 + h^2)) to
-//! Rx. Each falls with the length of its hop, so the best chain is the one whose hops, each as long as one common signal
-//! allows, just cover the distance. With one relay this is the place of the largest min{p_t / (x^2 + h^2), p_u / ((D - x)^2 +
-//! h^2)}.
+//! The received power of a hop is p_t / (eta (d^2 + h^2)) from Tx, p_u / (mu_LoS d^2) between relays and p_u / (eta (d^2 + h^2))
+//! to Rx. It falls with the hop length, so the best chain has the hop lengths at which all received powers are equal and the hops
+//! just span the distance. With one relay this maximises min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}.
 //!
-//! No relay can stand nearer to the ground than straight above it. Where the hops are longer than the distance even then,
-//! many chains are equally good, and the one is taken that shortens every hop in the same proportion.
+//! The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
+//! equally good; the one that shortens every hop in the same proportion is used.
 
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Halvings of the common signal: enough for any f64 bracket to close.
+/// Bisection steps on the common received power: enough for any f64 bracket to close.
 const HALVINGS: u32 = 200;
 
-/// The places of the relays, m from Tx, in order. Altitude and power of the first relay hold for all of them.
+/// Returns the positions of the relays in order, m from Tx.
 ///
-/// Empty without relays. Work: two hundred lengths of a chain, and N places.
+/// The altitude and power of the first relay are used for all. Empty without relays. Work: 200 chain lengths and N positions.
 pub fn places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();
@@ -41,20 +40,20 @@ pub fn places(scene: &Scene) -> Vec<f64> {
         .collect()
 }
 
-/// How long hops may be for a received signal of so many watts.
+/// Hop lengths as a function of the received power, W.
 struct Hops<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
 }
 
 impl Hops<'_> {
-    /// The strongest signal that the weaker of the two outer hops can have, W: its relay straight above the ground station.
+    /// Returns the strongest signal possible on the weaker outer hop, W: its relay straight above the ground station.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
     }
 
-    /// A hop between the ground and the relays' altitude, along x, m.
+    /// Returns the horizontal length of a hop between the ground and the relays' altitude, m.
     fn outer(&self, power_w: f64, signal_w: f64) -> f64 {
         let height = self.relay.altitude_m;
         let squared = power_w / (self.scene.eta * signal_w) - height * height;
@@ -69,7 +68,6 @@ impl Hops<'_> {
         (self.relay.power_w / (self.scene.mu_los * signal_w)).sqrt()
     }
 
-    /// All hops of the chain together, m.
     fn span(&self, signal_w: f64) -> f64 {
         let between = (self.scene.relays.len() - 1) as f64 * self.between(signal_w);
         self.first(signal_w) + between + self.outer(self.relay.power_w, signal_w)

@@ -1,8 +1,8 @@
-//! Relays at equal distances; a single one in the middle.
+//! Equal spacing; a single relay goes to the middle.
 
 use uav_relay_scenario::scene::Scene;
 
-/// The places of the relays, m from Tx: k D / (N + 1). Work: one division a relay.
+/// Returns the positions k D / (N + 1), m from Tx. Work: one division per relay.
 pub fn places(scene: &Scene) -> Vec<f64> {
     let hops = (scene.relays.len() + 1) as f64;
     (1..=scene.relays.len())

@@ -1,12 +1,12 @@
-//! What the methods of the crate are compared with: placements that know nothing of the interferer, scored as they are flown.
+//! Baseline placements that ignore the interferer, for comparison with the crate's methods.
 //!
-//! | file | where the relays stand |
+//! | file | positions of the relays |
 //! | --- | --- |
-//! | [`random`] | anywhere, in order: the mean over many draws |
-//! | [`blind`] | where every hop would have the best signal if there were no interference |
-//! | [`equal`] | at equal distances |
+//! | [`random`] | uniformly random, in order; mean over many draws |
+//! | [`blind`] | maximise the weakest received signal, without interference |
+//! | [`equal`] | equal spacing |
 //!
-//! All of them are scored by [`Scene`](uav_relay_scenario::scene::Scene), in f64: the SIR of the worst hop at those places.
+//! Each is scored in f64 by [`Scene`](uav_relay_scenario::scene::Scene): the SIR of the worst hop.
 
 pub mod blind;
 pub mod equal;

@@ -1,27 +1,27 @@
-//! Relays at random: as many places as there are relays, uniform between Tx and Rx, in order.
+//! Random placement: N positions uniform between Tx and Rx, sorted.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use uav_relay_scenario::scene::Scene;
 
-/// Draws that the paper takes.
+/// Number of draws used in the paper.
 pub const DRAWS: u32 = 1000;
 
-/// What many random chains come to.
+/// Statistics over many random chains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
     /// Mean SIR of the worst hop, linear.
     pub sir: f64,
-    /// Standard error of that mean, linear.
+    /// Standard error of the mean SIR, linear.
     pub error: f64,
-    /// Mean SIR of the worst hop in dB: of each draw's own dB.
+    /// Mean over the draws of the worst hop's SIR in dB.
     pub db: f64,
     /// Mean of log2(1 + SIR) of the worst hop, bit/s/Hz.
     pub rate: f64,
 }
 
-/// The mean of `draws` (at least 2) random chains from `seed`. Work: `draws` times N places, sorted, and N + 1 SIRs.
+/// Returns the statistics of `draws` (at least 2) random chains from `seed`. Work: `draws` sorted chains, N + 1 SIRs each.
 pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut places = vec![0.0; scene.relays.len()];

@@ -1,4 +1,4 @@
-//! `cargo image`: what a board is flashed with, as `.bin`, `.hex` and `.uf2`.
+//! `cargo image`: flash images of a board as `.bin`, `.hex` and `.uf2`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -10,20 +10,20 @@ use uav_relay_tools::image::elf::{Piece, flat, pieces};
 use uav_relay_tools::image::{hex, uf2};
 use uav_relay_tools::provision::config::LEN;
 
-/// Builds the image of a board, or takes a configuration block, and writes it as .bin and .hex, for the Pico 2 as .uf2 too.
+/// Builds a board's image, or converts a configuration block, to .bin and .hex, for the Pico 2 also to .uf2.
 #[derive(Parser, Debug)]
 #[command(name = "image", bin_name = "cargo image", disable_version_flag = true)]
 struct Options {
-    /// Which board: stm32f405, stm32f405-embassy, nucleo-f446re or pico2
+    /// Board: stm32f405, stm32f405-embassy, nucleo-f446re or pico2
     #[arg(long, value_name = "B", value_parser = board)]
     board: Board,
-    /// The image with one UART to a radio that all relays share; otherwise one to each neighbour
+    /// Build the image for one UART to a radio that all relays share; otherwise one UART to each neighbour
     #[arg(long)]
     radio: bool,
-    /// Nothing is built: a block of `cargo provision`, for the place that the board has for it
+    /// Convert this block of `cargo provision`, for the board's block address, and build nothing
     #[arg(long, value_name = "FILE", conflicts_with = "radio")]
     block: Option<PathBuf>,
-    /// The folder for the files
+    /// Output folder
     #[arg(long, value_name = "DIR", default_value = "target/images")]
     out: PathBuf,
 }
@@ -73,7 +73,6 @@ fn write(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The image that cargo builds.
 fn of_image(board: &Board, radio: bool) -> Result<(String, Vec<Piece>), String> {
     let (arguments, elf) = board.build(radio);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -93,7 +92,6 @@ fn of_image(board: &Board, radio: bool) -> Result<(String, Vec<Piece>), String> 
     Ok((board.stem(radio), pieces(&bytes)?))
 }
 
-/// A block that has been written before.
 fn of_block(board: &Board, block: &Path) -> Result<(String, Vec<Piece>), Failure> {
     let named = |what: String| Failure::input(format!("--block {}: {what}", block.display()));
     let bytes = std::fs::read(block).map_err(|error| named(error.to_string()))?;

@@ -1,4 +1,4 @@
-//! Algorithm 2: the shape of the chain and its SIR, round by round.
+//! Algorithm 2: positions of the relays and SIR of the chain by round.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,49 +10,49 @@ use super::paper;
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 
-/// Relays of the chain.
+/// Number of relays.
 pub const RELAYS: u16 = 50;
 
-/// Altitude they begin at, m.
+/// Initial altitude, m.
 pub const START_M: f64 = 220.0;
 
-/// How far a relay may go up or down in one round, m.
+/// Largest change of altitude per round, m.
 pub const EXPLORE_M: f32 = 10.0;
 
-/// The rounds after which the chain is drawn.
+/// Rounds after which the chain is drawn.
 pub const ROUNDS: [u16; 4] = [0, 10, 50, 500];
 
-/// The grid beside the search from coarse to fine.
+/// Grid search, for comparison with the coarse-to-fine search.
 pub const GRID: Local = Local::Grid {
     columns: 41,
     rows: 21,
 };
 
-/// A relay after so many rounds.
+/// Position of a relay after a number of rounds.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct ShapeRow {
-    /// Rounds of Algorithm 2.
+    /// Number of rounds of Algorithm 2.
     pub round: u16,
     /// Index of the relay, from 1.
     pub relay: u16,
-    /// Its place, m from Tx.
+    /// Position, m from Tx.
     pub x_m: f32,
-    /// Its altitude, m.
+    /// Altitude, m.
     pub altitude_m: f32,
 }
 
-/// The chain after one round.
+/// SIR of the chain after one round.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RoundRow {
-    /// Which round; 0 is Algorithm 1's chain.
+    /// Round number; 0 is the chain of Algorithm 1.
     pub round: u16,
-    /// SIR of the worst hop, each relay searching from coarse to fine, linear.
+    /// SIR of the worst hop with the coarse-to-fine search, linear.
     pub sir_fine_linear: f32,
-    /// The same, each relay searching a grid of 41 by 21, linear.
+    /// SIR of the worst hop with the 41 by 21 grid, linear.
     pub sir_grid_linear: f32,
 }
 
-/// Algorithm 2 for `relays` relays from `altitude_m` on, under the interferer at (500, 150) m.
+/// Runs Algorithm 2 for `relays` relays from `altitude_m` on, with the interferer at (500, 150) m.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -77,7 +77,7 @@ fn mission(relays: u16, altitude_m: f64) -> Result<Mission, Trouble> {
     paper::flown(&paper::altitudes(150.0, altitude_m), relays)
 }
 
-/// The relays after each of these numbers of rounds.
+/// Returns the relays' positions after each of these numbers of rounds.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -100,7 +100,7 @@ pub fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, Trouble> {
     Ok(chains?.concat())
 }
 
-/// The SIR after each of `rounds` rounds at most; a search that has ended holds what it has.
+/// Returns the SIR after each round up to `rounds`; a search that has ended keeps its last SIR.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -141,7 +141,7 @@ fn taken() -> Vec<String> {
     ]
 }
 
-/// The horizontal steps at the head, in the middle and at the tail after so many rounds, in words.
+/// Describes the horizontal spacing at the head, middle and tail after a number of rounds.
 fn steps(rows: &[ShapeRow], round: u16) -> String {
     let x = |relay: u16| {
         let mut of = rows.iter().filter(|row| row.round == round);
@@ -151,7 +151,7 @@ fn steps(rows: &[ShapeRow], round: u16) -> String {
     format!("{head:.1} m, {middle:.1} m and {tail:.1} m for k = {round}")
 }
 
-/// The figure of the shapes.
+/// Returns the figure of the positions.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].
@@ -200,7 +200,7 @@ pub fn shapes_sheet() -> Result<Sheet, Trouble> {
     })
 }
 
-/// The figure of the SIR by round.
+/// Returns the figure of the SIR by round.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

@@ -1,4 +1,4 @@
-//! The SIR of a chain whose relays share one altitude, by that altitude.
+//! SIR of a chain at a common altitude, as a function of that altitude.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,32 +10,32 @@ use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 use super::{convergence, paper, walk};
 
-/// Relays of the chain.
+/// Number of relays.
 pub const RELAYS: u16 = 50;
 
-/// Offsets of the interferer from the line, m.
+/// Lateral offsets of the interferer, m.
 pub const OFFSETS_M: [f64; 5] = [100.0, 150.0, 200.0, 300.0, 400.0];
 
-/// The offset of the paper's curve from which it takes h = 220 m.
+/// Offset of the paper's curve from which it reads h = 220 m.
 pub const PAPERS_OFFSET_M: f64 = 150.0;
 
-/// One altitude under one interferer.
+/// SIR at one altitude with one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
-    /// Offset of the interferer from the line, m.
+    /// Lateral offset of the interferer, m.
     pub interferer_y_m: f64,
     /// Common altitude, m.
     pub altitude_m: f64,
     /// SIR of the worst hop by Algorithm 1, linear.
     pub sir_linear: f64,
-    /// The same with the paper's step of 0.1, linear; worked out where the paper reads its best altitude.
+    /// SIR with the paper's step of 0.1, linear; only near the paper's best altitude.
     pub sir_by_step_linear: Option<f64>,
 }
 
-/// The altitudes about the best one of the paper's curve, m, that are worked out in steps of 0.5 m.
+/// Altitude range around the paper's best one that is computed in steps of 0.5 m, m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
-/// The chain for each pair of an interferer's offset, m, and an altitude, m, 10 to 500.
+/// Computes the chain for each pair of an interferer offset, m, and an altitude, m, 10 to 500.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -43,7 +43,7 @@ pub fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, Trouble> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
-/// Every altitude that is drawn: 5 m apart for each offset, and closer about the best of the paper's curve.
+/// Returns the pairs that are drawn: 5 m apart per offset, denser around the paper's best altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -80,9 +80,9 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, Trouble> {
     })
 }
 
-/// The altitude, m, and the SIR, linear, that are best for `relays` relays under an interferer at (500, `y_m`) m, between 20 m and 300 m.
+/// Returns the best common altitude, m, and SIR, linear, with an interferer at (500, `y_m`) m, 20 m to 300 m.
 ///
-/// Every 5 m, and then by thirds about the best of those, to 0.1 m, where that gains more than the tolerance of a chain.
+/// Scans every 5 m, then refines to 0.1 m by ternary search if that gains more than the tolerance of a chain.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -116,7 +116,7 @@ pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), Trouble> {
     }
     let middle = f64::midpoint(low, high);
     let between = sir(middle)?;
-    // A gain that the tolerance of a chain may have made is none.
+    // A gain within the tolerance of a chain is ignored.
     Ok(if between > best.1 * (1.0 + 2.0 * paper::FINE) {
         (middle, between)
     } else {
@@ -124,7 +124,6 @@ pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), Trouble> {
     })
 }
 
-/// Where the paper reads its best altitude, with its step and without.
 fn close_up(rows: &[Row]) -> Panel {
     let (low, high) = (f64::from(CLOSE_UP_M.0), f64::from(CLOSE_UP_M.1));
     let near = || {
@@ -149,7 +148,7 @@ fn close_up(rows: &[Row]) -> Panel {
     }
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

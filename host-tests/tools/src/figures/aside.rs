@@ -1,4 +1,4 @@
-//! A single relay that may go beside the line: where it goes as the room grows, and what side and altitude are worth.
+//! One relay beside the line: its best position by lateral room, and the gain of lateral and vertical freedom.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -17,49 +17,48 @@ pub const RELAY_W: f64 = 0.5;
 /// Lowest and highest altitude, m.
 pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
 
-/// Offsets of the interferer whose places are drawn, m.
+/// Interferer offsets in the figure of positions, m.
 pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
 
-/// The most room to each side, m.
+/// Largest lateral room to each side, m.
 pub const MOST_ROOM_M: u16 = 400;
 
-/// From one room to the next, m.
 const ROOM_STEP_M: u16 = 4;
 
-/// The room to each side that the gain is drawn for, m: as far as the altitude goes up.
+/// Lateral room in the figure of the gain, m: as large as the highest altitude.
 pub const ROOM_M: f64 = 300.0;
 
-/// The offset of the interferer up to which the gain is drawn, m, and its step.
+/// Largest interferer offset in the figure of the gain, m, and its step.
 const MOST_OFFSET_M: u16 = 400;
 const OFFSET_STEP_M: u16 = 5;
 
-/// The best place with some room.
+/// Best position for one lateral room.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Offset of the interferer, m.
     pub interferer_y_m: f64,
     /// Room to each side, m.
     pub room_m: f64,
-    /// Its place along the line, m from Tx.
+    /// Position along the line, m from Tx.
     pub x_m: f32,
-    /// Across it, m.
+    /// Lateral position, m.
     pub y_m: f32,
     /// SIR of the worse hop, linear.
     pub sir_linear: f32,
 }
 
-/// What side and altitude are worth under one interferer.
+/// SIR with and without lateral and vertical freedom, for one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct PowerRatio {
     /// Offset of the interferer, m.
     pub interferer_y_m: f64,
-    /// SIR right above the line at the lowest altitude, linear.
+    /// SIR above the line at the lowest altitude, linear.
     pub line_sir_linear: f32,
-    /// The same with the altitude free, linear.
+    /// SIR above the line at a free altitude, linear.
     pub altitude_sir_linear: f32,
-    /// With the side free at the lowest altitude, linear.
+    /// SIR with free lateral position at the lowest altitude, linear.
     pub side_sir_linear: f32,
-    /// With both free, linear.
+    /// SIR with both free, linear.
     pub both_sir_linear: f32,
     /// Altitude with both free, m.
     pub both_altitude_m: f32,
@@ -83,7 +82,7 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, Trouble> {
     Ok(found)
 }
 
-/// The best places at the lowest altitude for each offset, every `step_m` of room.
+/// Returns the best positions at the lowest altitude for each offset, every `step_m` of room.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -106,7 +105,7 @@ pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
     Ok(rows)
 }
 
-/// What side and altitude are worth, every `step_m` of the interferer's offset.
+/// Returns the SIRs with and without lateral and vertical freedom, every `step_m` of the interferer's offset.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -137,7 +136,7 @@ fn taken() -> Vec<String> {
     )]
 }
 
-/// The figure of the places.
+/// Returns the figure of the positions.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].
@@ -191,7 +190,7 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
     })
 }
 
-/// The figure of the gain.
+/// Returns the figure of the gain.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

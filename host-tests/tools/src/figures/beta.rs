@@ -1,4 +1,4 @@
-//! The paper's figure of Beta distributions: what the interference power, as a part of its largest value, may look like.
+//! The paper's figure of Beta distributions of the interference power relative to its maximum.
 
 use libm::lgamma;
 use serde::Serialize;
@@ -8,28 +8,28 @@ use super::chart::{Axis, Chart, Line, Look};
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 
-/// The shapes that are drawn, alpha and beta.
+/// Shape parameters alpha and beta.
 pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];
 
 /// Steps along the axis from 0 to 1.
 pub const STEPS: u32 = 100;
 
-/// One point of one density.
+/// A point of a density.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
-    /// First shape.
+    /// First shape parameter.
     pub alpha: f64,
-    /// Second shape.
+    /// Second shape parameter.
     pub beta: f64,
-    /// E[`I_max` / I], as relays take it: Upsilon times `I_max`.
+    /// E[`I_max` / I] as used by relays: Upsilon times `I_max`.
     pub upsilon_times_i_max: f64,
     /// I / `I_max`, 0 to 1.
     pub interference_over_i_max: f64,
-    /// Probability density there.
+    /// Probability density.
     pub density: f64,
 }
 
-/// The densities at `steps` + 1 places each, from 0 to 1.
+/// Returns the densities at `steps` + 1 points each, from 0 to 1.
 pub fn data(steps: u32) -> Vec<Row> {
     let mut rows = Vec::new();
     for (alpha, beta) in SHAPES {
@@ -50,13 +50,13 @@ pub fn data(steps: u32) -> Vec<Row> {
     rows
 }
 
-/// y^(alpha - 1) (1 - y)^(beta - 1) / B(alpha, beta); both shapes above 1.
+/// Returns y^(alpha - 1) (1 - y)^(beta - 1) / B(alpha, beta); both shape parameters above 1.
 fn density(alpha: f64, beta: f64, y: f64) -> f64 {
     let scale = lgamma(alpha + beta) - lgamma(alpha) - lgamma(beta);
     scale.exp() * y.powf(alpha - 1.0) * (1.0 - y).powf(beta - 1.0)
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

@@ -1,86 +1,86 @@
-//! What a chart shows, before it is drawn: panels one above the other, their axes and lines.
+//! Description of a chart before it is drawn: panels, axes and lines.
 
 use super::scale::{Kind, Scale};
 
-/// Panels one above the other that share one legend.
+/// Panels, stacked vertically, that share one legend.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Chart {
-    /// From top to bottom.
+    /// Panels from top to bottom.
     pub panels: Vec<Panel>,
 }
 
-/// One pair of axes, and what is drawn between them.
+/// A pair of axes and its lines.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Panel {
-    /// What distinguishes it from the other panels; empty for a chart of one.
+    /// Heading that distinguishes the panel; empty for a single panel.
     pub heading: String,
-    /// The horizontal axis.
+    /// Horizontal axis.
     pub x: Axis,
-    /// The vertical axis.
+    /// Vertical axis.
     pub y: Axis,
-    /// The lines; later ones lie above.
+    /// Lines; later ones are drawn on top.
     pub lines: Vec<Line>,
 }
 
-/// What an axis measures.
+/// An axis.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Axis {
     /// Quantity and unit.
     pub title: String,
-    /// How values go along it.
+    /// Linear or logarithmic.
     pub kind: Kind,
-    /// Its ends; where there are none, those of what it has to hold.
+    /// End values; `None` to fit the data.
     pub ends: Option<(f64, f64)>,
 }
 
-/// Points, joined or not.
+/// A series of points.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Line {
-    /// What the legend says; lines of one name have one entry, with the look of the first.
+    /// Name in the legend; lines of the same name share one entry, with the look of the first.
     pub name: String,
-    /// How it is told from the others.
+    /// Colour, stroke and signs.
     pub look: Look,
-    /// Finite numbers, in the order in which they are joined.
+    /// Points, all finite, in drawing order.
     pub points: Vec<(f64, f64)>,
 }
 
-/// How a line looks: each of these differs between the lines of a chart, so that none of them alone has to be seen.
+/// Look of a line. Lines of a chart differ in every field, so that no single one has to be recognised.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
-    /// Which colour, and which sign with it: 0 to 6.
+    /// Index of the colour and its sign, 0 to 6.
     pub hue: usize,
-    /// How the points are joined.
+    /// Stroke between the points.
     pub stroke: Stroke,
-    /// Which points have a sign.
+    /// Points that have a sign.
     pub signs: Signs,
 }
 
-/// Which points of a line have the sign of its colour.
+/// Which points of a line have a sign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signs {
-    /// None.
+    /// Draws no signs.
     None,
-    /// Every one.
+    /// Every point.
     All,
-    /// Some, well apart in the picture, and the last.
+    /// Points well apart in the picture, and the last one.
     Spaced,
 }
 
-/// How points are joined.
+/// Stroke between points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Stroke {
-    /// Not at all.
+    /// Draws only the signs.
     None,
-    /// A full line.
+    /// Solid line.
     Full,
-    /// A line of dashes.
+    /// Dashed line.
     Dashed,
-    /// A line of dots.
+    /// Dotted line.
     Dotted,
 }
 
 impl Axis {
-    /// An even axis.
+    /// Creates a linear axis.
     pub fn linear(title: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -89,7 +89,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis.
+    /// Creates a logarithmic axis.
     pub fn log(title: &str) -> Self {
         Self {
             kind: Kind::Log,
@@ -97,7 +97,7 @@ impl Axis {
         }
     }
 
-    /// The same, from `from` to `to`.
+    /// Sets the end values.
     pub fn between(self, from: f64, to: f64) -> Self {
         Self {
             ends: Some((from, to)),
@@ -105,7 +105,6 @@ impl Axis {
         }
     }
 
-    /// The axis as it is drawn, for `values`.
     pub(super) fn scale(&self, values: impl Iterator<Item = f64> + Clone) -> Scale {
         if let Some((from, to)) = self.ends {
             return Scale::new(self.kind, from, to);
@@ -117,7 +116,7 @@ impl Axis {
 }
 
 impl Look {
-    /// The look of the line number `index` of several: colour, sign and stroke change from one to the next.
+    /// Returns look number `index`: colour, sign and stroke change from one to the next.
     pub const fn number(index: usize) -> Self {
         let stroke = match index % 3 {
             0 => Stroke::Full,
@@ -131,7 +130,7 @@ impl Look {
         }
     }
 
-    /// The same with signs well apart.
+    /// Draws signs well apart.
     pub const fn spaced(self) -> Self {
         Self {
             signs: Signs::Spaced,
@@ -139,7 +138,7 @@ impl Look {
         }
     }
 
-    /// The same without a sign.
+    /// Draws no signs.
     pub const fn unsigned(self) -> Self {
         Self {
             signs: Signs::None,
@@ -147,14 +146,14 @@ impl Look {
         }
     }
 
-    /// The same with its points joined like that.
+    /// Sets the stroke.
     pub const fn joined(self, stroke: Stroke) -> Self {
         Self { stroke, ..self }
     }
 }
 
 impl Line {
-    /// A line through `points`.
+    /// Creates a line through `points`.
     pub fn new(name: &str, look: Look, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self {
             name: name.to_owned(),
@@ -165,7 +164,7 @@ impl Line {
 }
 
 impl Chart {
-    /// A chart of one panel.
+    /// Creates a chart with one panel.
     pub fn of(x: Axis, y: Axis, lines: Vec<Line>) -> Self {
         Self {
             panels: vec![Panel {
@@ -177,7 +176,7 @@ impl Chart {
         }
     }
 
-    /// Whether every number in it is finite, and above 0 where it goes on a logarithmic axis.
+    /// Returns true if all numbers are finite, and positive on logarithmic axes.
     pub fn is_drawable(&self) -> bool {
         let fits = |axis: &Axis, value: f64| {
             value.is_finite() && (axis.kind == Kind::Linear || value > 0.0)

@@ -1,4 +1,4 @@
-//! Algorithm 1 with the paper's step: the SIR of the chain while the target comes down.
+//! Algorithm 1 with the paper's step: SIR of the chain by sweep.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -8,26 +8,26 @@ use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 use super::{paper, walk};
 
-/// The chains that are drawn.
+/// Numbers of relays.
 pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 
-/// The paper's step, linear SIR.
+/// The paper's step of the target SIR, linear.
 pub const STEP: f64 = 0.1;
 
-/// One sweep of one chain.
+/// SIR of a chain after one sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Number of relays.
     pub relays: u16,
-    /// Which sweep, from 1.
+    /// Number of the sweep, from 1.
     pub sweep: u32,
-    /// SIR that every hop is asked to meet, linear.
+    /// Target SIR of every hop, linear.
     pub target_linear: f32,
-    /// SIR of the worst hop with the relays as far as the target lets them, linear.
+    /// SIR of the worst hop with the relays as far toward Rx as the target allows, linear.
     pub sir_linear: f64,
 }
 
-/// The sweeps of each of these chains until it settles; of the thousands those that a picture needs.
+/// Returns the sweeps of each chain until it settles, thinned out for drawing.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -54,7 +54,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, Trouble> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Every hundredth sweep, every tenth of the last thousand, and the last twenty.
+/// Keeps every hundredth sweep, every tenth of the last thousand, and the last twenty.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()
@@ -69,7 +69,7 @@ fn thinned(rows: &[Row]) -> Vec<Row> {
         .collect()
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

@@ -1,4 +1,4 @@
-//! What it costs a chain to settle: passes, messages and bytes, by the number of relays.
+//! Cost of settling a chain: passes, messages and bytes by number of relays.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,41 +11,41 @@ use super::trouble::Trouble;
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 
-/// The chains that are flown.
+/// Numbers of relays.
 pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];
 
-/// One chain.
+/// Cost for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Number of relays.
     pub relays: u16,
-    /// Passes of the paper's schedule with its step of 0.1.
+    /// Passes with the paper's step of 0.1.
     pub step_sweeps: u32,
-    /// Frames it puts on the links.
+    /// Frames sent with the paper's step.
     pub step_messages: u64,
-    /// Bytes of them.
+    /// Bytes sent with the paper's step.
     pub step_bytes: u64,
-    /// SIR it ends with, linear.
+    /// Final SIR with the paper's step, linear.
     pub step_sir_linear: f64,
-    /// Passes of bracketed targets, nothing known beforehand.
+    /// Passes with bracketed targets, without prediction.
     pub bracketed_sweeps: u32,
-    /// Frames they put on the links.
+    /// Frames sent with bracketed targets.
     pub bracketed_messages: u64,
-    /// Bytes of them.
+    /// Bytes sent with bracketed targets.
     pub bracketed_bytes: u64,
-    /// SIR they end with, linear.
+    /// Final SIR with bracketed targets, linear.
     pub bracketed_sir_linear: f64,
-    /// Passes where the head first solves the chain from the mission.
+    /// Passes if the leader first solves the chain from the mission.
     pub predicted_sweeps: u32,
-    /// Frames they put on the links.
+    /// Frames sent with prediction.
     pub predicted_messages: u64,
-    /// Bytes of them.
+    /// Bytes sent with prediction.
     pub predicted_bytes: u64,
-    /// SIR they end with, linear.
+    /// Final SIR with prediction, linear.
     pub predicted_sir_linear: f64,
 }
 
-/// These chains, flown three times each.
+/// Simulates each chain with the three schedules.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -83,7 +83,6 @@ fn row(relays: u16) -> Result<Row, Trouble> {
     })
 }
 
-/// A panel with the three ways; what costs nothing has no place on its axis.
 fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     let names = [
         "paper's step of 0.1",
@@ -105,7 +104,7 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     }
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

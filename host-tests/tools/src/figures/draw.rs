@@ -1,4 +1,4 @@
-//! A chart as an SVG document, for half a page: on 8 cm of paper its smallest letters are 6.5 points high.
+//! Draws a chart as SVG for half a page: at a width of 8 cm the smallest letters are 6.5 points high.
 
 use std::fmt::Display;
 
@@ -10,35 +10,26 @@ use super::chart::{Chart, Line, Look, Panel, Signs, Stroke};
 use super::scale::Scale;
 use super::signs::{self, Sign};
 
-/// Width of every picture, in its own units: 960 of them are 8 cm.
 const WIDTH: u32 = 960;
-/// Height of one panel, its axis titles included.
 const PANEL: u32 = 560;
-/// Height of a panel among several.
 const PANEL_OF_SEVERAL: u32 = 470;
-/// Height of one row of the legend.
 const ROW: u32 = 44;
-/// Above and below the legend.
 const GAP: u32 = 10;
-/// Width that a letter takes, about.
 const LETTER: u32 = 17;
-/// From the beginning of an entry of the legend to its words.
 const SAMPLE: u32 = 104;
 
 const FONT: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
-/// The backend takes a factor of 1.24 off.
+/// Font size; the backend divides it by 1.24.
 const LETTERS: f64 = 28.0 * 1.24;
 const INK: RGBColor = RGBColor(34, 34, 34);
 const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
-/// Width of a line, in units.
 const PEN: u32 = 4;
-/// From one sign of a line to the next where they are spaced, in units.
 const APART: f64 = 105.0;
-/// How much later the signs of each further line begin, in units.
+/// Offset of the first sign per hue, units.
 const APART_BY_HUE: u8 = 25;
 
-/// Why a chart could not be drawn, in the words of the backend.
+/// Error message of the drawing backend.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NotDrawn(pub String);
 
@@ -48,10 +39,10 @@ impl NotDrawn {
     }
 }
 
-/// Draws `chart`, whose `title` a screen reader says.
+/// Draws `chart` as SVG; `title` is for screen readers.
 ///
 /// # Errors
-/// [`NotDrawn`] where the backend fails, or a number does not belong on its axis.
+/// [`NotDrawn`] if the backend fails, or a number does not fit its axis.
 pub fn draw(chart: &Chart, title: &str) -> Result<String, NotDrawn> {
     if !chart.is_drawable() {
         return Err(NotDrawn("a number does not belong on its axis".to_owned()));
@@ -151,14 +142,13 @@ fn draw_line(plot: &mut Plot<'_, '_>, line: &Line) -> Result<(), NotDrawn> {
     Ok(())
 }
 
-/// The points of a line that have a sign.
 fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
     match line.look.signs {
         Signs::None => Vec::new(),
         Signs::All => line.points.clone(),
         Signs::Spaced => {
             let mut signed = Vec::new();
-            // Lines that lie on each other begin apart, so that their signs do.
+            // Different offsets per hue keep the signs of overlapping lines apart.
             let mut since =
                 APART - f64::from(APART_BY_HUE * u8::try_from(line.look.hue).unwrap_or(0));
             let mut before: Option<(i32, i32)> = None;
@@ -181,7 +171,7 @@ fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
     }
 }
 
-/// Length of a dash and of the gap behind it, in units; no gap for a full line.
+/// Returns the lengths of a dash and of the gap after it, units; no gap for a solid line.
 const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     match stroke {
         Stroke::None => None,
@@ -191,7 +181,7 @@ const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     }
 }
 
-/// The names of all lines, each once, with the look of the first of that name.
+/// Returns the legend entries: each name once, with the look of its first line.
 fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     let mut entries: Vec<(&str, Look)> = Vec::new();
     for line in chart.panels.iter().flat_map(|panel| &panel.lines) {
@@ -202,7 +192,6 @@ fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     entries
 }
 
-/// How many entries of the legend go side by side.
 fn columns(entries: &[(&str, Look)]) -> usize {
     let letters = entries.iter().map(|(name, _)| name.chars().count()).max();
     let widest = SAMPLE + LETTER * u32::try_from(letters.unwrap_or(0)).unwrap_or(0);
@@ -248,7 +237,6 @@ fn draw_legend(area: &Area<'_>, entries: &[(&str, Look)], columns: usize) -> Res
     Ok(())
 }
 
-/// The document with what it shows in words, for those who cannot see it.
 fn with_title(svg: &str, title: &str) -> String {
     let title = title.replace('&', "&amp;").replace('<', "&lt;");
     match svg.split_once(">\n") {

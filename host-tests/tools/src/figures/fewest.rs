@@ -1,4 +1,4 @@
-//! The fewest relays for a target SIR, by where the interferer stands and by the power of the relays.
+//! Fewest relays for a target SIR, by position of the interferer and by power of the relays.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,10 +10,10 @@ use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
-/// The most that is asked for, linear SIR: every whole number from 1 to this.
+/// Largest target, linear SIR; every whole number from 1 to it is computed.
 pub const MOST_TARGET: u16 = 40;
 
-/// Places of the interferer, X and Y, m.
+/// Positions of the interferer, X and Y, m.
 pub const PLACES_M: [(f64, f64); 6] = [
     (500.0, 400.0),
     (100.0, 400.0),
@@ -26,22 +26,22 @@ pub const PLACES_M: [(f64, f64); 6] = [
 /// Powers of the relays, W.
 pub const POWERS_W: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
 
-/// One target in one scenario.
+/// Result for one target in one scenario.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
-    /// Place of the interferer along x, m.
+    /// Position of the interferer along x, m.
     pub interferer_x_m: f64,
-    /// Its offset, m.
+    /// Lateral offset of the interferer, m.
     pub interferer_y_m: f64,
     /// Power of each relay, W.
     pub relay_w: f64,
-    /// SIR that is asked for, linear.
+    /// Target SIR, linear.
     pub target_linear: u16,
-    /// The fewest relays that reach it, if any number does.
+    /// Fewest relays that reach it, if any number does.
     pub relays: Option<u16>,
 }
 
-/// The fewest relays for each of `targets` and each of the interferer's places, relays of 1 W.
+/// Returns the fewest relays by target and position of the interferer, with relays of 1 W.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -49,7 +49,7 @@ pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
     rows(targets, &PLACES_M.map(|place| (place, 1.0)))
 }
 
-/// The fewest relays for each of `targets` and each of their powers, the interferer at (500, 400) m.
+/// Returns the fewest relays by target and power of the relays, with the interferer at (500, 400) m.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -84,7 +84,6 @@ fn all_targets() -> Vec<u16> {
     (1..=MOST_TARGET).collect()
 }
 
-/// The lines of the scenarios that `name` tells apart.
 fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     let mut lines: Vec<Line> = Vec::new();
     for row in rows {
@@ -107,7 +106,7 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     )
 }
 
-/// The figure by place.
+/// Returns the figure by position of the interferer.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].
@@ -146,7 +145,7 @@ pub fn by_place_sheet() -> Result<Sheet, Trouble> {
     })
 }
 
-/// The figure by power.
+/// Returns the figure by power of the relays.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

@@ -1,4 +1,4 @@
-//! A simulated chain that runs the code of the relays, message by message.
+//! Simulated chain that runs the relays' code, message by message.
 
 use uav_relay::{Method, Mission, Placement, Schedule};
 
@@ -8,10 +8,10 @@ use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// What a settled chain came to.
+/// Result of a settled chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
-    /// Where the relays stand, from Tx to Rx.
+    /// Positions from Tx to Rx.
     pub places: Vec<Placement>,
     /// SIR of the worst hop, linear.
     pub sir: f64,
@@ -19,13 +19,13 @@ pub struct Flown {
     pub rounds: Vec<f32>,
     /// Passes along the chain.
     pub sweeps: u32,
-    /// Frames put on any link.
+    /// Frames sent on all links.
     pub messages: u64,
-    /// Bytes put on any link.
+    /// Bytes sent on all links.
     pub bytes: u64,
 }
 
-/// Runs `mission` to the end; `predict` is whether the head first solves the chain for itself.
+/// Simulates `mission` until it settles; `predict` lets the leader first solve the chain itself.
 ///
 /// # Errors
 /// [`Trouble::Setup`] or [`Trouble::Unsettled`].

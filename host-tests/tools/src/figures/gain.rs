@@ -1,4 +1,4 @@
-//! What the chain of Algorithm 1 gains over relays at random, and over relays that know nothing of the interferer.
+//! Gain of Algorithm 1 over random, interference-blind and equally spaced relays.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,36 +11,36 @@ use crate::baseline::random::{DRAWS, mean};
 use crate::baseline::{blind, equal};
 use uav_relay_scenario::scene::Scene;
 
-/// The chains that are drawn: every N from 1 to this.
+/// Largest number of relays; every N from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 100;
 
-/// Seed of the random chains; each N has its own, this one plus N.
+/// Seed of the random chains; N relays use this seed plus N.
 pub const SEED: u64 = 1000;
 
-/// One chain.
+/// SIRs and gains for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Number of relays.
     pub relays: u16,
     /// SIR of the worst hop by Algorithm 1, linear.
     pub sir_linear: f64,
-    /// Mean of it over random chains, linear.
+    /// Mean SIR of the worst hop over random chains, linear.
     pub random_sir_linear: f64,
     /// Standard error of that mean, linear.
     pub random_error_linear: f64,
-    /// That of the chain that sees no interference, linear.
+    /// SIR of the worst hop of the interference-blind chain, linear.
     pub blind_sir_linear: f64,
-    /// That of relays at equal distances, linear.
+    /// SIR of the worst hop with equal spacing, linear.
     pub equal_sir_linear: f64,
-    /// PowerRatio over the random mean, percent.
+    /// Gain over the random mean, percent.
     pub gain_over_random_percent: f64,
-    /// PowerRatio over the blind chain, percent.
+    /// Gain over the blind chain, percent.
     pub gain_over_blind_percent: f64,
-    /// PowerRatio over equal distances, percent.
+    /// Gain over equal spacing, percent.
     pub gain_over_equal_percent: f64,
 }
 
-/// The chains of these numbers of relays, against the mean of `draws` random ones.
+/// Returns the results for these numbers of relays, against the mean of `draws` random chains.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -72,7 +72,7 @@ fn row(relays: u16, draws: u32) -> Result<Row, Trouble> {
     })
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

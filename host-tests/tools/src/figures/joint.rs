@@ -1,4 +1,4 @@
-//! Altitudes: the best common one, Algorithm 2 from there, and places and altitudes chosen jointly.
+//! Comparison of the best common altitude, Algorithm 2 from there, and the joint method.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -12,41 +12,40 @@ use super::paper;
 use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 
-/// The chains that are flown.
+/// Numbers of relays.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
 
 /// Rounds of Algorithm 2.
 pub const ROUNDS: u16 = 500;
 
-/// Offset of the interferer from the line, m.
 const OFFSET_M: f64 = 150.0;
 
-/// One chain.
+/// Results for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Number of relays.
     pub relays: u16,
-    /// Best altitude that all share, m.
+    /// Best common altitude, m.
     pub common_altitude_m: f64,
-    /// SIR there by Algorithm 1, linear.
+    /// SIR at the best common altitude by Algorithm 1, linear.
     pub common_sir_linear: f64,
     /// SIR after Algorithm 2 from there, linear.
     pub adjust_sir_linear: f64,
     /// Messages of both algorithms together.
     pub adjust_messages: u64,
-    /// SIR of places and altitudes chosen jointly, linear.
+    /// SIR of the joint method, linear.
     pub joint_sir_linear: f64,
-    /// Passes until they are.
+    /// Passes of the joint method.
     pub joint_passes: u32,
-    /// Messages until they are.
+    /// Messages of the joint method.
     pub joint_messages: u64,
-    /// PowerRatio of Algorithm 2 over the common altitude, percent.
+    /// Gain of Algorithm 2 over the common altitude, percent.
     pub adjust_gain_percent: f64,
-    /// PowerRatio of the joint choice over the common altitude, percent.
+    /// Gain of the joint method over the common altitude, percent.
     pub joint_gain_percent: f64,
 }
 
-/// These chains, with `rounds` rounds of Algorithm 2 at most.
+/// Returns the results for these numbers of relays, with at most `rounds` rounds of Algorithm 2.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -76,7 +75,7 @@ fn row(relays: u16, rounds: u16) -> Result<Row, Trouble> {
     })
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

@@ -1,4 +1,4 @@
-//! Lemma 1: where the two hops of a single relay have the same SIR.
+//! Lemma 1: the locus where both hops of a single relay have the same SIR.
 
 use serde::Serialize;
 use uav_relay::Mission;
@@ -10,7 +10,7 @@ use super::sheet::{Sheet, Table};
 use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
-/// Power of Tx, W, and place of the interferer, m, of each line.
+/// Power of Tx, W, and position of the interferer, m, for each line.
 pub const CHOICES: [(f64, (f64, f64)); 4] = [
     (20.0, (30.0, 30.0)),
     (20.0, (30.0, 60.0)),
@@ -21,27 +21,26 @@ pub const CHOICES: [(f64, (f64, f64)); 4] = [
 /// Distance from Tx to Rx, m.
 pub const DISTANCE_M: f64 = 35.0;
 
-/// Places along x for each metre.
 const FINENESS: u8 = 20;
 
-/// One place under one interferer.
+/// Equal-SIR altitudes at one position, with one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Power of Tx, W.
     pub tx_w: f64,
-    /// Place of the interferer along x, m.
+    /// Position of the interferer along x, m.
     pub interferer_x_m: f64,
-    /// Its offset, m.
+    /// Lateral offset of the interferer, m.
     pub interferer_y_m: f64,
-    /// Place of the relay, m from Tx.
+    /// Position of the relay, m from Tx.
     pub x_m: f32,
-    /// The lower altitude at which both hops have the same SIR, m, if there is one.
+    /// Lower altitude of equal SIR, m, if any.
     pub lower_altitude_m: Option<f32>,
-    /// The higher one, m, if there is one.
+    /// Upper altitude of equal SIR, m, if any.
     pub upper_altitude_m: Option<f32>,
 }
 
-/// The mission of one relay of 1 W.
+/// Returns the mission of one relay of 1 W.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -54,7 +53,7 @@ pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, Trouble
     paper::mission(&scenario, 1)
 }
 
-/// The altitudes at `per_m` places for each metre from Tx to Rx.
+/// Returns the altitudes at `per_m` positions per metre from Tx to Rx.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -82,7 +81,7 @@ pub fn data(per_m: u8) -> Result<Vec<Row>, Trouble> {
     Ok(rows)
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].
@@ -104,7 +103,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
         );
         let name = format!("Tx {tx_w} W, ({x_m}, {y_m}) m");
         let line = |points| Line::new(&name, Look::number(index).spaced(), points);
-        // Where there is nothing above Tx, both begin at one place between.
+        // If there is no altitude above Tx, both branches start at a common point further on.
         if upper.first().is_some_and(|first| first.0 > 0.0) {
             lines.push(line([lower.into_iter().rev().collect(), upper].concat()));
         } else {

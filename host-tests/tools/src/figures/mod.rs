@@ -1,21 +1,21 @@
-//! The paper's evaluation, computed by the code that flies, as pictures, tables and a page that shows them.
+//! The paper's evaluation, computed by the on-board code: pictures, tables and a page.
 //!
-//! Every figure is a file here with a pure `data`, which gives typed rows, and a `sheet`, which draws them. The numbers come
-//! from `uav_relay` or from the simulated chain that runs it; the baselines from [`baseline`](crate::baseline). The f64
-//! judge in `uav_relay_oracle` is what the tests hold them against.
+//! Every figure is a file with a pure `data` function, which returns typed rows, and a `sheet` function, which draws them. The
+//! numbers come from `uav_relay` or from the simulated chain that runs it; the baselines from [`baseline`](crate::baseline). The
+//! tests compare them with the independent f64 reference `uav_relay_oracle`.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
 //! | [`locus`], [`single`], [`single_gains`], [`single_sheet`], [`aside`] | one relay |
 //! | [`fewest`], [`convergence`], [`gain`], [`cost`] | chains at one altitude |
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
-//! | [`sensing`] | an interferer that nobody told of |
+//! | [`sensing`] | an unknown interferer |
 //! | [`paper`] | the paper's scenarios, as missions |
-//! | [`walk`], [`flight`] | a chain without a message, for figures that need thousands; one that is flown |
-//! | [`chart`], [`scale`], [`draw`] | what a chart shows, its axes, its SVG |
-//! | [`sheet`], [`page`] | a figure with its tables and words; the page with all of them |
-//! | [`trouble`] | why a figure could not be made |
+//! | [`walk`], [`flight`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
+//! | [`chart`], [`scale`], [`draw`] | a chart, its axes, its SVG |
+//! | [`sheet`], [`page`] | a figure with its tables and text; the page of all figures |
+//! | [`trouble`] | errors |
 
 pub mod adjust;
 pub mod altitude;
@@ -46,16 +46,16 @@ pub mod walk;
 use sheet::Sheet;
 use trouble::Trouble;
 
-/// A figure that can be made.
+/// A figure.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure {
-    /// What it is called on the command line, and its file without `.svg`.
+    /// Name on the command line, and of its file without `.svg`.
     pub name: &'static str,
-    /// Makes it.
+    /// Function that makes the figure.
     pub make: fn() -> Result<Sheet, Trouble>,
 }
 
-/// Every figure, in the order of the paper, then this project's own.
+/// The figures in the order of the paper, then this project's own.
 pub const ALL: [Figure; 16] = [
     figure("locus", locus::sheet),
     figure("single", single_sheet::sheet),

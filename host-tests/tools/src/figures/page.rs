@@ -1,4 +1,4 @@
-//! The page that shows the figures, with what was taken and found.
+//! HTML page of the figures, with their parameters and findings.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ h2{font-size:1.15rem;margin:0 0 .5rem}figcaption{max-width:46rem}p,ul{margin:.5r
 .taken{color:#555;font-size:.9rem}table{border-collapse:collapse;font-size:.85rem;margin:.7rem 0}\
 th,td{border-bottom:1px solid #ccc;padding:.15rem .7rem .15rem 0;text-align:right}th:first-child,td:first-child{text-align:left}";
 
-/// Writes a figure's picture and tables into `dir`.
+/// Writes a figure's picture and tables to `dir`.
 ///
 /// # Errors
 /// [`Trouble::Drawing`] or [`Trouble::File`].
@@ -26,7 +26,7 @@ pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), Trouble> {
     Ok(())
 }
 
-/// Writes `index.html` with these figures into `dir`; where it is.
+/// Writes `index.html` with these figures to `dir` and returns its path.
 ///
 /// # Errors
 /// [`Trouble::File`].
@@ -47,7 +47,6 @@ pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, Trouble> {
     Ok(file)
 }
 
-/// Adds the list of the figures, each a link to it.
 fn contents(html: &mut String, sheets: &[Sheet]) {
     html.push_str("<nav>\n<h2>Contents</h2>\n<ol>\n");
     for sheet in sheets {

@@ -1,4 +1,4 @@
-//! The paper's scenarios, as missions: what its table of parameters says, and nothing that it leaves out.
+//! The paper's scenarios as missions, with the parameters of its table.
 
 use uav_relay::Mission;
 
@@ -6,17 +6,16 @@ use super::trouble::Trouble;
 use uav_relay_scenario::mission;
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// Relative tolerance on the target of a chain without messages: ten times what an f32 can tell.
+/// Relative target tolerance for chains computed without messages: ten times the resolution of an f32.
 pub(super) const FINE: f64 = 1e-6;
 
-/// That of a chain that is flown, as `cargo chain` has it.
+/// Relative target tolerance for simulated chains, as in `cargo chain`.
 const FLOWN: f64 = 1e-4;
 
-/// The multi-hop scenario (fourth and fifth sub-table): D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at
-/// 20 m.
+/// Returns the multi-hop scenario (fourth and fifth sub-table).
 ///
-/// The least separation of 4 m is left out: Algorithms 1 and 4 as printed do not look at it, and at none of the optima it
-/// would bind.
+/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no least separation: Algorithms 1 and 4 as
+/// printed have none, and 4 m would not bind at any of the optima.
 pub fn multi_hop() -> Scenario {
     Scenario {
         min_separation_m: 0.0,
@@ -24,7 +23,7 @@ pub fn multi_hop() -> Scenario {
     }
 }
 
-/// The scenario of the section about altitudes: the interferer at (500, `y_m`) m, altitudes of 20 m to 300 m, 4 m apart.
+/// Returns the scenario of the section on altitudes: interferer at (500, `y_m`) m, altitudes 20 m to 300 m, 4 m apart.
 pub fn altitudes(y_m: f64, altitude_m: f64) -> Scenario {
     Scenario {
         altitude_m,
@@ -34,7 +33,7 @@ pub fn altitudes(y_m: f64, altitude_m: f64) -> Scenario {
     }
 }
 
-/// `scenario` with its interferer, of 80 W, elsewhere.
+/// Returns `scenario` with an interferer of 80 W at (`x_m`, `y_m`).
 pub fn with_interferer(scenario: Scenario, x_m: f64, y_m: f64) -> Scenario {
     Scenario {
         interference: Interference::Sources(vec![Source {
@@ -46,7 +45,7 @@ pub fn with_interferer(scenario: Scenario, x_m: f64, y_m: f64) -> Scenario {
     }
 }
 
-/// The mission of `relays` relays in `scenario`, for a chain without messages.
+/// Returns the mission of `relays` relays in `scenario`, for a chain computed without messages.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -54,7 +53,7 @@ pub fn mission(scenario: &Scenario, relays: u16) -> Result<Mission, Trouble> {
     Ok(mission::mission(scenario, relays, FINE)?.0)
 }
 
-/// The same for a chain that is flown.
+/// Returns the mission of `relays` relays in `scenario`, for a simulated chain.
 ///
 /// # Errors
 /// [`Trouble::Mission`].

@@ -1,4 +1,4 @@
-//! One axis of a chart: from a value to its place, and where its ticks are.
+//! Axis of a chart: mapping of values to positions, and ticks.
 
 use std::ops::Range;
 
@@ -6,25 +6,24 @@ use plotters::coord::ranged1d::{
     KeyPointHint, KeyPointWeight, NoDefaultFormatting, Ranged, ValueFormatter,
 };
 
-/// The most steps between the labels of an axis, about.
 const STEPS: f64 = 6.0;
 
-/// Decades of a logarithmic axis up to which 2 and 5 are labelled as well.
+/// Number of decades up to which 2 and 5 are labelled on a logarithmic axis.
 const FEW_DECADES: f64 = 2.4;
 
-/// How far a tick may be beyond an end for rounding's sake, as a part of the axis.
+/// Tolerance of ticks beyond an end, as a fraction of the axis.
 const ROUNDING: f64 = 1e-9;
 
-/// How values go along an axis.
+/// Kind of axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm; all of them above 0.
+    /// Logarithmic; all values above 0.
     Log,
 }
 
-/// An axis from one end to the other.
+/// An axis with fixed ends.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Scale {
     kind: Kind,
@@ -33,12 +32,12 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The axis from `from` to `to`, finite, `from` below `to`, and above 0 on a logarithmic one.
+    /// Creates an axis from `from` to `to`, finite, `from` < `to`, and positive on a logarithmic axis.
     pub const fn new(kind: Kind, from: f64, to: f64) -> Self {
         Self { kind, from, to }
     }
 
-    /// The axis that holds `least` to `most`, widened to the next round numbers.
+    /// Creates an axis that contains `least` to `most`, widened to the next round numbers.
     pub fn around(kind: Kind, least: f64, most: f64) -> Self {
         match kind {
             Kind::Linear => {
@@ -55,7 +54,7 @@ impl Scale {
         }
     }
 
-    /// A tick as it is labelled: the large ones of a logarithmic axis in thousands (k) and millions (M).
+    /// Returns a tick label; large numbers of a logarithmic axis in thousands (k) and millions (M).
     pub fn label(&self, value: f64) -> String {
         match self.kind {
             Kind::Log if value >= 1e6 => digits(value / 1e6) + " M",
@@ -64,7 +63,6 @@ impl Scale {
         }
     }
 
-    /// Where a value is: 0 at one end, 1 at the other.
     fn part(&self, value: f64) -> f64 {
         match self.kind {
             Kind::Linear => (value - self.from) / (self.to - self.from),
@@ -76,7 +74,6 @@ impl Scale {
         (-ROUNDING..=1.0 + ROUNDING).contains(&self.part(value))
     }
 
-    /// The values with a label, rising.
     fn ticks(&self) -> Vec<f64> {
         match self.kind {
             Kind::Linear => {
@@ -94,7 +91,6 @@ impl Scale {
         }
     }
 
-    /// The finer lines of a logarithmic axis.
     fn minor(&self) -> Vec<f64> {
         match self.kind {
             Kind::Linear => Vec::new(),
@@ -102,7 +98,7 @@ impl Scale {
         }
     }
 
-    /// These multiples of every power of ten that lie within the axis, rising.
+    /// Returns these multiples of every power of ten within the axis, rising.
     fn in_decades(&self, multiples: &[f64]) -> Vec<f64> {
         let (first, last) = (decade(self.from), decade(self.to));
         (first..=last)
@@ -112,19 +108,19 @@ impl Scale {
     }
 }
 
-/// The exponent of the power of ten at or below `value`, which is above 0.
+/// Returns the exponent of the power of ten at or below `value` > 0.
 #[expect(clippy::cast_possible_truncation, reason = "the exponent of an f64")]
 fn decade(value: f64) -> i32 {
     (value.log10() + ROUNDING).floor() as i32
 }
 
-/// The step between ticks over `span`: 1, 2 or 5 times a power of ten.
+/// Returns the step between ticks over `span`: 1, 2 or 5 times a power of ten.
 fn step(span: f64) -> f64 {
     let least = span.max(f64::MIN_POSITIVE) / STEPS;
     round_number(least * (1.0 - ROUNDING), true)
 }
 
-/// The next 1, 2 or 5 times a power of ten, not below `value` or else not above it.
+/// Rounds up or down to 1, 2 or 5 times a power of ten.
 fn round_number(value: f64, up: bool) -> f64 {
     let power = 10_f64.powi(decade(value));
     let mut candidates = [1.0, 2.0, 5.0, 10.0].map(|of| of * power).into_iter();
@@ -136,12 +132,11 @@ fn round_number(value: f64, up: bool) -> f64 {
     .unwrap_or(power)
 }
 
-/// A number without digits that say nothing.
 fn digits(value: f64) -> String {
     if value.abs() < 1e-12 {
         return "0".to_owned();
     }
-    // Four digits behind the first one are more than any step has.
+    // Four digits after the first one are more than any step has.
     let decimals = usize::try_from(4 - decade(value.abs())).unwrap_or(0);
     let text = format!("{value:.decimals$}");
     if text.contains('.') {

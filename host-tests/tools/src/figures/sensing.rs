@@ -1,4 +1,4 @@
-//! What a chain reaches that nobody told of its interferer: by agreement, and while the interferer moves.
+//! SIR of a chain that locates an unknown interferer: by agreement, and while the interferer moves.
 
 use serde::Serialize;
 
@@ -10,45 +10,45 @@ use crate::listening::found::{self, LAST, hypothetical, quantile, shadowed, shar
 use crate::listening::wild::Wild;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Random scenes of each line, and of each speed.
+/// Random scenes per line.
 pub const SCENES: u64 = 60;
-/// The same while the interferer moves.
+/// Random scenes per speed of a moving interferer.
 pub const PASSES: u64 = 6;
 
 /// Speeds of the interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// One kind of scene after one more agreement.
+/// Share of the optimum after a number of agreements.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Found {
-    /// What is flown.
+    /// Name of the kind of scene.
     pub scene: &'static str,
     /// Number of relays.
     pub relays: u16,
-    /// Agreements that followed what was heard.
+    /// Number of agreements based on measurements.
     pub agreements: usize,
-    /// Share of the optimum, linear, the median of the scenes.
+    /// Median over the scenes of the share of the optimum, linear.
     pub median_linear: f64,
-    /// The same that nine of ten scenes reach.
+    /// Share that nine of ten scenes reach, linear.
     pub tenth_linear: f64,
 }
 
-/// One speed.
+/// Mean share of the optimum for one speed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Followed {
     /// Number of relays.
     pub relays: u16,
     /// Speed of the interferer, m/s.
     pub speed_mps: f64,
-    /// Mean share of the optimum of each moment, of the chain that follows.
+    /// Mean share of the momentary optimum of the chain that tracks the interferer.
     pub followed_linear: f64,
-    /// The same of the chain that stays where it was best at first.
+    /// Mean share of the momentary optimum of the chain that keeps its first positions.
     pub stayed_linear: f64,
 }
 
 type Run = fn(&Wild) -> Result<Setup, Trouble>;
 
-/// What is flown: its name, relays, sources, how.
+/// Kinds of scene: name, relays, sources, setup.
 const KINDS: [(&str, u16, usize, Run); 6] = [
     ("3 relays, one source", 3, 1, unknown),
     ("8 relays, one source", 8, 1, unknown),
@@ -58,7 +58,7 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ("8, two sources, told the paper's", 8, 2, hypothetical),
 ];
 
-/// The share by agreement, in `scenes` scenes each.
+/// Returns the share by agreement, in `scenes` scenes each.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -79,7 +79,7 @@ pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, Trouble> {
     Ok(rows)
 }
 
-/// The share by speed, in `scenes` scenes each.
+/// Returns the share by speed, in `scenes` scenes each.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -99,7 +99,7 @@ pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, Trouble> {
     Ok(rows)
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

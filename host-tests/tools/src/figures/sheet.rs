@@ -1,4 +1,4 @@
-//! A figure that is ready to be written: its chart, its tables, and what has to be said beside them.
+//! A figure ready to be written: chart, tables and text.
 
 use std::fmt::Write as _;
 
@@ -7,39 +7,39 @@ use serde::Serialize;
 use super::chart::Chart;
 use super::trouble::Trouble;
 
-/// One figure.
+/// A figure.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sheet {
-    /// What it is called on the command line, and its file without `.svg`.
+    /// Name on the command line, and of its file without `.svg`.
     pub name: &'static str,
-    /// What it shows, in a few words.
+    /// Title.
     pub title: &'static str,
-    /// What is to be seen.
+    /// Findings, one paragraph each.
     pub says: Vec<String>,
-    /// Which parameters were taken, those among them that the paper leaves out named as such.
+    /// Parameters; those that the paper omits are marked.
     pub taken: Vec<String>,
-    /// What is drawn.
+    /// Chart.
     pub chart: Chart,
-    /// The numbers.
+    /// Tables, written as CSV files.
     pub tables: Vec<Table>,
-    /// A short table beside the chart: its head, then its rows.
+    /// Short table beside the chart: head, then rows.
     pub shown: Vec<Vec<String>>,
 }
 
-/// Rows of numbers.
+/// A table.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Table {
-    /// Its file without `.csv`.
+    /// Name of its file without `.csv`.
     pub name: &'static str,
-    /// The rows under their head, as CSV.
+    /// CSV text: head, then rows.
     pub rows: String,
 }
 
 impl Table {
-    /// The table of `rows`, whose head is the names of their fields.
+    /// Creates the table of `rows`; the head has the names of their fields.
     ///
     /// # Errors
-    /// [`Trouble::Table`] where a row is no row, [`Trouble::NotFinite`] where it holds a number that is not finite.
+    /// [`Trouble::Table`] if a row cannot be serialised, [`Trouble::NotFinite`] if a number is not finite.
     pub fn new<R: Serialize>(
         name: &'static str,
         rows: impl IntoIterator<Item = R>,
@@ -61,7 +61,7 @@ impl Table {
 }
 
 impl Sheet {
-    /// The file of `table`: what it is and what was taken, as comments, then its rows.
+    /// Returns the CSV file of `table`, with title and parameters as comments.
     pub fn csv(&self, table: &Table) -> String {
         let mut text = format!("# {}\n", self.title);
         for line in &self.taken {

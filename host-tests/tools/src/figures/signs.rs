@@ -1,10 +1,10 @@
-//! Colours that colour-blind eyes tell apart, and a sign for each, so that print without colours does too.
+//! Colours that colour-blind readers can distinguish, each with a sign for print without colours.
 
 use plotters::element::{Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters_backend::{BackendCoord, DrawingErrorKind};
 
-/// The palette of Okabe and Ito, darkest first; yellow, which paper swallows, left out.
+/// Palette of Okabe and Ito, darkest first, without yellow, which is faint on paper.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),
@@ -15,16 +15,15 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
 ];
 
-/// Half the size of a sign, in units of the picture.
 const SIZE: i32 = 9;
 
-/// The colour number `hue`, from the start again after the seventh.
+/// Returns colour number `hue`, modulo the palette.
 pub(super) fn colour(hue: usize) -> RGBColor {
     let [black, ..] = COLOURS;
     COLOURS.get(hue % COLOURS.len()).copied().unwrap_or(black)
 }
 
-/// The sign of colour `hue` at a place: disc, square, diamond, triangle, cross, ring, triangle upside down.
+/// The sign of a hue: disc, square, diamond, triangle, cross, ring, inverted triangle.
 pub(super) struct Sign<C> {
     pub(super) at: C,
     pub(super) hue: usize,

@@ -1,4 +1,4 @@
-//! A single relay at its best place (Theorem 1), against a random place and one that knows nothing of the interferer.
+//! One relay at its best position (Theorem 1), against random, interference-blind and middle positions.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,16 +11,16 @@ use uav_relay_scenario::mission;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// The realisations that are drawn: powers of Tx and of the relay, W.
+/// Powers of Tx and of the relay in the figure, W.
 pub const REALISATIONS: [(f64, f64); 2] = [(100.0, 0.5), (80.0, 2.0)];
 
-/// Altitudes, m: from the first to the last, metre by metre.
+/// First and last altitude, m, in steps of 1 m.
 pub const ALTITUDES_M: (u32, u32) = (10, 50);
 
-/// Seed of the random places; each altitude has its own, this one plus the altitude in metres.
+/// Seed of the random positions; each altitude uses this seed plus the altitude in metres.
 pub const SEED: u64 = 2000;
 
-/// One altitude with one choice of powers.
+/// Results for one altitude and one pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
     /// Power of Tx, W.
@@ -29,25 +29,25 @@ pub struct Row {
     pub relay_w: f64,
     /// Altitude, m.
     pub altitude_m: u32,
-    /// Its best place, m from Tx.
+    /// Best position, m from Tx.
     pub x_m: f32,
-    /// SIR of the worse hop there, linear.
+    /// SIR of the worse hop at the best position, linear.
     pub sir_linear: f32,
-    /// Mean of it over random places, linear.
+    /// Mean SIR of the worse hop over random positions, linear.
     pub random_sir_linear: f64,
     /// Standard error of that mean, linear.
     pub random_error_linear: f64,
-    /// Mean over random places in dB.
+    /// Mean SIR over random positions, in dB.
     pub random_sir_db: f64,
-    /// Mean of log2(1 + SIR) over random places, bit/s/Hz.
+    /// Mean of log2(1 + SIR) over random positions, bit/s/Hz.
     pub random_rate_bit_per_s_hz: f64,
-    /// SIR where the signal alone says, linear.
+    /// SIR at the interference-blind position, linear.
     pub blind_sir_linear: f64,
     /// SIR in the middle, linear.
     pub middle_sir_linear: f64,
 }
 
-/// The dual-hop scenario of the paper's third sub-table.
+/// Returns the dual-hop scenario of the paper's third sub-table.
 pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
     let altitude_m = f64::from(altitude_m);
     Scenario {
@@ -67,10 +67,10 @@ pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
     }
 }
 
-/// Each of the choices of powers at each of the altitudes, against `draws` random places.
+/// Returns the results for each pair of powers and altitude, against `draws` random positions.
 ///
 /// # Errors
-/// [`Trouble::Unsettled`], which no choice of powers above 0 leads to.
+/// [`Trouble::Unsettled`], which does not occur for powers above 0.
 pub fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<Vec<Row>, Trouble> {
     let choices: Vec<(f64, f64, u32)> = powers_w
         .iter()

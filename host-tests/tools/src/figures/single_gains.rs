@@ -1,7 +1,7 @@
-//! What the gain of a single relay at its best place comes to on average, by what is averaged, and beside what is printed.
+//! Average gain of one relay at its best position, under several readings of the paper's text.
 //!
-//! The paper prints an average gain in SIR of 30.14 % over a random place and of 25.73 % over the method that sees no
-//! interference, and up to 65 %, without the powers they belong to. Here are many powers and several readings.
+//! The paper prints an average gain in SIR of 30.14 % over a random position and of 25.73 % over the interference-blind method,
+//! and up to 65 %, without the powers. This file computes many powers and several ways of averaging.
 
 use serde::Serialize;
 
@@ -20,19 +20,18 @@ pub const RELAY_W: [f64; 17] = [
     0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0,
 ];
 
-/// The printed averages, percent: over random, over the blind method.
+/// Printed averages, percent: over random, over the blind method.
 pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
-/// The printed largest gain, percent.
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
-/// How near an average has to come to count as the printed one, percentage points.
+/// Difference up to which an average counts as the printed one, percentage points.
 const NEAR: f64 = 0.5;
 
-/// What is averaged over the altitudes.
+/// Quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// The gain in linear SIR at each altitude.
+    /// Gain in linear SIR at each altitude.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
     /// Linear SIR; the gain is that of the means.
@@ -46,7 +45,7 @@ pub enum Reading {
     Rates,
 }
 
-/// All of them.
+/// The four readings.
 pub const READINGS: [Reading; 4] = [
     Reading::LinearGains,
     Reading::LinearMeans,
@@ -55,7 +54,6 @@ pub const READINGS: [Reading; 4] = [
 ];
 
 impl Reading {
-    /// In words.
     const fn words(self) -> &'static str {
         match self {
             Self::LinearGains => "mean of linear gains",
@@ -66,31 +64,31 @@ impl Reading {
     }
 }
 
-/// One reading for one choice of powers.
+/// Gains under one reading for one pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct GainRow {
     /// Power of Tx, W.
     pub tx_w: f64,
     /// Power of the relay, W.
     pub relay_w: f64,
-    /// What is averaged.
+    /// Averaged quantity.
     pub reading: Reading,
-    /// PowerRatio over a random place, percent; none where the mean in dB is not above 0.
+    /// Gain over a random position, percent; none if the mean in dB is not above 0.
     pub over_random_percent: Option<f64>,
-    /// PowerRatio over the place that the signal alone says, percent.
+    /// Gain over the interference-blind position, percent.
     pub over_blind_percent: Option<f64>,
-    /// PowerRatio over the middle, percent.
+    /// Gain over the middle, percent.
     pub over_middle_percent: Option<f64>,
     /// Largest gain over random at one altitude, percent of linear SIR.
     pub largest_over_random_percent: f64,
-    /// Largest gain over the blind place at one altitude, percent of linear SIR.
+    /// Largest gain over the blind position at one altitude, percent of linear SIR.
     pub largest_over_blind_percent: f64,
 }
 
-/// Every reading for every pair of these powers, over these altitudes.
+/// Returns every reading for every pair of these powers, over these altitudes.
 ///
 /// # Errors
-/// As [`places`].
+/// Those of [`places`].
 pub fn data(
     tx_w: &[f64],
     relay_w: &[f64],
@@ -109,7 +107,7 @@ pub fn data(
         .collect())
 }
 
-/// What a relay does at one altitude, as a reading has it: at the best place, at random, blind, in the middle.
+/// Returns the quantity of a reading at the best, random, blind and middle positions for one altitude.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),
@@ -131,7 +129,7 @@ fn four(row: &Row, reading: Reading) -> [f64; 4] {
     }
 }
 
-/// One reading of the altitudes of one choice of powers; `None` without any.
+/// Evaluates a reading over the altitudes of one pair of powers; `None` without rows.
 fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     let first = rows.first()?;
     let percent = |best: f64, under: f64| 100.0 * (best / under - 1.0);
@@ -168,8 +166,7 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// How far the worse of the two averages is from the printed one, percentage points; the middle may stand in for the blind
-/// method.
+/// Returns the larger difference from the printed averages, percentage points; `middle` replaces the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent
@@ -182,7 +179,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
     from(row.over_random_percent, PRINTED_PERCENT.0).max(from(other, PRINTED_PERCENT.1))
 }
 
-/// What reproduces the printed averages and what does not, in words.
+/// Describes which readings reproduce the printed averages.
 pub fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);
@@ -215,7 +212,7 @@ pub fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// The nearest choice of each reading, then the linear readings of the realisations that are drawn.
+/// Returns the nearest pair of powers per reading, then the linear readings of the pairs that are drawn.
 pub fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",

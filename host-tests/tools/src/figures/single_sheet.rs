@@ -1,4 +1,4 @@
-//! The figure of a single relay, and the table of what its gain may be said to be.
+//! Figure of one relay, with the table of its average gains.
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::sheet::{Sheet, Table};
@@ -29,7 +29,7 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
     }
 }
 
-/// The figure, and the table of what its gain may be said to be.
+/// Returns the figure, with the table of average gains.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

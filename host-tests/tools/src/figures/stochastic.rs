@@ -1,4 +1,4 @@
-//! Algorithm 4 with the paper's step, in a field that is the same everywhere and in one that is not.
+//! Algorithm 4 with the paper's step, in an even and in an uneven field.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,22 +11,20 @@ use super::trouble::Trouble;
 use super::{convergence, paper, walk};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 
-/// The chains that are drawn.
+/// Numbers of relays.
 pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
 
 /// Seed of the uneven field.
 pub const SEED: u64 = 4;
 
-/// From one drawn point of the uneven field to the next, m.
 const SPACING_M: u32 = 20;
 
-/// First shape of every distribution.
 const ALPHA: f64 = 3.0;
 
-/// The most interference power as a multiple of Lambda.
+/// Largest interference power as a multiple of Lambda.
 const MOST: f64 = 2.0;
 
-/// Which field.
+/// Kind of field.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -36,43 +34,43 @@ pub enum Kind {
     Even,
 }
 
-/// One sweep of one chain.
+/// Expected SIR of a chain after one sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Row {
-    /// Which field.
+    /// Kind of field.
     pub field: Kind,
     /// Number of relays.
     pub relays: u16,
-    /// Which sweep, from 1.
+    /// Number of the sweep, from 1.
     pub sweep: u32,
-    /// Expected SIR that every hop is asked to meet, linear.
+    /// Target expected SIR of every hop, linear.
     pub target_linear: f32,
     /// Expected SIR of the worst hop, linear.
     pub sir_linear: f64,
 }
 
-/// One point of the field.
+/// A point of the field.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct PointRow {
-    /// Which field.
+    /// Kind of field.
     pub field: Kind,
-    /// Place, m from Tx.
+    /// Position, m from Tx.
     pub x_m: f64,
-    /// First shape of the Beta distribution of I / `I_max` there.
+    /// First shape parameter of the Beta distribution of I / `I_max`.
     pub alpha: f64,
-    /// Second shape.
+    /// Second shape parameter.
     pub beta: f64,
-    /// The most interference power, W.
+    /// Largest interference power, W.
     pub i_max_w: f64,
 }
 
-/// Lambda, W: what 1 W straight below a relay is when it has come up to it.
+/// Returns Lambda, W: the power that a relay receives from 1 W right below it.
 fn lambda_w(mission: &Mission) -> f64 {
     let height = f64::from(mission.config().common.altitude_m);
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// The field's points.
+/// Returns the points of the field.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -96,7 +94,7 @@ pub fn field(kind: Kind) -> Result<Vec<PointRow>, Trouble> {
     })
 }
 
-/// The mission of `relays` relays in the field.
+/// Returns the mission of `relays` relays in the field.
 ///
 /// # Errors
 /// [`Trouble::Mission`].
@@ -120,7 +118,7 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, Trouble> {
     paper::mission(&scenario, relays)
 }
 
-/// The sweeps of both fields and these numbers of relays until each chain settles.
+/// Returns the sweeps of both fields for these numbers of relays, until each chain settles.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -143,7 +141,7 @@ pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
     Ok(rows)
 }
 
-/// Where both fields' chains end with the paper's step, a tenth of it, and bracketed targets.
+/// Returns the final SIRs with the paper's step, a tenth of it, and bracketed targets.
 fn shown() -> Result<Vec<Vec<String>>, Trouble> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]
@@ -175,7 +173,7 @@ fn shown() -> Result<Vec<Vec<String>>, Trouble> {
     Ok(rows)
 }
 
-/// The sweeps of one chain, and the last one held to the end of the picture.
+/// Returns the line of one chain, with its last sweep extended to the end of the picture.
 fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     let of = rows
         .iter()
@@ -194,7 +192,7 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     Line::new(&format!("N = {relays}"), Look::number(index), points)
 }
 
-/// The figure.
+/// Returns the figure.
 ///
 /// # Errors
 /// Never in practice: see [`Trouble`].

@@ -1,4 +1,4 @@
-//! Why a figure could not be made.
+//! Errors of making a figure.
 
 use std::fmt;
 
@@ -8,21 +8,21 @@ use uav_relay::optimiser::search::Infeasible;
 use super::draw::NotDrawn;
 use uav_relay_scenario::mission::Refusal;
 
-/// Why a figure could not be made: its numbers are fixed, so all but `File` would be a bug.
+/// Error of making a figure. The numbers are fixed, so any error except `File` is a bug.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Trouble {
-    /// The mission refuses a number.
+    /// The scenario is not a valid mission.
     Mission(Refusal),
-    /// A relay refuses its settings.
+    /// A relay rejects its settings.
     Setup(SetupError),
-    /// No target is met, or the simulated chain has not settled.
+    /// The target cannot be met, or the simulated chain has not settled.
     Unsettled(&'static str),
     /// The chart could not be drawn.
     Drawing(NotDrawn),
     /// A table could not be written.
     Table(csv::Error),
-    /// A table holds a number that is not finite.
+    /// A table contains a number that is not finite.
     NotFinite(String),
     /// A file could not be written.
     File(String, std::io::Error),

@@ -1,4 +1,4 @@
-//! A whole chain without a message, by the functions that the relays walk one hop each.
+//! A whole chain computed without messages, by the functions that relays use for one hop each.
 
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::TARGETS;
@@ -10,18 +10,18 @@ use uav_relay::{Heading, Mission, Placement, Profile, Schedule};
 use super::trouble::Trouble;
 use uav_relay_sim::report::hop_sirs;
 
-/// Relays at their places, all alike.
+/// Positions of identical relays.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Chain {
-    /// The places from Tx to Rx.
+    /// Positions from Tx to Rx.
     pub places: Vec<Placement>,
     /// SIR of the worst hop, linear.
     pub sir: f64,
 }
 
-/// The chain that stretches every hop as far as `target` (linear, above 0) allows; `None` where a hop cannot meet it.
+/// Returns the chain with every hop as long as `target` (linear, > 0) allows; `None` if a hop cannot meet it.
 ///
-/// At a target that is too high it falls short of its end, and the SIR of the last hop is what it is. Work: N reaches.
+/// If the target is too high, the chain ends short of its end, with a lower SIR on the last hop. Work: N reaches.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     let profile = mission.config().common;
     let mut from = PerTarget::from(
@@ -60,21 +60,21 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     Some(Chain { places, sir })
 }
 
-/// One sweep of the paper's schedule.
+/// A sweep of the paper's schedule.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Which one, from 1.
+    /// Number of the sweep, from 1.
     pub number: u32,
-    /// SIR that every hop is asked to meet, linear.
+    /// Target SIR of every hop, linear.
     pub target: f32,
-    /// The chain stretched for it; `None` where a hop cannot meet it.
+    /// Chain stretched for the target; `None` if a hop cannot meet it.
     pub chain: Option<Chain>,
 }
 
-/// The sweeps of the paper's Algorithm 1, in a field of Algorithm 4, with this `step` (linear SIR), up to the one that settles.
+/// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) with this `step` (linear SIR) until the chain settles.
 ///
 /// # Errors
-/// [`Trouble::Unsettled`] where none of the targets is met.
+/// [`Trouble::Unsettled`] if no target is met.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -115,17 +115,17 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
     Ok(sweeps)
 }
 
-/// The chain that the relays of `mission` agree on by Algorithm 1, in a field by Algorithm 4.
+/// Returns the chain that the relays of `mission` agree on by Algorithm 1 (Algorithm 4 in a field).
 ///
 /// # Errors
-/// [`Trouble::Unsettled`] where no target is met.
+/// [`Trouble::Unsettled`] if no target is met.
 pub fn settled(mission: &Mission) -> Result<Chain, Trouble> {
     let common = |_| mission.config().common;
     let agreed = plan::solve(mission, Schedule::Bracketed, common)?;
     stretched(mission, agreed.target).ok_or(Trouble::Unsettled("a chain"))
 }
 
-/// SIR of the worst hop of relays alike at `places`, linear; 0 without any.
+/// Returns the SIR of the worst hop of identical relays at `places`, linear; 0 if empty.
 pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
     let power_w = mission.config().common.power_w;
     let standing: Vec<(Placement, Profile)> = places

@@ -1,4 +1,4 @@
-//! The boards that images are made for.
+//! Supported boards: what cargo builds for each, and where its block goes.
 
 use std::path::{Path, PathBuf};
 
@@ -6,27 +6,26 @@ use uav_relay_block::ADDRESS;
 
 use super::uf2::Family;
 
-/// A board.
+/// A supported board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Board {
-    /// As `--board` has it.
+    /// Name, as accepted by `--board`.
     pub name: &'static str,
-    /// What cargo builds for.
+    /// Rust target triple.
     pub target: &'static str,
-    /// Where its package is, from the checkout's root.
     manifest: &'static str,
     package: &'static str,
-    /// Whether its images are examples of that, and no binaries.
+    /// True if the images are examples of the package, false if they are binaries.
     examples: bool,
-    /// With a UART to each neighbour, and with a radio.
+    /// Image names: with a UART to each neighbour, and with a shared radio.
     images: [&'static str; 2],
-    /// Where its configuration block begins.
+    /// Flash address of the configuration block.
     pub block: u32,
-    /// Which UF2 files its boot ROM takes, if any.
+    /// UF2 family that the boot ROM accepts, if any.
     pub uf2: Option<Family>,
 }
 
-/// All boards.
+/// The supported boards.
 pub const BOARDS: [Board; 4] = [
     Board {
         name: "stm32f405",
@@ -71,12 +70,12 @@ pub const BOARDS: [Board; 4] = [
 ];
 
 impl Board {
-    /// The board of that name.
+    /// Returns the board with that name.
     pub fn named(name: &str) -> Option<Self> {
         BOARDS.into_iter().find(|board| board.name == name)
     }
 
-    /// What cargo is to be told, and where the ELF is then, both from the checkout's root.
+    /// Returns cargo's arguments and the path of the resulting ELF, both relative to the checkout's root.
     pub fn build(&self, radio: bool) -> (Vec<String>, PathBuf) {
         let [wires, radios] = self.images;
         let image = if radio { radios } else { wires };
@@ -109,7 +108,7 @@ impl Board {
         (words.map(str::to_owned).into(), elf.join(image))
     }
 
-    /// What the files of an image are called, without their extension.
+    /// Returns the file name of an image, without extension.
     pub fn stem(&self, radio: bool) -> String {
         format!("{}-{}", self.name, if radio { "radio" } else { "wires" })
     }

@@ -1,28 +1,28 @@
-//! The bytes of an image, and where in the flash they go.
+//! Loadable bytes of an ELF image and their flash addresses.
 
 use object::LittleEndian;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 
-/// The most that lies between the first byte of an image and the last: no flash here is larger.
+/// Largest span from the first byte of an image to the last: no supported flash is larger.
 pub const LARGEST: u32 = 16 * 1024 * 1024;
 
-/// What a blank flash reads.
+/// Value of an erased flash byte.
 pub const BLANK: u8 = 0xFF;
 
-/// Bytes from an address on.
+/// Contiguous bytes at an address.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Piece {
-    /// Where the first one goes.
+    /// Address of the first byte.
     pub address: u32,
-    /// What goes there.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 
-/// What is loaded from an ELF, by where it is stored: not where it runs.
+/// Returns the loadable segments of an ELF, by physical (load) address.
 ///
 /// # Errors
-/// One line that says why it is no image.
+/// A line that says why the file is not a loadable ELF.
 pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     let wrong = |error: object::Error| format!("not an ELF of 32 bits: {error}");
     let header = FileHeader32::<LittleEndian>::parse(elf).map_err(wrong)?;
@@ -46,10 +46,10 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     Ok(pieces)
 }
 
-/// One stretch of memory from the first byte to the last, blank in between.
+/// Joins pieces into one contiguous image, with erased bytes in the gaps.
 ///
 /// # Errors
-/// Where they overlap, or lie farther apart than any flash here is large.
+/// If pieces overlap, or lie more than [`LARGEST`] bytes apart.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
     let first = pieces.first().ok_or("nothing to load")?.address;
     let mut bytes = Vec::new();

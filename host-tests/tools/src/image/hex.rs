@@ -1,16 +1,15 @@
-//! Intel HEX, by the crate `ihex`.
+//! Intel HEX output, by the crate `ihex`.
 
 use ihex::Record;
 
 use super::elf::Piece;
 
-/// Bytes of a record.
 const RECORD: u8 = 16;
 
-/// The file, with addresses of 32 bits.
+/// Returns the HEX file, with 32-bit addresses.
 ///
 /// # Errors
-/// What `ihex` refuses.
+/// If `ihex` rejects a record.
 pub fn file(pieces: &[Piece]) -> Result<String, String> {
     let mut records = Vec::new();
     let mut above = None;
@@ -24,7 +23,7 @@ pub fn file(pieces: &[Piece]) -> Result<String, String> {
                 above = Some(high);
                 records.push(Record::ExtendedLinearAddress(high));
             }
-            // No record reaches across a boundary of 64 KiB.
+            // A record must not cross a 64 KiB boundary.
             let room = 0x1_0000 - usize::from(offset);
             let len = usize::from(RECORD).min(room).min(rest.len());
             let (value, behind) = rest.split_at(len);

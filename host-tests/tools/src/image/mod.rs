@@ -1,11 +1,11 @@
-//! From what cargo has linked to what a board is flashed with.
+//! Flash images: from the ELF that cargo links to the files that flash a board.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`board`] | the boards: what is built for each, and what it takes |
-//! | [`elf`] | the bytes of an image, and where they go |
-//! | [`uf2`] | the blocks of a UF2 file |
-//! | [`hex`] | Intel HEX |
+//! | [`board`] | supported boards |
+//! | [`elf`] | loadable bytes and their addresses |
+//! | [`uf2`] | UF2 files |
+//! | [`hex`] | Intel HEX files |
 
 pub mod board;
 pub mod elf;

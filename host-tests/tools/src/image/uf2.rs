@@ -1,12 +1,12 @@
-//! UF2: the file that a boot ROM takes as if it were a disk. Blocks of 512 bytes, each of which says where its bytes go.
+//! UF2: the file format of USB mass-storage boot loaders. Each block of 512 bytes carries its own flash address.
 //!
-//! | byte of a block | type | what |
+//! | byte of a block | type | content |
 //! | --- | --- | --- |
 //! | 0 | 2 u32 | [`MAGIC`] |
-//! | 8 | u32 | flags: 0x2000, the family is stated |
+//! | 8 | u32 | flags: 0x2000, a family ID is present |
 //! | 12 | u32 | address of the first byte, a multiple of [`PAGE`] |
-//! | 16 | u32 | bytes: [`PAGE`] |
-//! | 20 | u32 | number of this block, from 0 |
+//! | 16 | u32 | payload size: [`PAGE`] |
+//! | 20 | u32 | block number, from 0 |
 //! | 24 | u32 | number of blocks |
 //! | 28 | u32 | [`Family`] |
 //! | 32 | 476 bytes | a page, and zeros |
@@ -18,30 +18,30 @@ use std::collections::BTreeMap;
 
 use super::elf::{BLANK, Piece};
 
-/// How a block begins.
+/// Magic numbers at the start of a block.
 pub const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
 
-/// How it ends.
+/// Magic number at the end of a block.
 pub const END: u32 = 0x0AB1_6F30;
 
-/// Bytes of a block that go into the flash.
+/// Payload bytes per block.
 pub const PAGE: u32 = 256;
 
 const FAMILY_STATED: u32 = 0x2000;
 
-/// Which chips take a block; others ignore it.
+/// Chip family that accepts a block; other chips ignore it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Family(pub u32);
 
 impl Family {
-    /// An RP2350 with its Arm cores, in secure state.
+    /// RP2350, Arm cores, secure state.
     pub const RP2350: Self = Self(0xE48B_FF59);
 }
 
-/// The file. What of a page is in no piece is blank.
+/// Returns the UF2 file. Bytes of a page that no piece covers are erased-flash bytes.
 ///
 /// # Errors
-/// Where there are more blocks than a file may have.
+/// If there are more blocks than the format can count.
 pub fn file(pieces: &[Piece], family: Family) -> Result<Vec<u8>, String> {
     let mut pages = BTreeMap::new();
     for piece in pieces {

@@ -1,4 +1,4 @@
-//! An interferer that passes, against the chain that stays where it was best.
+//! Moving interferer: a chain that tracks it against a chain that keeps its first positions.
 
 use rayon::prelude::*;
 use uav_relay::{Instant, Interference, Listen};
@@ -7,19 +7,19 @@ use uav_relay_sim::simulator::chain::run;
 use super::wild::Wild;
 use crate::figures::trouble::Trouble;
 
-/// From then on, that long after the begin, it counts.
+/// Start of the evaluation, s after the start of the run.
 const BEGUN_S: u32 = 60;
 
-/// Of every scene the mean share of the optimum of that moment, from a minute after the begin on.
+/// Mean shares of the momentary optimum, per scene, from a minute after the start on.
 #[derive(Clone, Debug, Default)]
 pub struct Shares {
-    /// Of the chain that follows.
+    /// Shares of the chain that tracks the interferer.
     pub followed: Vec<f64>,
-    /// Of one that stays where it was best at first.
+    /// Shares of the chain that keeps its first optimal positions.
     pub stayed: Vec<f64>,
 }
 
-/// The shares in `scenes` scenes, while the one interferer passes at 300 m.
+/// Returns the shares in `scenes` scenes while a single interferer passes at a distance of 300 m.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -34,7 +34,7 @@ pub fn shares(scenes: u64, relays: u16, speed_mps: f64) -> Result<Shares, Troubl
 
 fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), Trouble> {
     let mut wild = Wild::new(seed, relays, 1);
-    // It is beside the middle half way.
+    // Half-way through, the interferer is beside the middle of the line.
     let span_s = 600.0 / speed_mps.max(3.0) + f64::from(BEGUN_S);
     let half_s = 0.5 * (span_s + f64::from(BEGUN_S));
     wild.place(500.0 - speed_mps * half_s, 300.0);
@@ -66,7 +66,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), Trouble> {
         stayed += scene.chain_sir(first) / best;
         moments += 1.0;
     }
-    // Once a second for a minute at least.
+    // At least a minute of samples, one per second.
     if moments > 50.0 {
         Ok((followed / moments, stayed / moments))
     } else {
@@ -74,7 +74,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), Trouble> {
     }
 }
 
-/// The mean.
+/// Returns the arithmetic mean; NaN if empty.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

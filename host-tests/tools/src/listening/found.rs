@@ -1,4 +1,4 @@
-//! Still sources: how much of the optimum after how many agreements.
+//! Static interferers: share of the optimum after each agreement.
 
 use rayon::prelude::*;
 use uav_relay::Interference;
@@ -8,13 +8,13 @@ use uav_relay_sim::simulator::setup::Setup;
 use super::wild::{Wild, by_agreement};
 use crate::figures::trouble::Trouble;
 
-/// The agreements that are told of.
+/// Last agreement that is reported.
 pub const LAST: usize = 8;
 
-/// Shares of the optimum after 0, 1, 2, .. agreements that followed what was heard, of every scene of these seeds.
+/// Shares of the optimum after 0 to [`LAST`] agreements based on measurements, one per scene.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// The shares in `scenes` scenes, run as `setup` says.
+/// Returns the shares in `scenes` random scenes, each run with `setup`.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -42,7 +42,7 @@ pub fn shares(
     }))
 }
 
-/// Nothing is known of the interference.
+/// Setup without prior knowledge of the interference.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -50,7 +50,7 @@ pub fn unknown(wild: &Wild) -> Result<Setup, Trouble> {
     wild.setup(Interference::Unknown)
 }
 
-/// The same, and every place is off by 1 dB by itself.
+/// The setup of [`unknown`] with 1 dB of shadowing, independent at each position.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -62,7 +62,7 @@ pub fn shadowed(wild: &Wild) -> Result<Setup, Trouble> {
     Ok(setup)
 }
 
-/// Nobody listens; of several sources all are told the paper's hypothetical one.
+/// Setup without measurements: the relays know the interferer, or the paper's hypothetical one for several sources.
 ///
 /// # Errors
 /// [`Trouble`].
@@ -73,7 +73,7 @@ pub fn hypothetical(wild: &Wild) -> Result<Setup, Trouble> {
     Ok(setup)
 }
 
-/// The part-quantile of numbers; NaN of none.
+/// Returns the `part`-quantile of `numbers`; NaN if empty.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,10 +1,10 @@
-//! How much of the optimum a chain has that has to find its interferer, in random scenes, beside chains that were told.
+//! Chains that must locate their interferer, compared with chains that know it, in random scenes.
 //!
-//! | module | one idea |
+//! | module | content |
 //! | --- | --- |
-//! | [`wild`] | a random scene, and the runs in it |
-//! | [`found`] | still sources: the share by agreement |
-//! | [`followed`] | one that passes: the mean share over its way |
+//! | [`wild`] | a random scene and its simulation setups |
+//! | [`found`] | static sources: share of the optimum after each agreement |
+//! | [`followed`] | a moving source: mean share of the optimum over time |
 
 pub mod followed;
 pub mod found;

@@ -1,4 +1,4 @@
-//! A random scene, and the runs in it.
+//! Random scenes and their simulation setups.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -14,22 +14,21 @@ use uav_relay_sim::simulator::sky::{Sky, Stand};
 use crate::figures::trouble::Trouble;
 use crate::multi_interferer::optimum;
 
-/// What a scene without sources is.
 const NO_SCENE: Trouble = Trouble::Unsettled("a scene");
 
-/// A scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.
+/// A random scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.
 #[derive(Clone, Debug)]
 pub struct Wild {
-    /// Where it is.
+    /// Geometry, powers and the true interferers.
     pub scenario: Scenario,
-    /// How many relays.
+    /// Number of relays.
     pub relays: u16,
-    /// What everything random in it comes of.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl Wild {
-    /// With so many relays and sources.
+    /// Draws a scene with that many relays and sources.
     pub fn new(seed: u64, relays: u16, sources: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut scenario = Scenario::default();
@@ -52,7 +51,7 @@ impl Wild {
         }
     }
 
-    /// The one source is there, m.
+    /// Moves the first source to (`x_m`, `y_m`), m.
     pub fn place(&mut self, x_m: f64, y_m: f64) {
         if let Known::Sources(sources) = &mut self.scenario.interference
             && let Some(source) = sources.first_mut()
@@ -61,22 +60,22 @@ impl Wild {
         }
     }
 
-    /// The same with the sources of `scene`.
+    /// Returns a copy with the sources of `scene`.
     pub fn with(&self, scene: &Scene) -> Self {
         let mut wild = self.clone();
         wild.scenario.interference = Known::Sources(scene.sources.clone());
         wild
     }
 
-    /// What is true.
+    /// Returns the true scene.
     ///
     /// # Errors
-    /// [`Trouble::Unsettled`]: it has no sources.
+    /// [`Trouble::Unsettled`] if there are no sources.
     pub fn scene(&self) -> Result<Scene, Trouble> {
         Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
     }
 
-    /// What the relays are told of it.
+    /// Returns the mission of the relays, with `guess` as its interference.
     ///
     /// # Errors
     /// [`Trouble::Mission`].
@@ -89,7 +88,7 @@ impl Wild {
         Mission::try_new(config).map_err(|_| NO_SCENE)
     }
 
-    /// The SIR of the chain that knows everything, linear: of one source the chain that was told, of several the exact optimum.
+    /// Returns the best SIR with full knowledge, linear: one source, the briefed chain's; several, the exact optimum.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -101,7 +100,7 @@ impl Wild {
         Ok(scene.chain_sir(&self.told()?))
     }
 
-    /// Where the chain stands that was told of everything; of several sources by the paper's hypothetical one.
+    /// Returns the positions of a chain that knows the interferer; for several sources, the paper's hypothetical one.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -112,7 +111,7 @@ impl Wild {
         places.ok_or(Trouble::Unsettled("a chain that was told"))
     }
 
-    /// A run in which relays are at their places at once, and measure every five seconds.
+    /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -129,7 +128,7 @@ impl Wild {
         Ok(setup)
     }
 
-    /// The same with drones of 10 m/s, which start beside the transmitter and measure once a second on their way.
+    /// Returns a simulation with drones of 10 m/s that start beside the transmitter and measure every second in flight.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -146,7 +145,7 @@ impl Wild {
     }
 }
 
-/// The SIR after each agreement, linear; the first is that before anything was heard.
+/// Returns the SIR after each agreement, linear; the first element is the SIR before any measurement.
 pub fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
     let mut sirs = Vec::new();
     for stand in stands {

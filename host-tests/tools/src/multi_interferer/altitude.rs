@@ -1,25 +1,22 @@
-//! The common altitude at which the best chain is best.
+//! The best common altitude of a chain.
 
 use super::optimum::{Chain, at_altitude, best_at_altitude};
 use uav_relay_scenario::scene::Scene;
 
-/// Altitudes of the scan that are spread evenly, and as many that are spread by equal factors.
+/// Number of scanned altitudes with equal spacing; as many again have equal ratios.
 const SCANNED: u32 = 24;
 
-/// Tops of the scan that are refined.
 const TOPS: usize = 3;
 
-/// Golden-section steps per refined top: the interval shrinks by about 5e-6, the loss in SIR by its square.
+/// Golden-section steps per refined maximum: the interval shrinks by about 5e-6, the loss in SIR by its square.
 const STEPS: u32 = 25;
 
-/// How well the SIR is found while altitudes are compared, relative.
 const TOLERANCE: f64 = 1e-11;
 
-/// The best chain of relays that share one altitude of the scene's band; at least as good as those at either end of the band.
+/// Returns the best chain whose relays share one altitude of the band; never worse than at either end of the band.
 ///
-/// A scan and a refinement of its three highest tops: no proof that no narrower top lies between the altitudes scanned. `None`
-/// as for [`optimum`](super::optimum()), with a relay that holds an altitude of its own, and with an empty band. About 120
-/// optima.
+/// Scans the band and refines the three highest maxima; a narrower maximum between scanned altitudes may be missed. `None` as for
+/// [`optimum`](super::optimum()), if a relay has a fixed altitude of its own, and for an empty band. Work: about 120 optima.
 pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     let band = scene.band;
     if scene.relays.iter().any(|relay| relay.holds) || !(band.least_m <= band.most_m) {
@@ -56,7 +53,7 @@ pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     at_altitude(scene, best.0)
 }
 
-/// The altitudes of the scan, rising; one if the band is one.
+/// Returns the altitudes of the scan in rising order; a single one if the band is a point.
 fn altitudes(least: f64, most: f64) -> Vec<f64> {
     let shares = (0..=SCANNED).map(|i| f64::from(i) / f64::from(SCANNED));
     let mut altitudes: Vec<f64> = shares
@@ -73,7 +70,7 @@ fn altitudes(least: f64, most: f64) -> Vec<f64> {
     altitudes
 }
 
-/// The best place that a golden-section search of [`low`, `high`] meets, and the value there.
+/// Returns the best argument of a golden-section search on [`low`, `high`], and the value there.
 pub(super) fn golden(
     mut low: f64,
     mut high: f64,

@@ -1,20 +1,18 @@
-//! Where a sampled function crosses a level.
+//! Level crossings of a sampled function.
 
-/// Halvings after which any f64 interval in metres has collapsed to neighbours, with room to spare.
+/// Bisection steps: more than enough to collapse any f64 interval in metres to adjacent numbers.
 const HALVINGS: u32 = 200;
 
-/// One crossing of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
-    /// Where, metres.
     pub(super) at: f64,
-    /// Whether the function is below the level before it and not below it after.
+    /// True if the function is below the level before the crossing and not below it after.
     pub(super) rising: bool,
 }
 
-/// The crossings of `level` by `exact`, known by its `values` at the rising `nodes`, in rising order.
+/// Returns the crossings of `level` by `exact` in rising order, from its `values` at the rising `nodes`.
 ///
-/// Two crossings within one cell go unseen. One evaluation a node was spent on the values; a crossing costs about 60 more.
+/// Two crossings within one cell are missed. Work: about 60 evaluations per crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],
@@ -35,9 +33,9 @@ pub(super) fn crossings(
         .collect()
 }
 
-/// The last place on the way from `inside` to `outside` (either direction) at which `holds` is still true.
+/// Returns the last point from `inside` towards `outside` (in either direction) at which `holds` is still true.
 ///
-/// `holds` is taken to be true at `inside` and false at `outside`; where it changes more than once, one of the changes is found.
+/// `holds` must be true at `inside` and false at `outside`; if it changes more than once, one of the changes is found.
 pub(super) fn boundary(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

@@ -1,35 +1,31 @@
-//! The line at one altitude: how quiet it is where, how far a hop into each place may be, and how good the first hop is.
+//! The line at one altitude: interference, hop ranges and the SIR of the first hop along x.
 
 use super::crossing::{Crossing, crossings};
 use super::spans::Span;
 use uav_relay_scenario::hypothetical::mesh::{Centre, graded};
 use uav_relay_scenario::scene::Scene;
 
-/// Width of the cells over the distance to the nearest source.
+/// Cell width relative to the distance to the nearest source.
 const STEP: f64 = 0.02;
 
-/// Least number of cells.
 const CELLS: f64 = 500.0;
 
-/// The places that relays may take at one altitude, sampled for searches that must miss no turn of the interference.
+/// The line above the ground at one altitude, sampled finely enough to catch every turn of the interference.
 pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
     /// Quiet r = (I + N)^(-1/2) at the nodes, W^(-1/2).
     quiet: Vec<f64>,
-    /// Its slope there.
     slope: Vec<f64>,
-    /// The tops of the first hop's SIR between the ends of the line.
     tops: Vec<f64>,
 }
 
-/// How far a sender is heard at some target: `stride` times the quiet at the receiver, metres.
+/// Hop range at some target SIR, per unit of quiet at the receiver: range = `stride` times quiet, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stride(f64);
 
 impl<'a> Line<'a> {
-    /// The line at `altitude_m`, metres, > 0.
     pub(super) fn new(scene: &'a Scene, altitude_m: f64) -> Self {
         let mut centres: Vec<Centre> = scene
             .sources
@@ -61,7 +57,6 @@ impl<'a> Line<'a> {
         line
     }
 
-    /// The quiet and its slope at `x`.
     fn quiet_and_slope(&self, x: f64) -> (f64, f64) {
         let (mut power, mut change) = (self.scene.noise_w, 0.0);
         for source in &self.scene.sources {
@@ -75,18 +70,17 @@ impl<'a> Line<'a> {
         (quiet, -0.5 * quiet * change / power)
     }
 
-    /// Half the relative rate at which the first hop's SIR rises with `x`, 1/m.
+    /// Returns half the relative slope of the first hop's SIR at `x`, 1/m.
     fn first_rise(&self, x: f64) -> f64 {
         let (quiet, slope) = self.quiet_and_slope(x);
         slope / quiet - x / (x * x + self.altitude_m * self.altitude_m)
     }
 
-    /// SIR (linear) of the first hop at `x`.
     pub(super) fn first_sir(&self, x: f64) -> f64 {
         self.scene.sir_at(self.scene.tx(), (x, self.altitude_m))
     }
 
-    /// The place in `spans` at which the first hop is best; `None` in no span.
+    /// Returns the position in `spans` with the best first hop; `None` if there are no spans.
     pub(super) fn best_first(&self, spans: &[Span]) -> Option<f64> {
         let ends = spans.iter().flat_map(|span| [span.low, span.high]);
         let inside = |x: &&f64| spans.iter().any(|span| span.contains(**x));
@@ -94,26 +88,26 @@ impl<'a> Line<'a> {
             .max_by(|&a, &b| self.first_sir(a).total_cmp(&self.first_sir(b)))
     }
 
-    /// How far a relay with `power_w` watts is heard by other relays at `target` (linear, > 0).
+    /// Returns the stride of a relay with `power_w` watts at `target` (linear, > 0).
     pub(super) fn stride(&self, power_w: f64, target: f64) -> Stride {
         Stride((power_w / (self.scene.mu_los * target)).sqrt())
     }
 
-    /// The place nearest to Tx from which a sender is still heard at `x`; it may lie behind Tx.
+    /// Returns the sender position nearest to Tx that a receiver at `x` still hears; may lie behind Tx.
     pub(super) fn heard_from(&self, stride: Stride, x: f64) -> f64 {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// The local minima of [`Line::heard_from`] between the ends of the line.
+    /// Returns the local minima of [`Line::heard_from`] inside the line.
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
-        // Its slope is 1 - stride x slope of the quiet.
+        // The slope of `heard_from` is 1 - stride x slope of the quiet.
         let level = 1.0 / stride.0;
         falling(&crossings(&self.nodes, &self.slope, level, |x| {
             self.quiet_and_slope(x).1
         }))
     }
 
-    /// Where a sender `apart` metres (>= 0) or farther away is still heard.
+    /// Returns the receiver positions whose hop range is at least `apart` metres (>= 0).
     pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
         let level = apart / stride.0;
         let turns = crossings(&self.nodes, &self.quiet, level, |x| {
@@ -134,9 +128,9 @@ impl<'a> Line<'a> {
         spans
     }
 
-    /// The place nearest to Tx at which the last relay, with `power_w` watts, meets `target` (linear, > 0) at Rx.
+    /// Returns the position nearest to Tx at which the last relay, with `power_w` watts, meets `target` (linear, > 0) at Rx.
     ///
-    /// At least 0; `None` where it misses the target even above Rx.
+    /// At least 0; `None` if the target is missed even above Rx.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
         let scene = self.scene;
         let squared = power_w / (scene.eta * target * (scene.interference_rx_w() + scene.noise_w));
@@ -145,7 +139,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Where a function that crosses zero has a maximum of its integral, or one that crosses a level falls below it.
+/// Returns the falling crossings: maxima of the integral, or points where the function drops below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

@@ -1,13 +1,12 @@
-//! Several interferers at once: the true sum of what they do, the one hypothetical interferer that comes closest to it, and
-//! chains that are placed against the true sum.
+//! Several interferers: chains placed against the true sum of their powers.
 //!
-//! The relays know one interferer. Several are replaced by one for them ([`hypothetical`](uav_relay_scenario::hypothetical)), which is an approximation; how
-//! much SIR it costs is known only by comparing with the best chain against the true sum: [`optimum`] for relays that hold
-//! one altitude (exact), [`best_common_altitude`] where that altitude may be chosen, [`polish`] for relays that differ, and for
-//! places to the side.
+//! Relays know a single interferer; several are replaced by a hypothetical one
+//! ([`hypothetical`](uav_relay_scenario::hypothetical)). The SIR that this approximation costs is found by comparison with the
+//! best chain against the true sum: [`optimum`] for relays at one fixed altitude (exact), [`best_common_altitude`] for a common
+//! altitude that may be chosen, [`polish`] for relays with different altitudes or lateral room.
 //!
-//! Everything is f64, in SI units, with x along the ground from Tx (0) to Rx (D), y to the right of it; SIRs are linear. As
-//! everywhere, a relay never stands behind the one before it. All chains but polished ones stand above the line (y = 0).
+//! All values are f64 in SI units, x along the ground from Tx (0) to Rx (D), y to the right; SIRs are linear. No relay is behind
+//! its predecessor. All chains except polished ones are above the line (y = 0).
 
 mod altitude;
 mod crossing;

@@ -1,49 +1,48 @@
-//! The best chain against the true sum of the interference, for relays that hold one altitude.
+//! The best chain against the true sum of the interference, for relays at one fixed altitude.
 
 use super::line::Line;
 use super::spans::Span;
 use super::stages::Stages;
 use uav_relay_scenario::scene::Scene;
 
-/// Relative width at which the bracket of a target is narrow enough.
+/// Relative bracket width at which the bisection of the target ends.
 const TOLERANCE: f64 = 1e-13;
 
-/// Targets below this are not told from zero.
 const LEAST_TARGET: f64 = 1e-250;
 
-/// What rounding may take off the least separation, relative: a thousand relays that just fit must not fail for it.
+/// Relative rounding allowance on the least separation, so that a thousand relays that just fit are accepted.
 const ROUNDING: f64 = 1e-12;
 
-/// A chain that was found, and what it reaches.
+/// A chain and its SIR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
-    /// Where each relay stands from Tx to Rx, (x, h) in metres: x in [0, D], rising by the least separation or more (but for
-    /// 1e-12 of it, for rounding).
+    /// Positions from Tx to Rx, (x, h) in metres: x in [0, D], rising by at least the least separation (less 1e-12 of it, for
+    /// rounding).
     pub places: Vec<(f64, f64)>,
-    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`] of these places.
+    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// What the best chain would reach if relays need not keep apart: `sir` where the least separation does not bind.
+    /// SIR of the best chain without a least separation; equals `sir` where the separation does not bind.
     pub free_sir: f64,
 }
 
 impl Chain {
-    /// Whether the least separation costs more than a millionth of the SIR. It is kept in any case.
+    /// Returns true if the least separation costs more than a millionth of the SIR. It is kept in any case.
     pub fn separation_binds(&self) -> bool {
         self.sir < self.free_sir * (1.0 - 1e-6)
     }
 }
 
-/// The best chain for relays that all hold the same altitude, with whatever powers; exact but for rounding.
+/// Returns the best chain of relays at one common altitude, with any powers; exact except for rounding.
 ///
-/// Asserted to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
+/// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
 /// (`of_one_source_it_is_the_optimum_of_the_reference`, `brute_force_finds_the_same` in `host-tests/tests/several`).
 ///
-/// The least separation is kept: where it binds, the SIR is the best of the chains that keep it. Without one, relays may share
-/// a place when the rest of the chain is the bottleneck. `None` without relays or interferers, where altitudes differ, where
-/// the relays have no room on the way, and where no chain has an SIR above zero (an interferer at Rx).
+/// If the least separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a position when
+/// another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the relays do not fit on the
+/// line, and if no chain has an SIR above zero (an interferer at Rx).
 ///
-/// About 50 targets, twice if there is a least separation; each looks once at some thousand places on the line (for every
-/// change of power along the chain), and at a few intervals a relay.
+/// Work: about 50 targets, twice with a least separation. For each target: some thousand points of the line per change of power
+/// along the chain, and a few intervals per relay.
 pub fn optimum(scene: &Scene) -> Option<Chain> {
     let altitude_m = scene.relays.first()?.altitude_m;
     let same = |other: f64| other.total_cmp(&altitude_m).is_eq();
@@ -51,7 +50,7 @@ pub fn optimum(scene: &Scene) -> Option<Chain> {
     alike.then(|| at_altitude(scene, altitude_m)).flatten()
 }
 
-/// The best chain at `altitude_m`, metres, > 0, whatever altitude the relays have in the scene.
+/// Returns the best chain at `altitude_m`, m, > 0, whatever the altitudes in the scene.
 pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     let line = Line::new(scene, altitude_m);
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
@@ -71,7 +70,7 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     })
 }
 
-/// The best target (linear) at the scene's least separation, to `tolerance` (relative); `None` as for [`optimum`].
+/// Returns the best target (linear) with the least separation, to a relative `tolerance`; `None` as for [`optimum`].
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)
@@ -84,7 +83,7 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
         return None;
     }
     let met = |target: f64| Stages::new(line, target, apart).is_some_and(|found| found.is_met());
-    // No chain beats the best of its first hop.
+    // No chain is better than its first hop.
     let whole = Span {
         low: 0.0,
         high: scene.distance_m,
@@ -98,7 +97,7 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
         }
     }
     while above - below > tolerance * below {
-        // The geometric mean: the targets span many decades.
+        // Geometric mean, because the targets span many decades.
         let middle = below * (above / below).sqrt();
         if met(middle) {
             below = middle;

@@ -1,59 +1,57 @@
-//! Any chain made better against the true sum, by one relay after the other.
+//! Local search that improves any chain against the true sum, one relay at a time.
 //!
-//! A relay that moves changes two hops: the one it hears and the one it feeds. It moves to where the worse of these two is
-//! best, between its neighbours; a pass there and one back let what one relay gains reach every hop. That is a local search: it
-//! improves a chain that was placed by an approximation, and cannot leave the side of an interferer that the chain is on.
+//! Moving a relay changes two hops: the one that it receives and the one that it sends. The relay moves, between its neighbours,
+//! to maximise the worse of the two; passes along the chain and back spread the gain. The search improves an approximate
+//! placement but cannot move the chain to the other side of an interferer.
 
 use super::altitude::golden;
 use uav_relay_scenario::scene::Corridor;
 use uav_relay_scenario::scene::{Place, Relay, Scene, Sender};
 
-/// Rounds after which it ends.
 const ROUNDS: u32 = 200;
 
-/// A round gains something if it gains more than this (relative).
+/// Least relative gain for a round to count as progress.
 const GAIN: f64 = 1e-6;
 
-/// Rounds in a row without a gain after which it ends: one alone may only prepare the gain of the next.
+/// Rounds without progress before the search ends: a single one may only prepare the gain of the next.
 const PATIENCE: u32 = 3;
 
-/// Places along x that are looked at before the best of them is refined.
+/// Positions along x that are scanned before the best is refined.
 const PLACES: u32 = 16;
 
-/// Altitudes, and sides, that are looked at in the first round, and the part of the room on either hand in later ones.
+/// Altitudes and lateral positions scanned in the first round; later rounds search this fraction of the range on either side.
 const LEVELS: u32 = 8;
 
 /// Golden-section steps: the interval shrinks by about 1e-7.
 const STEPS: u32 = 34;
 
-/// What came of polishing.
+/// Result of the local search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polished {
-    /// Where each relay stands from Tx to Rx.
+    /// Positions from Tx to Rx.
     pub places: Vec<Place>,
-    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`] of these places.
+    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// Rounds it took, the last one included; each is a pass there and one back.
+    /// Number of rounds, the last one included; each is a pass along the chain and one back.
     pub rounds: u32,
 }
 
-/// What one relay may do, its neighbours held still.
+/// The move of one relay while its neighbours are fixed.
 struct Turn<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
     before: Sender,
-    /// The next relay's place; `None` for the last one.
     next: Option<Place>,
-    /// Least distance from the relay before, metres: 0 from Tx.
+    /// Least distance from the previous relay, m; 0 from Tx.
     apart_before: f64,
 }
 
-/// The chain that is reached from `start` by moving relays within `room`; never worse than `start`.
+/// Returns the chain reached from `start` by moving relays within `room`; never worse than `start`.
 ///
-/// Relays keep their order and the least separation, as long as the start does; a relay that holds an altitude of its own
-/// only moves along x, and to the side. At most 200 rounds, fewer when three in a row gain less than a millionth each: a round is
-/// 2 N moves, a move about 50 SIRs at one altitude, 2 400 in a band and as many more with room to the side. `None` unless the
-/// start has one place per relay and at least one relay.
+/// Order and least separation are kept if the start has them; a relay with a fixed altitude moves along x and sideways only. At
+/// most 200 rounds, fewer when three in a row gain less than a millionth each. A round is 2 N moves, a move about 50 SIRs at one
+/// altitude, 2 400 in a band and as many again with lateral room. `None` unless the start has one position per relay and at least
+/// one relay.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],
@@ -86,7 +84,7 @@ pub fn polish(
     })
 }
 
-/// Moves relay `at`, counted from 0, if a better place is found for it.
+/// Moves relay `at` (from 0) if a better position is found.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;
     let (Some(&own), Some(relay)) = (places.get(at), relays.get(at)) else {
@@ -110,7 +108,6 @@ fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: 
 }
 
 impl Turn<'_> {
-    /// The worse of the two hops with this relay at `place`.
     fn sir(&self, place: Place) -> f64 {
         let heard = self.scene.sir_at(self.before, place);
         let fed = match self.next {
@@ -123,8 +120,7 @@ impl Turn<'_> {
         heard.min(fed)
     }
 
-    /// The best place that is found from `own` on, first upward and then to the side, and the SIR there: 0 where there is no
-    /// room.
+    /// Returns the best position found from `own`, first upward and then sideways, and its SIR: 0 if there is no room.
     fn best(&self, own: Place, room: Corridor, window: f64) -> (Place, f64) {
         let start = if self.relay.holds {
             own.h
@@ -150,7 +146,7 @@ impl Turn<'_> {
         best
     }
 
-    /// The best place found at altitude `h`, `y` to the side.
+    /// Returns the best position found at altitude `h` and lateral position `y`, and its SIR.
     fn best_at(&self, y: f64, h: f64) -> (Place, f64) {
         let (low, high) = self.room(y, h);
         if !(low <= high) {
@@ -171,8 +167,7 @@ impl Turn<'_> {
         }
     }
 
-    /// From where to where the relay may move along x at altitude `h`, `y` to the side, metres; the wrong way round where there
-    /// is no room.
+    /// Returns the range along x open to the relay at altitude `h` and lateral position `y`, m; reversed if there is no room.
     fn room(&self, y: f64, h: f64) -> (f64, f64) {
         let ahead = |apart: f64, other: Place| {
             let across = (y - other.y).powi(2) + (h - other.h).powi(2);
@@ -191,7 +186,7 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// The best of `at`, seen from `own`, over a `window` of the range from `least` to `most`: a scan and a refinement of its top.
+/// Returns the best of `at` within a `window` of the range around `own`: a scan and a refinement of its maximum.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

@@ -13,7 +13,7 @@ impl Span {
     }
 }
 
-/// The union of `spans` as disjoint intervals in rising order.
+/// Returns the union of `spans` as disjoint intervals in rising order.
 pub(super) fn merged(mut spans: Vec<Span>) -> Vec<Span> {
     spans.sort_by(|a, b| a.low.total_cmp(&b.low));
     let mut union: Vec<Span> = Vec::with_capacity(spans.len());
@@ -26,7 +26,7 @@ pub(super) fn merged(mut spans: Vec<Span>) -> Vec<Span> {
     union
 }
 
-/// What is in both, each given as disjoint intervals in rising order.
+/// Returns the intersection of two lists of disjoint intervals in rising order.
 pub(super) fn common(a: &[Span], b: &[Span]) -> Vec<Span> {
     let pairs = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
     pairs

@@ -1,42 +1,41 @@
-//! For one target: from which places each relay's part of the chain can be continued to Rx, exactly, at one altitude.
+//! For one target SIR and altitude: the exact sets of positions from which each relay's part of the chain can reach Rx.
 //!
-//! Heard at y, a hop's SIR depends only on its length, so its sender may stand anywhere in [y - d(y), y - s]: d(y) the longest
-//! hop that y hears at the target, s the least separation. From Rx back, the places of relay k from which the rest can be
-//! done are the union of these intervals over the places of relay k + 1. Over an interval of y on which d(y) >= s that is an
-//! interval again, from the least y - d(y) on; so each relay's set is a few intervals, known by their ends. With s = 0 it is
-//! one, [l_k, D]. A lower target only widens them, so that the best target can be bisected.
+//! For a receiver at y the SIR of a hop depends only on its length, so the sender may be anywhere in [y - d(y), y - s]: d(y) the
+//! hop range at the target, s the least separation. Backwards from Rx, the feasible positions of relay k are the union of these
+//! intervals over those of relay k + 1. Over an interval of y with d(y) >= s this union is again an interval, from the least y -
+//! d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
+//! target can be bisected.
 
 use super::crossing::boundary;
 use super::line::{Line, Stride};
 use super::spans::{Span, common, merged};
 
-/// How a relay in `from` can be continued: the next one stands somewhere in `to`.
+/// A feasible hop: for a relay anywhere in `from`, some position of the next relay in `to` works.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     from: Span,
     to: Span,
-    /// The place in `to` that hears the farthest back.
+    /// The receiver position in `to` with the farthest reach back.
     farthest: f64,
 }
 
-/// The steps of one relay.
 struct Stage {
     stride: Stride,
     steps: Vec<Step>,
 }
 
-/// A target that every hop but the first can meet.
+/// A target that every hop except the first can meet.
 pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
     target: f64,
-    /// The relays before the last, N - 1 down to 1.
+    /// Relays N - 1 down to 1.
     before: Vec<Stage>,
-    /// Where relay 1 may stand, as far as the hops after it go.
+    /// Positions of relay 1 that are feasible for the hops after it.
     first: Vec<Span>,
 }
 
-/// What a stride allows, worked out once for all relays that speak alike.
+/// Hop ranges for one stride, computed once for consecutive relays of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -44,9 +43,9 @@ struct Reach {
 }
 
 impl<'a> Stages<'a> {
-    /// The sets for `target` (linear, > 0) with relays at least `apart` metres apart; `None` where one of them is empty.
+    /// Computes the sets for `target` (linear, > 0) and a separation of `apart` metres; `None` if one is empty.
     ///
-    /// A scan of the line's nodes for every change of power from one relay to the next, and a few intervals a relay.
+    /// Work: a scan of the line's nodes for every change of power along the chain, and a few intervals per relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {
@@ -81,15 +80,15 @@ impl<'a> Stages<'a> {
         })
     }
 
-    /// Whether the first hop can meet the target, too.
+    /// Returns true if the first hop meets the target as well.
     pub(super) fn is_met(&self) -> bool {
         let best = self.line.best_first(&self.first);
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
     }
 
-    /// A chain that meets the target if [`Stages::is_met`], rising in x; `None` if the sets do not hang together.
+    /// Returns a chain that meets the target if [`Stages::is_met`], rising in x; `None` if the sets are not connected.
     ///
-    /// Each relay stands as near as the target lets it to an even division of the way that is left.
+    /// Each relay is as near to an even division of the remaining distance as the target allows.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -111,12 +110,12 @@ impl<'a> Stages<'a> {
         }))
     }
 
-    /// The place nearest to `wish` for the receiver of a relay at `x`.
+    /// Returns the position of the next relay nearest to `wish` that hears a relay at `x`.
     fn next_place(&self, stage: &Stage, x: f64, wish: f64) -> Option<f64> {
         let steps = stage.steps.iter().filter(|step| step.from.contains(x));
         let places = steps.map(|step| {
             let near = x + self.apart;
-            // It hears x if it is near enough, and else because it is the one that hears the farthest back.
+            // `sure` hears x: either it is close enough, or it is the position with the farthest reach back.
             let sure = step.farthest.max(near).min(step.to.high);
             let wish = wish.clamp(step.to.low.max(near).min(sure), step.to.high);
             toward(sure, wish, |y| self.line.heard_from(stage.stride, y) <= x)
@@ -125,7 +124,7 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// From where the next relay's places `spans` are heard.
+/// Returns the positions from which the next relay, somewhere in `spans`, can be reached.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -146,7 +145,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// `wish` if it holds there, else the last place on the way from `sure`, where it holds.
+/// Returns `wish` if `holds` is true there, else the last point on the way from `sure`, where it is true.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(wish) {
         wish

@@ -1,5 +1,6 @@
-//! Plans that choose altitudes and sides too, against one interferer: the joint method's own solver, and the places by the rules of
-//! the sweep that settles the relays.
+//! Plans with free altitudes and sides against one interferer, by the solver of the joint method.
+//!
+//! Positions follow the rules of the sweep that settles the relays on board.
 
 use core::task::Poll;
 
@@ -16,20 +17,19 @@ use super::found::{NoPlan, Plan, Why};
 use super::source;
 use uav_relay_scenario::Scenario;
 
-/// A solver for any chain.
 type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;
 
-/// The best places, sides and altitudes of so many relays that the joint method finds.
+/// Returns the best positions of `relays` relays with free altitudes and sides, by the joint method.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     match joint(&briefed) {
         Some(places) => Ok(briefed.plan(&places, "the joint method", false)),
-        // As the relays do, which then stay at the altitudes they hold.
+        // The relays do the same: they stay at their own altitudes.
         None => source::best(scenario, relays, tolerance),
     }
 }
 
-/// The places that the joint method finds; `None` where it finds none.
+/// Returns the joint method's positions; `None` if it finds none.
 fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
     solved(mission, |index| {
@@ -38,9 +38,9 @@ fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
     })
 }
 
-/// The places that the joint method finds for relays of which `seat_of` says what they bring along; `None` where it finds none.
+/// Returns the joint method's positions for relays with the profiles `seat_of`; `None` if it finds none.
 ///
-/// This is what one relay does by itself for the whole chain, and what the sweep makes of it.
+/// Computes what a relay on board solves for the whole chain, and the sweep that follows.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
     let target = loop {
@@ -86,10 +86,10 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
     Some(places)
 }
 
-/// The altitudes of the band at which a common one is tried: what many relays can do, few cannot do worse when each may choose.
+/// Number of common altitudes tried to bound the number of relays from above.
 const LEVELS: u8 = 9;
 
-/// The fewest relays that meet `target` when they may choose their altitudes.
+/// Returns a plan with the fewest relays that meet `target` with free altitudes.
 pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     fewest_of(
         scenario,
@@ -99,8 +99,10 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
     )
 }
 
-/// The fewest relays that meet `target`: between one and the fewest that do `at_level`, at one of the band's altitudes, by
-/// halving on what so many reach when `free` to choose. More relays are taken to do no worse.
+/// Returns a plan with the fewest relays that meet `target`, found by bisection on the number of relays.
+///
+/// The upper end is the fewest that meet it `at_level`, at one altitude of the band. `free` plans a given number of relays; more
+/// relays are assumed to do no worse.
 pub(super) fn fewest_of(
     scenario: &Scenario,
     target: f64,

@@ -1,4 +1,4 @@
-//! A mission as its relays are briefed for it.
+//! A mission together with the profile of each relay.
 
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::Scenario;
@@ -7,10 +7,10 @@ use uav_relay_sim::report::hop_sirs;
 
 use super::found::{NoPlan, Plan};
 
-/// Most relays that a scenario may ask to be told apart while their number is not yet known.
+/// Largest number of relays while the number is not yet known.
 pub(super) const MOST_RELAYS: u16 = uav_relay::mission::MAX_RELAYS;
 
-/// A mission, and what each relay of it holds.
+/// A mission, the relays' own profiles and the indices of relays with a fixed altitude.
 pub(super) struct Briefed {
     pub(super) mission: Mission,
     pub(super) own: Vec<(u16, Profile)>,
@@ -34,7 +34,6 @@ impl Briefed {
             .map_or(self.mission.config().common, |(_, profile)| *profile)
     }
 
-    /// Whether all relays have the same altitude.
     pub(super) fn level(&self) -> bool {
         let common = self.mission.config().common;
         self.own
@@ -42,7 +41,7 @@ impl Briefed {
             .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
     }
 
-    /// The plan of these places, which the crate's own formulas judge.
+    /// Returns the plan with these positions; its SIRs are computed by the crate's own formulas.
     pub(super) fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
         let held: Vec<(Placement, Profile)> = (1..)
             .zip(places)
@@ -67,7 +66,7 @@ impl Briefed {
     }
 }
 
-/// Whether a least separation costs nothing, as `is_as_good` finds of the scenario without it.
+/// Returns true if there is no least separation, or `is_as_good` says that removing it gains nothing.
 pub(super) fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {
         min_separation_m: 0.0,

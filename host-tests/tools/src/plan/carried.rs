@@ -1,15 +1,15 @@
-//! A plan that a scenario file carries on, to what is written into drones.
+//! Section `[plan]` of a scenario file, which carries a plan over to `cargo provision`.
 
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
 use uav_relay_scenario::{Planned, PlannedMethod, PlannedPlace};
 
 use super::flown::Flown;
 
-/// How far what is flown may be from what was planned, m and dB: what another machine's last digits come to.
+/// Tolerated difference between planned and recomputed positions and SIR, m and dB: rounding of another machine.
 const SAME_M: f64 = 0.1;
 const SAME_DB: f64 = 0.01;
 
-/// What a scenario is told of relays that fly `flown`.
+/// Returns the `[plan]` section for `flown`.
 pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned {
     let places: Vec<PlannedPlace> = flown
         .plan
@@ -30,15 +30,15 @@ pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned 
     }
 }
 
-/// The number that has the fewest digits of those that are nearest to this one.
+/// Returns the f64 with the shortest decimal form that rounds to `value`.
 fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
 
-/// The scenario file `text` with `planned` at its end, in place of the plan that it may have.
+/// Returns the scenario file `text` with `planned` at its end, which replaces an existing plan.
 ///
 /// # Errors
-/// Why it is no TOML.
+/// The reason if `text` is not valid TOML.
 pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
     let mut file: DocumentMut = text
         .parse()
@@ -65,7 +65,7 @@ pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
     places.set_trailing("\n");
     places.set_trailing_comma(true);
     table.insert("places", value(places));
-    // Behind all that is there: tables go where their number says.
+    // Puts the section last: tables are ordered by position.
     table.set_position(Some(isize::MAX));
     file.insert("plan", Item::Table(table));
     Ok(file.to_string())
@@ -75,10 +75,10 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Whether the plan that a scenario carries is what relays in that scenario fly: `flown`, of as many relays by its method.
+/// Checks that the scenario's plan still is what the relays fly: `flown`, recomputed with the same number and method.
 ///
 /// # Errors
-/// In one line, how far apart the two are.
+/// A line that states the differences.
 pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
     let places = planned.places.iter().zip(&flown.plan.places);
     let off_m = places

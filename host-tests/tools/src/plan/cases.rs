@@ -1,15 +1,15 @@
-//! The cases of the theorems, as what they mean for the drone.
+//! Explanations of the theorems' cases for the user.
 
 use uav_relay::planning::single::{aside, free, given_altitude, given_x};
 
-/// What an interferer at Rx leaves.
+/// Explanation for an interferer at Rx.
 const DROWNED: &str = "the interferer stands at Rx, where nothing is heard wherever the drone is";
 
-/// What an interferer at Tx leaves.
+/// Explanation for an interferer at Tx.
 const LEVEL: &str = "the drone goes right above Rx: the interferer stands at Tx, so the first hop is the same everywhere, and the \
                      second is best there";
 
-/// A case of Theorem 1.
+/// Explains a case of Theorem 1.
 pub(super) fn along_x(case: given_altitude::PlaceCase) -> &'static str {
     use given_altitude::PlaceCase;
     match case {
@@ -46,7 +46,7 @@ pub(super) fn along_x(case: given_altitude::PlaceCase) -> &'static str {
     }
 }
 
-/// A case of Theorem 2.
+/// Explains a case of Theorem 2.
 pub(super) fn upward(case: given_x::AltitudeCase) -> &'static str {
     use given_x::AltitudeCase;
     match case {
@@ -63,7 +63,7 @@ pub(super) fn upward(case: given_x::AltitudeCase) -> &'static str {
     }
 }
 
-/// A case of Theorem 3: its number, and what it means.
+/// Returns the number and explanation of a case of Theorem 3.
 pub(super) fn anywhere_above(case: free::FreeCase) -> (u8, String) {
     match case {
         free::FreeCase::Lowest(case) => (1, format!("as low as may be, {}", along_x(case))),
@@ -77,7 +77,7 @@ pub(super) fn anywhere_above(case: free::FreeCase) -> (u8, String) {
     }
 }
 
-/// A case of one relay aside.
+/// Explains a case of one relay beside the line.
 pub(super) fn sideways(case: aside::AsideCase) -> &'static str {
     use aside::{AsideCase, EdgeCoordinate};
     match case {

@@ -1,6 +1,6 @@
 //! Plans in a field of interference.
 //!
-//! The field is the same at every altitude, and the outer hops are best as low as may be: that is all there is to free altitudes.
+//! The field does not depend on the altitude, and the outer hops are best at the lowest one, so free altitudes reduce to that.
 
 use uav_relay::planning::fleet::ranges;
 use uav_relay::planning::single::stochastic;
@@ -33,7 +33,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     }
 }
 
-/// The best places of so many relays.
+/// Returns the best positions of `relays` relays.
 fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);
@@ -42,7 +42,7 @@ fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan
         return Ok(briefed.plan(&[found.place], "Algorithm 3", true));
     }
     if !briefed.own.is_empty() {
-        // Relays that differ: what they would settle on by themselves.
+        // Different powers or altitudes: the positions that the relays agree on by themselves.
         let target = solved(&briefed)?;
         let places = placed(&briefed, target).ok_or_else(nothing)?;
         return Ok(briefed.plan(&places, "Algorithm 4", false));

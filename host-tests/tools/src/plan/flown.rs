@@ -1,7 +1,7 @@
-//! What relays that are given a scenario will fly by themselves, and what that loses to the best there is.
+//! Positions that relays given a scenario agree on by themselves, and their loss against the best known ones.
 //!
-//! On board there is one interferer, or a field: one that stands for several is a stand-in, and in an uneven field Algorithm 4 falls short.
-//! What their places are worth is judged against all that is there.
+//! On board there is a single interferer or a field. A hypothetical interferer in place of several is an approximation, and
+//! Algorithm 4 falls short in an uneven field, so the positions are judged against the full interference.
 
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, mission};
@@ -11,29 +11,29 @@ use super::found::{LOSS, NoPlan, Plan};
 use super::several::with_one;
 use super::{altitude, source};
 
-/// A chain as it settles by itself.
+/// A chain as the relays settle by themselves.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
-    /// Its places, with their SIRs against all that is there.
+    /// Positions, with SIRs against the full interference.
     pub plan: Plan,
-    /// The best SIR (linear) of the worst hop that the planner knows of for as many relays.
+    /// Best SIR (linear) of the worst hop that the planner finds for the same number of relays.
     pub best_sir: f64,
-    /// Whether one interferer stands for several on board.
+    /// True if a hypothetical interferer replaces several on board.
     pub stand_in: bool,
 }
 
 impl Flown {
-    /// What is lost, as a part of the best SIR: 0 for nothing.
+    /// Returns the loss as a fraction of the best SIR; 0 for none.
     pub fn loss(&self) -> f64 {
         (1.0 - self.plan.sir() / self.best_sir).max(0.0)
     }
 
-    /// Whether that is too much to fly without a word.
+    /// Returns true if the loss exceeds [`LOSS`].
     pub fn is_poor(&self) -> bool {
         self.loss() > LOSS
     }
 
-    /// How much is lost, and what can be done about it, in one line.
+    /// Returns a line with the loss, its cause and the remedy.
     pub fn describe(&self) -> String {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
@@ -55,12 +55,12 @@ impl Flown {
     }
 }
 
-/// What `relays` relays in `scenario` settle on by `method`.
+/// Returns the chain that `relays` relays in `scenario` settle on by `method`.
 ///
 /// Work: that of [`super::plan`] twice.
 ///
 /// # Errors
-/// [`NoPlan`] where there is nothing to settle on.
+/// [`NoPlan`] if the relays settle on nothing.
 pub fn flown(
     scenario: &Scenario,
     relays: u16,
@@ -83,7 +83,7 @@ pub fn flown(
     })
 }
 
-/// The places by themselves, and their SIRs against all.
+/// Returns the plan of the relays by themselves, with SIRs against the full interference.
 fn alone(
     scenario: &Scenario,
     relays: u16,

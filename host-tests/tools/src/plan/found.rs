@@ -1,4 +1,4 @@
-//! What planning comes to.
+//! Results of planning.
 
 use uav_relay::mission::MAX_RELAYS;
 use uav_relay::{Mission, Placement, Profile};
@@ -7,70 +7,70 @@ use uav_relay_scenario::mission::Refusal;
 
 use super::unit::Unit;
 
-/// By how much places may fall short of the best, as a part of its SIR, and still be good enough.
+/// Tolerated loss of positions against the best ones, as a fraction of the SIR.
 pub const LOSS: f64 = 0.01;
 
-/// Which of the paper's theorems, or what stands in for one, placed the only relay, and by which of its cases.
+/// The theorem and case that placed the only relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Theorem {
-    /// 1 to 3; 4 for one relay aside, which is not in the paper.
+    /// 1 to 3; 4 for one relay beside the line, which is not in the paper.
     pub number: u8,
-    /// The number of the case there; 0 for one that the paper leaves out.
+    /// Number of the case in the paper; 0 for a case that the paper omits.
     pub case: u8,
-    /// What the case means for the drone.
+    /// Explanation of the case for the user.
     pub words: String,
 }
 
-/// What became of several interferers.
+/// The hypothetical interferer that replaces several.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fitted {
-    /// The one interferer that stands for all.
+    /// Power, position and error of the hypothetical interferer.
     pub hypothetical: Hypothetical,
-    /// SIR (linear) against all of them of the places that are best against that one; `None` where there are none.
+    /// SIR (linear) against all interferers of the positions that are best against it; `None` if there are none.
     pub sir: Option<f64>,
-    /// Whether those places were good enough to keep; if not, the plan's are the best against all interferers.
+    /// True if those positions are the plan's; otherwise the plan's are the best found against all interferers.
     pub kept: bool,
 }
 
-/// Where the relays go.
+/// A plan: positions of the relays and their SIRs.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Plan {
-    /// The relays' mission.
+    /// Mission of the relays.
     pub mission: Mission,
-    /// Their places and what they hold, relay 1 first.
+    /// Positions and profiles, relay 1 first.
     pub places: Vec<(Placement, Profile)>,
     /// SIR (linear) of hops 1 to N + 1.
     pub sirs: Vec<f64>,
-    /// How they were found.
+    /// Name of the algorithm that found the positions.
     pub how: &'static str,
-    /// Whether it is certain that no places are better, or that no fewer relays do.
+    /// True if it is proven that no positions are better, or that no fewer relays suffice.
     pub proven: bool,
-    /// Where one of the theorems placed the only relay.
+    /// Theorem that placed the only relay, if one did.
     pub theorem: Option<Theorem>,
-    /// For a target: the most that so many relays can have, linear SIR, where that is known.
+    /// Best SIR (linear) of as many relays, if known; only for a target.
     pub most: Option<f64>,
-    /// Where there are several interferers.
+    /// Present with several interferers.
     pub fitted: Option<Fitted>,
 }
 
-/// Why no placement meets what was asked.
+/// Why the request cannot be met.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Why {
-    /// In words.
+    /// An explanation.
     Plain(String),
-    /// No number of relays gives every hop the target.
+    /// The target cannot be met by any number of relays.
     Short {
-        /// The SIR that was asked for, linear.
+        /// Requested SIR, linear.
         target: f64,
-        /// The most that was found, linear.
+        /// Best SIR found, linear.
         most: f64,
-        /// How many relays have it, where no number has more.
+        /// Number of relays with the best SIR; `None` if more might do better.
         relays: Option<u16>,
     },
 }
 
 impl Why {
-    /// In one line, with SIRs in `unit`.
+    /// Returns the reason in one line, with SIRs in `unit`.
     pub fn say(&self, unit: Unit) -> String {
         match self {
             Self::Plain(line) => line.clone(),
@@ -102,9 +102,9 @@ impl Default for Why {
 /// Why there is no plan.
 #[derive(Clone, PartialEq, Debug)]
 pub enum NoPlan {
-    /// The scenario is no mission, or what is asked for does not go with it.
+    /// The scenario is not a valid mission, or the request does not fit it.
     Wrong(String),
-    /// No placement meets what was asked, and the most that was found (linear SIR).
+    /// The request cannot be met; with the best SIR found (linear).
     Unmet(Why, Option<f64>),
 }
 
@@ -118,12 +118,11 @@ impl From<Refusal> for NoPlan {
 }
 
 impl Plan {
-    /// SIR (linear) of the worst hop.
+    /// Returns the SIR (linear) of the worst hop.
     pub fn sir(&self) -> f64 {
         self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// The places alone.
     pub(super) fn chain(&self) -> Vec<Placement> {
         self.places.iter().map(|(place, _)| *place).collect()
     }

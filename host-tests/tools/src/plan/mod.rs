@@ -1,13 +1,13 @@
-//! The planner: how many relays a target needs, or where a given number goes, worked out without a message.
+//! The planner: how many relays a target needs, or where a given number goes, computed without messages.
 //!
 //! | interference | file |
 //! | --- | --- |
 //! | one interferer | `one`, `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
-//! | a field | `field`: Algorithm 3 for one relay, Algorithm 4 and Problem 1, exact for equals, for more |
-//! | several interferers | `several`: the hypothetical MSI, and the true sum where that is not good enough |
+//! | a field | `field`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
+//! | several interferers | `several`: the hypothetical interferer, or the true sum where that is not good enough |
 //!
-//! Places are found by the crate's own maths, the same that flies, wherever the crate has it. [`Plan::proven`] says whether what
-//! was found is known to be the best there is.
+//! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
+//! optimal.
 
 mod altitude;
 mod ask;
@@ -38,7 +38,7 @@ pub use unit::Unit;
 /// Work: some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
-/// [`NoPlan`]: what is wrong, or what the most is.
+/// [`NoPlan`]: an invalid request, or the best SIR that can be had.
 pub fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     match &scenario.interference {
@@ -48,7 +48,7 @@ pub fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     }
 }
 
-/// Whether what is asked for goes together.
+/// Checks that the options of the request are compatible.
 fn check(scenario: &Scenario, ask: &Ask) -> Result<(), NoPlan> {
     let Some(x_m) = ask.x_m else { return Ok(()) };
     let d = scenario.distance_m;

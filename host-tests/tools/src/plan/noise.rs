@@ -1,16 +1,16 @@
-//! The receivers' noise, where a bandwidth and a noise figure make it.
+//! Receiver noise computed from bandwidth and noise figure.
 
 use std::fmt;
 
 use serde::Serialize;
 use uav_relay_scenario::Noise;
 
-/// The noise at the input of every receiver, and the numbers it came from: k T0 B F.
+/// Noise at the input of every receiver, k T0 B F, and its parameters.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct NoiseReport {
-    /// That power, W.
+    /// Noise power, W.
     pub power_w: f64,
-    /// The same in dBm.
+    /// Noise power, dBm.
     pub power_dbm: f64,
     /// B, Hz.
     pub bandwidth_hz: f64,
@@ -18,12 +18,12 @@ pub struct NoiseReport {
     pub figure_db: f64,
     /// T0, K.
     pub temperature_k: f64,
-    /// What counts against the signal where the receivers' antennas have a gain, W: that power over the lower gain.
+    /// Effective noise power with receiver antenna gain, W: the noise power over the lower gain.
     pub effective_w: f64,
 }
 
 impl NoiseReport {
-    /// The noise of a scenario; `None` where there is none, or where the scenario says the power itself.
+    /// Returns the noise of a scenario; `None` if there is none, or if the scenario states the power itself.
     pub fn of(noise: &Noise) -> Option<Self> {
         let power_w = noise.receiver_w();
         let is_made = noise.power_dbm.is_none() && power_w > 0.0;

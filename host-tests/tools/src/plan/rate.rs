@@ -1,8 +1,8 @@
-//! Data rates of a chain whose hops share one frequency in time slots of equal length.
+//! Data rates of a chain whose hops share one frequency in equal time slots.
 //!
-//! The paper assumes one frequency. A hop then sends in one of N + 1 slots, and N relays carry B log2(1 + SIR) / (N + 1), with the SIR of the
-//! worst hop: more relays raise the SIR and divide the time. Slots fitted to the hops, spatial reuse and a frequency of its own for every hop
-//! are not modelled here.
+//! The paper assumes one frequency, so each hop sends in one of N + 1 slots. N relays carry B log2(1 + SIR) / (N + 1), with the
+//! SIR of the worst hop: more relays raise the SIR but shorten the slots. Slots fitted to the hops, spatial reuse and separate
+//! frequencies per hop are not modelled.
 
 use serde::Serialize;
 use uav_relay_scenario::{Interference, Scenario};
@@ -10,60 +10,61 @@ use uav_relay_scenario::{Interference, Scenario};
 use super::ask::{Ask, Number};
 use super::found::{NoPlan, Plan};
 
-/// The largest number of relays that is tried, where a plan of many relays takes milliseconds.
+/// Largest number of relays tried where a plan takes milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// The same, where it takes seconds.
+/// Largest number of relays tried where a plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Returns the number of slots of a chain of `relays` relays: one for each hop.
+/// Returns the number of slots of a chain of `relays` relays: one per hop.
 pub const fn slots(relays: u16) -> u32 {
     relays as u32 + 1
 }
 
-/// Returns the data rate of a hop while it sends at an SIR (linear) over a bandwidth, bit/s: Shannon's, with the interference as noise.
+/// Returns the data rate of a hop while it sends, bit/s: Shannon's, with the interference as noise; `sir` is linear.
 pub fn hop_bps(bandwidth_hz: f64, sir: f64) -> f64 {
     bandwidth_hz * sir.ln_1p() / std::f64::consts::LN_2
 }
 
-/// Returns the SIR (linear) that a data rate takes over a bandwidth; the inverse of [`hop_bps`].
+/// Returns the SIR (linear) needed for a data rate over a bandwidth; the inverse of [`hop_bps`].
 pub fn sir_for_hop(bandwidth_hz: f64, rate_bps: f64) -> f64 {
     (rate_bps / bandwidth_hz * std::f64::consts::LN_2).exp_m1()
 }
 
-/// Returns the data rate of a chain of `relays` relays with a worst SIR (linear) of `sir`, bit/s.
+/// Returns the data rate of a chain of `relays` relays, bit/s; `sir` is that of the worst hop, linear.
 pub fn chain_bps(bandwidth_hz: f64, relays: u16, sir: f64) -> f64 {
     hop_bps(bandwidth_hz, sir) / f64::from(slots(relays))
 }
 
-/// The number of relays that carries most, of the numbers that were tried.
+/// The number of relays with the largest data rate among those tried.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct BestRate {
     /// Number of relays.
     pub best_uavs: u16,
-    /// Their data rate, bit/s.
+    /// Data rate, bit/s.
     pub best_rate_bps: f64,
-    /// The numbers tried are 1 to this.
+    /// Numbers tried: 1 to this one.
     pub tried_uavs: u16,
     /// True if no larger number can carry more: the SIR at the receiver is bounded, and the slots shorten.
     pub best_is_proven: bool,
 }
 
-/// The data rates of a scenario's chains over one bandwidth.
+/// Data rates of a scenario's chains over one bandwidth.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Rates {
-    /// The number of relays that carries most.
+    /// The number of relays with the largest data rate.
     pub best: BestRate,
-    /// The fewest relays that carry the target, where there is one and they do.
+    /// Plan with the fewest relays that carry the target, if one is given and can be met.
     pub meeting: Option<Plan>,
 }
 
 impl Rates {
-    /// Plans 1, 2, 3 and more relays as `ask` has it, until no larger number can carry more or as many are tried as are planned in seconds;
-    /// `target_bps` is the rate that is wanted.
+    /// Plans 1, 2, 3 and more relays until no larger number can carry more, or the limit for a few seconds is reached.
+    ///
+    /// `target_bps` is the wanted rate.
     ///
     /// # Errors
-    /// [`NoPlan`] where no number of relays has a plan.
+    /// [`NoPlan`] if no number of relays has a plan.
     pub fn new(
         scenario: &Scenario,
         ask: &Ask,
@@ -88,7 +89,7 @@ impl Rates {
             };
             let plan = match super::plan(scenario, &one) {
                 Ok(plan) => plan,
-                // A larger number has still less room.
+                // More relays need more room.
                 Err(none) => {
                     refused = Some(none);
                     break;
@@ -120,7 +121,7 @@ impl Rates {
     }
 }
 
-/// Returns the largest number of relays that is tried.
+/// Returns the largest number of relays to try.
 fn most_tried(scenario: &Scenario, ask: &Ask) -> u16 {
     let is_several =
         matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
@@ -133,9 +134,9 @@ fn most_tried(scenario: &Scenario, ask: &Ask) -> u16 {
     }
 }
 
-/// Returns an upper bound on the SIR (linear) at the receiver of any number of relays, from that of `plan`.
+/// Returns an upper bound on the SIR (linear) at Rx for any number of relays, from that of `plan`.
 ///
-/// The interference at the receiver does not depend on the relays. The signal is largest from right above it, at the lowest altitude and with
+/// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest altitude and with
 /// the largest power.
 fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
     let (Some((last, profile)), Some(sir)) = (plan.places.last(), plan.sirs.last()) else {

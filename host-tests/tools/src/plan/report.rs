@@ -1,4 +1,4 @@
-//! The report of a plan.
+//! Report of a plan.
 
 use std::fmt::{self, Write as _};
 
@@ -13,54 +13,54 @@ use super::noise::NoiseReport;
 use super::rate::{self, BestRate};
 use super::unit::Unit;
 
-/// The one interferer that stands for several.
+/// The hypothetical interferer that replaces several.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct HypotheticalReport {
-    /// Its transmit power, W.
+    /// Transmit power, W.
     pub power_w: f64,
-    /// Its place along x, m.
+    /// Position along x, m.
     pub x_m: f64,
-    /// Its distance from that line, m: to its right above 0.
+    /// Lateral position, m; positive to the right of the line.
     pub y_m: f64,
-    /// How far the interference that a relay receives from it is from that of all, on average over where relays may be, W.
+    /// Mean absolute error of its interference against the true sum, over the positions that relays may take, W.
     pub mean_abs_error_w: f64,
-    /// The same as a part of the average interference of all.
+    /// Mean absolute error divided by the mean interference.
     pub relative_error: f64,
-    /// SIR against all of the places that are best against it alone, linear; absent where there are none.
+    /// SIR (linear) against all interferers of the positions that are best against it; absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// Whether these places are the plan's. If not, the plan's are the best that were found against all.
+    /// True if these positions are the plan's. Otherwise the plan's are the best found against all interferers.
     pub kept: bool,
-    /// What these places lose to the plan's, as a part of its SIR: 0 for nothing.
+    /// Loss of these positions against the plan's, as a fraction of the plan's SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// By how much the plan's SIR is above theirs, as a part of it.
+    /// Gain of the plan's SIR over that of these positions, as a fraction of the latter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
 }
 
-/// The data rates of a chain whose hops share one frequency in time slots of equal length.
+/// Data rates of a chain whose hops share one frequency in equal time slots.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RateReport {
-    /// The data rate of the chain, bit/s: that of the worst hop over the number of slots. Absent where there is no plan.
+    /// Data rate of the chain, bit/s: that of the worst hop over the number of slots. Absent without a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<f64>,
-    /// The data rate of the worst hop while it sends, bit/s: bandwidth x log2(1 + SIR).
+    /// Data rate of the worst hop while it sends, bit/s: bandwidth x log2(1 + SIR).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<f64>,
-    /// Number of time slots: one for each hop.
+    /// Number of time slots: one per hop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
-    /// The target, bit/s.
+    /// Target, bit/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_rate_bps: Option<f64>,
-    /// The number of relays that carries most.
+    /// The number of relays with the largest data rate.
     #[serde(flatten)]
     pub best: BestRate,
 }
 
 impl RateReport {
-    /// The rates of `plan` over `bandwidth_hz`; without a plan only the largest.
+    /// Creates the report of `plan` over `bandwidth_hz`; without a plan it has only the largest rate.
     pub fn new(
         plan: Option<&Plan>,
         bandwidth_hz: f64,
@@ -122,86 +122,88 @@ impl fmt::Display for BestRate {
     }
 }
 
-/// What the model leaves out.
+/// Limits of the model.
 const NOT_MODELLED: &str = "not modelled: terrain and obstacles, and the link from Rx back to Tx";
 
-/// The result of `cargo plan`.
+/// Result of `cargo plan`.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct PlanReport {
-    /// Number of relays; absent where no number meets the target.
+    /// Number of relays; absent if no number meets the target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uavs: Option<u16>,
-    /// What went wrong, if anything.
+    /// Error message, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// The most that was found, linear SIR, where what was asked for cannot be had.
+    /// Best SIR found (linear) if the request cannot be met.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// The same in dB, where it is above 0.
+    /// `best_sir` in dB, if above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
     /// SIR of the worst hop, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// The same in dB.
+    /// SIR of the worst hop, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
-    /// The data rates over the bandwidth that was given.
+    /// Data rates over the given bandwidth.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub rates: Option<RateReport>,
-    /// The target, linear SIR.
+    /// Target SIR, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir: Option<f64>,
-    /// The same in dB.
+    /// Target SIR, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir_db: Option<f64>,
-    /// With a target: the most that so many relays can have, linear SIR.
+    /// Best SIR of as many relays, linear; only for a target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir: Option<f64>,
-    /// The same in dB.
+    /// `most_sir` in dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir_db: Option<f64>,
-    /// How the places were found.
+    /// Name of the algorithm that found the positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub how: Option<&'static str>,
-    /// Whether no places are better, and no fewer relays enough. False means that it is not known.
+    /// True if no positions are better and no fewer relays suffice; false if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
-    /// The theorem that placed the only relay, 1 to 3; 4 for one relay aside.
+    /// Theorem that placed the only relay, 1 to 3; 4 for one relay beside the line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
-    /// Its case as the paper counts them; 0 for one that the paper leaves out. For Theorem 3 the edge of the box: 1 lowest, 2
-    /// highest, 3 above Rx. For one relay aside: 1 where the circles of equal SIR touch, 2 on the hill of the first hop, 3 above
-    /// Rx, 4 to 6 on an edge of the corridor along x, along y or upward, 7 and 8 with the interferer at Tx or Rx.
+    /// Case number of the theorem in the paper; 0 for a case that the paper omits.
+    ///
+    /// For Theorem 3 the edge of the box: 1 lowest, 2 highest, 3 above Rx. For one relay beside the line: 1 where the circles of
+    /// equal SIR touch, 2 the maximum of the first hop, 3 above Rx, 4 to 6 an edge of the corridor along x, along y or upward, 7
+    /// and 8 with the interferer at Tx or Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
-    /// What the case means for the drone.
+    /// Explanation of the case for the user.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case_words: Option<String>,
-    /// The relays, from the transmitter on.
+    /// Relays, from the transmitter on.
     pub relays: Vec<RelayReport>,
     /// SIR at the receiver, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir: Option<f64>,
-    /// The same in dB.
+    /// SIR at the receiver, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
-    /// The noise that a bandwidth and a noise figure make.
+    /// Noise computed from a bandwidth and a noise figure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseReport>,
-    /// For several interferers.
+    /// Present with several interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
-    /// Whether there is room beside the line: the table then says where in it a relay is.
+    /// True if the corridor has lateral room: the table then has a column for it.
     #[serde(skip)]
     pub room: bool,
-    /// The unit that SIRs were asked for in.
+    /// Unit of the SIRs in the request.
     #[serde(skip)]
     pub unit: Unit,
 }
 
 impl PlanReport {
-    /// The report of a plan for `number` relays.
+    /// Creates the report of a plan for the request `number`.
     pub fn new(plan: &Plan, number: Number, unit: Unit) -> Self {
         let sir = plan.sir();
         let rx_sir = plan.sirs.last().copied();
@@ -253,7 +255,7 @@ impl PlanReport {
         }
     }
 
-    /// The report of what could not be had: why, and the most that was found (linear SIR).
+    /// Creates the report of a request that cannot be met: the reason and the best SIR found (linear).
     pub fn unmet(why: &Why, best_sir: Option<f64>, number: Number, unit: Unit) -> Self {
         let (uavs, target_sir) = match number {
             Number::Of(relays) => (Some(relays), None),
@@ -271,13 +273,13 @@ impl PlanReport {
         }
     }
 
-    /// The same, with data rates.
+    /// Adds data rates.
     #[must_use]
     pub fn with_rates(self, rates: Option<RateReport>) -> Self {
         Self { rates, ..self }
     }
 
-    /// The same, of a scenario with that noise.
+    /// Adds the scenario's noise.
     #[must_use]
     pub fn in_noise(self, noise: &Noise) -> Self {
         Self {
@@ -286,7 +288,7 @@ impl PlanReport {
         }
     }
 
-    /// The report as a table to read.
+    /// Returns the report as a table.
     pub fn table(&self) -> String {
         let mut text = hops_table(&self.relays, &[], self.rx_sir, self.room);
         let (Some(uavs), Some(sir)) = (self.uavs, self.sir) else {

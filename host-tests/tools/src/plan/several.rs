@@ -1,7 +1,7 @@
 //! Plans against several interferers.
 //!
-//! One hypothetical interferer stands for all, so that the relays can find their places by themselves. What its places are
-//! worth is judged against the true sum; where they lose more than a hundredth to the best against that sum, those are taken.
+//! A hypothetical interferer replaces them, so that relays can find their positions by themselves. These positions are judged
+//! against the true sum; if they lose more than a hundredth to the best against that sum, the latter are used.
 
 use uav_relay::Placement;
 
@@ -16,10 +16,10 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// How many of the starts are polished: the best against the true sum.
+/// Number of starting chains that are polished: the best against the true sum.
 const POLISHED: usize = 2;
 
-/// How many of the interferers are tried alone, to begin with.
+/// Number of interferers that are tried alone for starting chains.
 const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
@@ -53,10 +53,10 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     }
 }
 
-/// The scenario with the hypothetical interferer alone.
+/// Returns the scenario with the hypothetical interferer in place of all others.
 pub(super) fn with_one(scenario: &Scenario, one: &Hypothetical) -> Scenario {
     let mut source = one.source();
-    // No mission takes more; only interferers next to that limit have one that is stronger.
+    // A mission's power limit; only the fit of interferers near that limit exceeds it.
     source.power_w = source.power_w.min(1e9);
     Scenario {
         interference: Interference::Sources(vec![source]),
@@ -70,7 +70,7 @@ struct Planner<'a> {
     hypothetical: Hypothetical,
 }
 
-/// Two chains of as many relays, with their SIRs against the true sum.
+/// Two chains of the same number of relays, with their SIRs against the true sum.
 struct Candidates {
     scene: Scene,
     relays: u16,
@@ -78,7 +78,7 @@ struct Candidates {
     by_all: Option<Best>,
 }
 
-/// The best chain against the true sum that was found.
+/// Best chain found against the true sum.
 struct Best {
     places: Vec<Placement>,
     sir: f64,
@@ -111,7 +111,7 @@ impl Planner<'_> {
         })
     }
 
-    /// The best chain against the true sum, which for altitudes that differ or may be chosen is polished from fair ones.
+    /// Returns the best chain against the true sum; polished from several starts if altitudes differ or are free.
     fn by_all(&self, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         if let Some(x_m) = self.ask.x_m {
             return at(scene, x_m);
@@ -133,7 +133,7 @@ impl Planner<'_> {
                 Some(places(&plan))
             }));
         } else {
-            // Altitudes differ, and each is to be kept, right above the line.
+            // Relays keep their different altitudes, right above the line.
             (scene.band.left_m, scene.band.right_m) = (0.0, 0.0);
             for relay in &mut scene.relays {
                 relay.holds = true;
@@ -153,8 +153,9 @@ impl Planner<'_> {
             .max_by(|a, b| a.sir.total_cmp(&b.sir))
     }
 
-    /// Scenarios with one interferer whose chains may go another way than the first: with the hypothetical interferer on the
-    /// other side, with room to one side or to none, and with each of the first interferers alone.
+    /// Returns single-interferer scenarios whose chains may take another route.
+    ///
+    /// The hypothetical interferer on the other side, with room on one side or none, and each of the first interferers alone.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
@@ -187,7 +188,7 @@ impl Planner<'_> {
         variants
     }
 
-    /// The fewest relays one of whose chains meets `target`: more are taken to do no worse.
+    /// Returns the fewest relays that meet `target`; more relays are assumed to do no worse.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
         let mut most: f64 = 0.0;
         let mut meets = |relays: u16| -> Result<Option<Candidates>, NoPlan> {
@@ -227,14 +228,13 @@ impl Planner<'_> {
 }
 
 impl Candidates {
-    /// The better SIR of the two.
     fn sir(&self) -> f64 {
         let one = self.by_one.as_ref().map_or(0.0, |(_, sir)| *sir);
         let all = self.by_all.as_ref().map_or(0.0, |best| best.sir);
         one.max(all)
     }
 
-    /// The plan: by the hypothetical interferer where that is good enough, for `target` if there is one, else by all of them.
+    /// Returns the hypothetical interferer's chain if it is good enough (or meets `target`), else the one against the true sum.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, sir)| *sir);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);
@@ -264,7 +264,7 @@ impl Candidates {
             }
             _ => return Err(source::nothing()),
         };
-        // Relays that share one place hear each other infinitely well.
+        // Relays at the same position have an infinite SIR.
         let sirs = self.scene.hop_sirs(&plan.chain());
         Ok(Plan {
             sirs: sirs
@@ -279,7 +279,7 @@ impl Candidates {
 }
 
 impl Best {
-    /// The chain at the f32 places that relays are told.
+    /// Creates the chain at the f32 positions that relays use.
     fn new(scene: &Scene, places: &[impl Copy + Into<Place>], proven: bool) -> Self {
         let places: Vec<Placement> = places
             .iter()
@@ -300,12 +300,11 @@ impl Best {
     }
 }
 
-/// The places of a plan.
 fn places(plan: &Plan) -> Vec<Place> {
     plan.chain().into_iter().map(Place::from).collect()
 }
 
-/// One relay at `x_m`: the best altitude of a fine scan of the band, closed in on four times.
+/// Returns the best position of one relay at `x_m`: a scan of the altitude band, refined four times.
 fn at(scene: &Scene, x_m: f64) -> Option<Best> {
     const ROWS: u16 = 200;
     let band = scene.band;

@@ -1,4 +1,4 @@
-//! Places against one interferer: one relay by a theorem, several at the altitudes they hold.
+//! Plans against one interferer: one relay by a theorem, several at their own altitudes.
 
 use uav_relay::optimiser::plan as silent;
 use uav_relay::planning::fleet;
@@ -12,7 +12,7 @@ use super::found::{NoPlan, Plan, Theorem, Why};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 
-/// The fewest relays at the altitudes they hold, by eq. (Opt).
+/// Returns the fewest relays at their own altitudes, by eq. (Opt).
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     let plan = fewest(scenario, target, tolerance, "eq. (Opt)")?;
     let most = best(scenario, plan.mission.relays(), tolerance);
@@ -22,7 +22,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     })
 }
 
-/// One relay, by Theorem 1, 2 or 3, or beside the line. One that holds its altitude holds its place above the line too.
+/// Returns the best position of one relay, by a theorem or beside the line; with a fixed altitude it stays above the line.
 pub(super) fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
@@ -56,7 +56,7 @@ pub(super) fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     })
 }
 
-/// The mission whose band is the one altitude that its relay holds.
+/// Returns the mission with the relay's own altitude as its band.
 fn at_one_altitude(mission: &Mission, profile: Profile) -> Mission {
     let config = MissionConfig {
         band: Band::at(profile.altitude_m),
@@ -120,7 +120,7 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
     ))
 }
 
-/// The best places of so many relays at the altitudes they hold: Algorithm 1 without its messages.
+/// Returns the best positions of relays at their own altitudes: Algorithm 1 without messages.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
@@ -133,7 +133,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     Ok(briefed.plan(&places, "Algorithm 1", proven))
 }
 
-/// The target that the relays would settle on.
+/// Returns the target that the relays would agree on.
 pub(super) fn solved(briefed: &Briefed) -> Result<f32, NoPlan> {
     silent::solve(&briefed.mission, Schedule::Bracketed, |index| {
         briefed.profile(index)
@@ -142,14 +142,14 @@ pub(super) fn solved(briefed: &Briefed) -> Result<f32, NoPlan> {
     .map_err(|_| nothing())
 }
 
-/// Where they stand for it.
+/// Returns the relays' positions for a target.
 pub(super) fn placed(briefed: &Briefed, target: f32) -> Option<Vec<Placement>> {
     let mut places = vec![Placement::default(); usize::from(briefed.mission.relays())];
     let profile_of = |index| briefed.profile(index);
     fleet::places(&briefed.mission, target, profile_of, &mut places).then_some(places)
 }
 
-/// The fewest relays at the altitudes they hold, and their places for the target.
+/// Returns the fewest relays at their own altitudes, and their positions for the target.
 pub(super) fn fewest(
     scenario: &Scenario,
     target: f64,
@@ -161,16 +161,13 @@ pub(super) fn fewest(
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// The mission of the fewest relays that meet `target` at the altitudes they hold, and whether no fewer do.
-///
-/// # Errors
-/// [`NoPlan::Unmet`], with the most that any number of relays can have.
+/// Returns the mission of the fewest relays that meet `target` at their own altitudes, and whether that is proven.
 pub(super) fn enough(
     scenario: &Scenario,
     target: f64,
     tolerance: f64,
 ) -> Result<(Briefed, bool), NoPlan> {
-    // Their number is not known yet: what differs for a relay counts once there are so many.
+    // The number is not known yet: profiles of relays beyond it are ignored later.
     let alone = Briefed::new(scenario, 1, tolerance)?;
     let own = Briefed {
         own: own_profiles(scenario, &alone.mission),
@@ -191,7 +188,7 @@ pub(super) fn enough(
     Err(NoPlan::Unmet(why, Some(best)))
 }
 
-/// What any relay of the scenario would hold of its own, whatever their number.
+/// Returns the profiles of all relays that the scenario lists, whatever their number.
 fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
     let common = mission.config().common;
     scenario

@@ -1,9 +1,9 @@
-//! SIRs in the unit in which they were asked for.
+//! Formatting of SIRs in the unit of the request.
 
-/// The unit of an answer.
+/// Unit of SIRs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Unit {
-    /// A ratio of powers.
+    /// Ratio of powers.
     #[default]
     Linear,
     /// Decibels.
@@ -11,7 +11,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// An SIR (linear) in this unit, with the digits of a result.
+    /// Formats an SIR (linear) in this unit, rounded as a result.
     pub fn say(self, sir: f64) -> String {
         match self {
             Self::Linear => format!("{sir:.6}"),
@@ -19,16 +19,16 @@ impl Unit {
         }
     }
 
-    /// An SIR (linear) in this unit with all its digits, as it was asked for.
+    /// Formats an SIR (linear) in this unit with all the digits of the request.
     pub fn asked(self, sir: f64) -> String {
         match self {
             Self::Linear => format!("{sir}"),
-            // An SIR comes from decibels and goes back to them by logarithms.
+            // Rounds off the error of converting decibels to linear and back.
             Self::Decibels => format!("{} dB", (10.0 * sir.log10() * 1e9).round() / 1e9),
         }
     }
 
-    /// An SIR (linear) in both units, this one first.
+    /// Formats an SIR (linear) in both units, this one first.
     pub fn both(self, sir: f64) -> String {
         let sir_db = 10.0 * sir.log10();
         match self {

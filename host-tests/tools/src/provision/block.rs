@@ -1,4 +1,4 @@
-//! From a scenario to the block that is written into one drone.
+//! Builds the configuration block of one drone from a scenario.
 
 use std::fmt;
 
@@ -12,19 +12,19 @@ use super::config::{
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::{AirGround, ChannelSpec, Scenario};
 
-/// Why there is no block.
+/// Why a block cannot be built.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BlockError {
-    /// The scenario is no mission.
+    /// The scenario is not a valid mission.
     Refused(Refusal),
-    /// The field has this many points, more than a block has room for.
+    /// The field has this many points, more than a block can hold.
     Points(usize),
-    /// The drone would refuse the block.
+    /// The drone would reject the block.
     Config(ConfigError),
-    /// The drone would refuse its sites.
+    /// The drone would reject the sites.
     Course(CourseError),
-    /// The drone would read another mission than was meant.
+    /// The drone would read back a different configuration.
     Changed,
 }
 
@@ -78,7 +78,7 @@ impl fmt::Display for BlockError {
 
 impl std::error::Error for BlockError {}
 
-/// What the drones of one flight have in common.
+/// Configuration that all drones of one flight share.
 #[derive(Clone, Debug)]
 pub struct Flight {
     mission: Mission,
@@ -92,15 +92,15 @@ pub struct Flight {
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
     network: u16,
-    /// 0 for the usual ones.
+    /// Silence before a neighbour is probed, ms; 0 for the firmware's default.
     probe_after_ms: u32,
 }
 
 impl Flight {
-    /// The flight of `uavs` relays in `scenario`, on network `network`: places alone, and nothing is measured.
+    /// Creates the flight of `uavs` relays in `scenario` on network `network`, with method `align` and without measurements.
     ///
     /// # Errors
-    /// [`BlockError`] where the scenario is no mission, or none that a block has room for.
+    /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.
     pub fn new(
         scenario: &Scenario,
         uavs: u16,
@@ -133,17 +133,17 @@ impl Flight {
         })
     }
 
-    /// The same, by another method.
+    /// Sets the method.
     pub fn by(self, method: Method) -> Self {
         Self { method, ..self }
     }
 
-    /// The same, with relays that measure the interference.
+    /// Sets the measurement of the interference field.
     pub fn measuring(self, measure: Option<Measure>) -> Self {
         Self { measure, ..self }
     }
 
-    /// The same, with relays that ask a neighbour for a sign of life after that many milliseconds of silence; 0 for the usual ones.
+    /// Sets the silence before a neighbour is probed, ms; 0 for the firmware's default.
     pub fn asking_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,
@@ -151,12 +151,12 @@ impl Flight {
         }
     }
 
-    /// The same, with frames that are signed.
+    /// Sets the key and epoch that sign frames.
     pub fn signed(self, secret: Option<Secret>) -> Self {
         Self { secret, ..self }
     }
 
-    /// The same, with drones that fly at most that fast, m/s, where they have sites.
+    /// Sets the drones' greatest speed, m/s; ignored without sites.
     pub fn no_faster_than(mut self, speed_m_s: f32) -> Self {
         if let Some(sites) = &mut self.sites {
             sites.speed_m_s = speed_m_s;
@@ -164,7 +164,7 @@ impl Flight {
         self
     }
 
-    /// The same, with autopilots that sign with that key.
+    /// Sets the key that signs MAVLink messages to and from the autopilot.
     pub fn signed_to_autopilots(self, autopilot_key: Option<[u8; 32]>) -> Self {
         Self {
             autopilot_key,
@@ -172,40 +172,40 @@ impl Flight {
         }
     }
 
-    /// Whether the drones have sites, by which they tell an autopilot where to fly.
+    /// Returns true if the drones have sites, which setpoints for an autopilot need.
     pub const fn has_sites(&self) -> bool {
         self.sites.is_some()
     }
 
-    /// The mission.
+    /// Returns the mission.
     pub const fn mission(&self) -> &Mission {
         &self.mission
     }
 
-    /// What single relays hold of their own, by index from 1.
+    /// Returns the relays' own profiles, where they differ from the common one, by index from 1.
     pub fn profiles(&self) -> &[(u16, Profile)] {
         &self.own
     }
 
-    /// Relays that keep to their altitude when altitudes are chosen, by index from 1.
+    /// Returns the indices (from 1) of relays with a fixed altitude.
     pub fn held(&self) -> &[u16] {
         &self.held
     }
 
-    /// What the leader has the chain do.
+    /// Returns the method.
     pub const fn method(&self) -> Method {
         self.method
     }
 
-    /// How the relays listen, if they do.
+    /// Returns the settings for locating the interferer, if any.
     pub const fn listen(&self) -> Option<Listen> {
         self.listen
     }
 
-    /// The block of relay `index`, read back to be sure.
+    /// Returns the block of relay `index`, verified by reading it back.
     ///
     /// # Errors
-    /// [`BlockError`] where the drone would refuse it.
+    /// [`BlockError`] if the drone would reject it.
     pub fn block(&self, index: u16) -> Result<Block, BlockError> {
         let own = self.own.iter().find(|(of, _)| *of == index);
         let config = Config {
@@ -238,8 +238,7 @@ impl Flight {
     }
 }
 
-/// Decibels as factors, by the very function by which [`uav_relay::Channel::from_db`] has them, so that the drone's channel
-/// is the scenario's to the bit.
+/// Converts decibels to factors, exactly as [`uav_relay::Channel::from_db`], so that both channels are equal to the bit.
 fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     let factor = |db: f64| libm::pow(10.0, db / 10.0);
     ChannelNumbers {

@@ -1,12 +1,11 @@
-//! What the firmware can be told of the section `[network]` of a file.
+//! Checks section `[network]` of a file against what the firmware supports.
 
 use uav_relay::{Duration, Settings};
 use uav_relay_scenario::deployment::Network;
 
 use super::config::{BAUD, MOST_PROBE_AFTER_MS};
 
-/// After which silence relays ask a neighbour for a sign of life, and after which that counts as lost; `probe_after_ms` is 0 for the usual
-/// ones.
+/// Returns the silence after which a neighbour is probed and that after which it is lost; 0 selects the default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     let Settings {
         probe_after,
@@ -19,11 +18,10 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     }
 }
 
-/// Refuses what a block cannot say, where it is not what the firmware does anyway; `given_ms` is the silence of the command line. Returns the
-/// milliseconds of silence after which relays ask, 0 for the usual ones.
+/// Returns `probe_after_ms` for the block: the command line's `given_ms`, else the section's; 0 for the firmware's default.
 ///
 /// # Errors
-/// One line that names the key, its value and the one that is allowed.
+/// A line that names a key whose value no block can express, the value and the allowed one.
 pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
     let refuse = |key: &str, value: u32, own: u32, why: &str| {
         format!(
@@ -48,7 +46,7 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
         let why = "three times probe_after_ms, as the firmware has it";
         return Err(refuse("dead_after_ms", after, dead, why));
     }
-    // What the firmware does anyway is the same block.
+    // The explicit default and 0 give the same block.
     let [usual, _] = silence(0);
     let is_usual = Duration::from_millis(probe_after_ms.into()) == usual;
     Ok(if is_usual { 0 } else { probe_after_ms })

@@ -1,22 +1,23 @@
-//! The blocks of a whole flight in one folder: all of them, or none.
+//! Writes the blocks of a whole flight into one folder: all of them, or none.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-/// The name of the file for relay `index`.
+/// Returns the file name of relay `index`.
 pub fn name(index: u16) -> String {
     format!("relay{index}.bin")
 }
 
-/// Writes `files` (name and content) to `dir`, which is made if it is not there. With `force` over what is there; blocks there that are not
-/// among `files` are then removed, for a drone of another flight would take them.
+/// Writes `files` (name and content) to `dir`, and creates it if necessary.
 ///
-/// Everything is written beside its name first, and named in the end: what goes wrong before leaves the folder as it was.
+/// With `force`, existing files are overwritten and other blocks in the folder removed, because a drone of another flight would
+/// accept them. Files are first written under temporary names and renamed at the end: an earlier failure leaves the folder as it
+/// was.
 ///
 /// # Errors
-/// In one line, which file or folder, and why.
+/// A line that names the file or folder and the reason.
 pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(), String> {
     let old = there(dir, files)?;
     if let Some(first) = old.first()
@@ -31,7 +32,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
     let is_new = !dir.exists();
     let failed = |what: &Path, error: std::io::Error| {
         if is_new {
-            // Empty again, if it was ever made.
+            // Removes the folder again, if it was created.
             _ = std::fs::remove_dir(dir);
         }
         format!("--out-dir {}: {error}", what.display())
@@ -60,7 +61,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
     Ok(())
 }
 
-/// The content in a file without a name of its own, that is removed unless it gets one.
+/// Writes `content` to a temporary file that is removed unless it is renamed.
 fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     let mut file = NamedTempFile::new_in(dir)?;
     file.write_all(content)?;
@@ -68,7 +69,7 @@ fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     Ok(file)
 }
 
-/// What of a flight is in the folder: blocks of any relay, and files of the names that are to be written.
+/// Returns the files in the folder that belong to a flight: blocks of any relay, and the names in `files`.
 fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String> {
     if !dir.exists() {
         return Ok(Vec::new());

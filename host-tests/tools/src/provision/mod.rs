@@ -1,12 +1,12 @@
-//! From a scenario to the configuration block that is written to one drone.
+//! Builds the configuration blocks of drones from a scenario.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`config`] | the block, byte by byte; a crate of its own, as the firmware has it |
-//! | [`block`] | from a scenario to the block of one drone |
-//! | [`firmware`] | what the firmware can be told of the section `[network]` |
+//! | [`config`] | block format, byte by byte; a crate of its own, shared with the firmware |
+//! | [`block`] | the block of one drone |
+//! | [`firmware`] | section `[network]` against what the firmware supports |
 //! | [`folder`] | the blocks of a whole flight: all of them, or none |
-//! | [`summary`] | what is in that folder, and what to type |
+//! | [`summary`] | `summary.txt`: the folder's content and the commands to flash it |
 
 pub mod block;
 pub mod firmware;

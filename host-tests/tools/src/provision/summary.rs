@@ -1,4 +1,4 @@
-//! What is in a folder of blocks, and what to type to get them into drones.
+//! `summary.txt`: the content of a folder of blocks, and the commands that flash them.
 
 use std::fmt::Write as _;
 
@@ -8,22 +8,22 @@ use uav_relay_scenario::Line;
 use super::config::ADDRESS;
 use super::folder::name;
 
-/// What there is to say of a flight beside its relays.
+/// Flight data for the summary, apart from its relays.
 #[derive(Clone, Debug)]
 pub struct Heading {
-    /// The scenario it is from.
+    /// Name of the scenario.
     pub scenario: String,
     /// Number of relays.
     pub uavs: u16,
-    /// Number of the network.
+    /// Network number.
     pub network: u16,
-    /// How the places are found, as an option has it.
+    /// Method, as named on the command line.
     pub method: String,
-    /// Whether frames are signed.
+    /// True if frames are signed.
     pub signed: bool,
 }
 
-/// The text of `summary.txt`: `places` are where the relays are expected to settle, none where that is not known.
+/// Returns the text of `summary.txt`; `places` are the expected positions of the relays, empty if unknown.
 pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<&Line>) -> String {
     let Heading {
         scenario,

@@ -1,4 +1,4 @@
-//! Altitudes: a common one, Algorithm 2 round by round, and places and altitudes chosen jointly.
+//! Altitudes: a common one, Algorithm 2 by round, and the joint method.
 
 use uav_relay_oracle::reference::joint::{self, Corridor, Place};
 use uav_relay_oracle::reference::{Link, Station};
@@ -33,7 +33,7 @@ fn chains_at_one_altitude_are_the_judges() {
     }
 }
 
-/// The paper's step: where it ends, and that 220 m is its doing.
+/// Checks the result of the paper's step, and that the step is the cause of 220 m.
 #[test]
 fn the_step_ends_where_the_judge_says() {
     let table = Table::read("altitude");
@@ -82,7 +82,7 @@ fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
         };
         assert!(joint::keeps_rules(&rounded, CORRIDOR, &[], &places));
     }
-    // What the page says of them.
+    // Statements on the page.
     let at = |round: f64, relay: f64| shapes.row(&[("round", round), ("relay", relay)]);
     assert!(
         at(50.0, 1.0).number("altitude_m") < 160.0 && at(50.0, 50.0).number("altitude_m") < 180.0
@@ -97,7 +97,7 @@ fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
     assert!(step(500.0, 49.0) < step(500.0, 25.0));
 }
 
-/// Against Algorithm 2 with exact local maximisation, and the joint optimum, of a separate program.
+/// Compares with Algorithm 2 with exact local maximisation, and the joint optimum, of a separate program.
 #[test]
 fn rounds_rise_as_exact_local_search_does_and_a_coarse_grid_gains_nothing() {
     let table = Table::read("rounds");

@@ -1,4 +1,4 @@
-//! One relay beside the line: its places and what they gain, against the judge of three dimensions.
+//! One relay beside the line: positions and gains, against the three-dimensional reference.
 
 use uav_relay_oracle::reference::joint::{Corridor, Effort, Place, optimum, sir};
 use uav_relay_oracle::reference::{Link, Station};
@@ -17,7 +17,7 @@ fn link(y_i: f64) -> Link {
     }
 }
 
-/// The judge's best SIR with this room and up to this altitude.
+/// Returns the reference's best SIR with this lateral room and up to this altitude.
 fn judged(y_i: f64, room_m: f64, most_m: f64) -> f64 {
     let corridor = Corridor {
         least_m: ALTITUDES_M.0,
@@ -69,7 +69,7 @@ fn what_side_and_altitude_gain_is_what_the_judge_says() {
             within(got, judged(y, room, most), 1e-5, 1e-5);
             assert!(got <= both * (1.0 + 1e-6));
         }
-        // The side is worth more than the altitude, and with the most of it the lowest is best.
+        // Lateral freedom is worth more than altitude, and with the largest room the lowest altitude is best.
         assert!(of[2].0 >= of[1].0 * (1.0 - 1e-6) || y <= 0.0, "{y}");
     }
 }

@@ -1,4 +1,4 @@
-//! Chains at one altitude: the fewest relays, the paper's step, the gain, and what it costs to settle.
+//! Chains at one altitude: the fewest relays, the paper's step, the gain, and the cost of settling.
 
 use uav_relay_oracle::cases::{self, OPTIMA};
 use uav_relay_oracle::reference::{Link, Station};
@@ -21,7 +21,6 @@ fn link(relays: usize, x_i: f64, y_i: f64, power_w: f64) -> Link {
 }
 
 fn link_of(row: &Row<'_>, relays: f64) -> Link {
-    // A small whole number.
     let relays = (1..=1000).find(|n| f64::from(*n) == relays).unwrap();
     link(
         usize::try_from(relays).unwrap(),
@@ -31,7 +30,6 @@ fn link_of(row: &Row<'_>, relays: f64) -> Link {
     )
 }
 
-/// As many as the table says meet the target, and one fewer do not.
 #[test]
 fn the_fewest_relays_meet_the_target_and_one_fewer_do_not() {
     for name in ["fewest-by-place", "fewest-by-power"] {
@@ -80,7 +78,7 @@ fn the_fewest_relays_are_the_reference_programs() {
     }
 }
 
-/// What the page says: nearer to the line costs more relays, more power fewer.
+/// Checks the page: an interferer nearer to the line costs more relays, more power fewer.
 #[test]
 fn the_fewest_relays_move_as_it_is_said() {
     let by_place = Table::read("fewest-by-place");
@@ -118,7 +116,7 @@ fn the_fewest_relays_move_as_it_is_said() {
     }
 }
 
-/// The chain that stretches every hop for `target`, by bisection of the SIRs themselves.
+/// Returns the chain stretched for `target`, by bisection of the SIRs.
 fn stretched(link: &Link, target: f64) -> Vec<f64> {
     let mut from = 0.0;
     (1..=link.len())
@@ -183,7 +181,7 @@ fn gains_are_over_what_the_references_have() {
             ) < 1e-7
         );
     }
-    // A separate program's, with random chains of its own.
+    // Results of a separate program with its own random chains.
     for (relays, over_random, over_blind) in [
         (8.0, 5665.0, 329.0),
         (50.0, 3367.0, 106.0),
@@ -193,7 +191,7 @@ fn gains_are_over_what_the_references_have() {
         let got = row.number("gain_over_random_percent");
         let error = row.number("random_error_linear") / row.number("random_sir_linear");
         assert!(error < 0.04, "{error}");
-        // Both means scatter.
+        // Both means have a statistical error.
         let scatter = 4.0 * 2.0_f64.sqrt() * error * (100.0 + got);
         println!("N = {relays}: {got:.0} % against {over_random} %, {scatter:.0} allowed");
         assert!((got - over_random).abs() < scatter);
@@ -208,7 +206,7 @@ fn settling_costs_what_the_schedules_take() {
         let relays = row.number("relays");
         let is_that = |n: &u16| f64::from(*n) == relays;
         let link = Link::paper(usize::from((1..=100).find(is_that).unwrap()));
-        // The judge takes half a minute for as many sweeps of a hundred relays.
+        // The reference takes half a minute for as many sweeps of a hundred relays.
         let tried = if relays < 15.0 {
             let (tried, target) = link.fixed_step(0.1).unwrap();
             within(row.number("step_sir_linear"), target, 1e-5, 1e-5);
@@ -219,8 +217,9 @@ fn settling_costs_what_the_schedules_take() {
             9857.0
         };
         assert_eq!(row.number("step_sweeps"), tried);
-        // A message and an answer for each sweep between two relays, which are signs of life; and in the hours that takes the claims of
-        // each relay to its number: six at the start, then one in 15 s, in which a link carries more than 700 frames of sweeps.
+        // Each sweep takes a message and an answer per neighbour pair, which also count as signs of life. In the hours that
+        // takes, each relay claims its index: six times at the start, then every 15 s, in which a link carries more than 700
+        // sweep frames.
         let hops = relays - 1.0;
         let sweeps = 2.0 * hops * tried;
         let claims = row.number("step_messages") - sweeps;
@@ -240,7 +239,7 @@ fn settling_costs_what_the_schedules_take() {
         for name in ["predicted_sir_linear", "bracketed_sir_linear"] {
             within(row.number(name), optimum, 1e-4, 2e-6);
         }
-        // 95 bytes are what a sweep of sixteen targets and its verdict take on average.
+        // 95 bytes: average of a sweep with sixteen targets and its verdict.
         assert_eq!(row.number("predicted_bytes"), 2.0 * hops * 95.0);
         let a_message = row.number("step_bytes") / row.number("step_messages").max(1.0);
         assert!(

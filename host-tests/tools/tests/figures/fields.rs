@@ -1,4 +1,4 @@
-//! Fields of interference: the densities, and Algorithm 4 sweep by sweep.
+//! Fields of interference: densities, and Algorithm 4 by sweep.
 
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
@@ -16,7 +16,7 @@ fn densities_are_beta_distributions() {
         let rows = table.rows(&[("alpha", alpha), ("beta", beta)]);
         let at =
             |row: &super::Row<'_>| (row.number("interference_over_i_max"), row.number("density"));
-        // The trapezoidal rule on the table's own points.
+        // Trapezoidal rule on the table's points.
         let integral = |of: &dyn Fn(f64, f64) -> f64| {
             let terms = rows.windows(2).map(|pair| {
                 let ((a, f), (b, g)) = (at(&pair[0]), at(&pair[1]));
@@ -38,7 +38,9 @@ fn densities_are_beta_distributions() {
     }
 }
 
-/// E[1 / y] of a Beta distribution, by two integrals without its normalisation; y = t^8 takes the edge off y = 0, and 1 - s^8 off 1.
+/// Returns E[1 / y] of a Beta distribution by two integrals without its normalisation.
+///
+/// Substitutes y = t^8 near 0 and 1 - s^8 near 1, to remove the singularities.
 fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
     let steps = 20_000;
     let integral = |power: f64| -> f64 {
@@ -54,7 +56,7 @@ fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
     integral(alpha - 2.0) / integral(alpha - 1.0)
 }
 
-/// The judge's link in one of the fields of the table.
+/// Returns the reference's link in one of the table's fields.
 fn link(field: &str, relays: usize) -> StochasticLink {
     let table = Table::read("stochastic-field");
     let rows = table.rows(&[]);
@@ -122,7 +124,7 @@ fn sweeps_of_algorithm_4_are_the_judges() {
             for row in &rows {
                 let target = link.ceiling() - 0.1 * (row.number("sweep") - 1.0);
                 assert!((row.number("target_linear") - target).abs() < 1e-6);
-                // A hair below, so that a tail straight above Rx is one whatever rounding does.
+                // Slightly below the target, so that rounding does not decide about a tail straight above Rx.
                 let places = link.backward(target * (1.0 - 1e-12)).unwrap();
                 within(
                     row.number("sir_linear"),
@@ -158,7 +160,7 @@ fn algorithm_4_ends_where_the_reference_program_does() {
     }
 }
 
-/// What the page says of eight relays: the step of 0.1 passes over all there is, 0.0912, and ends next to nothing.
+/// Checks the page: with eight relays the step of 0.1 misses the optimum of 0.0912 and ends near 0.
 #[test]
 fn a_step_of_a_tenth_finds_next_to_nothing_for_eight_relays() {
     let last = |relays: u16| {

@@ -1,4 +1,4 @@
-//! The files, the page that names them, and how the tool refuses.
+//! Output files, the page that links them, and error messages.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,7 +10,6 @@ use uav_relay_tools::figures::ALL;
 
 use super::{figures, written};
 
-/// Every file of the full run, but the page.
 fn files() -> BTreeSet<String> {
     let all = fs::read_dir(written()).unwrap();
     let name =
@@ -109,7 +108,7 @@ fn tables_say_what_was_taken_and_their_heads_have_units() {
     }
 }
 
-/// How far a text reaches along x, at 0.6 of its height a letter.
+/// Returns the horizontal extent of a text, with letters 0.6 times as wide as the font size.
 fn extent(text: &Node<'_, '_>) -> (f64, f64) {
     let number = |name: &str| text.attribute(name).unwrap().parse::<f64>().unwrap();
     let letters = text.text().unwrap().trim().chars().count() as f64;
@@ -139,7 +138,7 @@ fn pictures_are_documents_whose_words_are_inside() {
         {
             let y: f64 = text.attribute("y").unwrap().parse().unwrap();
             assert!(y >= 0.0 && y <= size("height"), "{:?}", text.text());
-            // At 8 cm for the whole width, 6 points at least.
+            // At least 6 points if the width is printed at 8 cm.
             let height: f64 = text.attribute("font-size").unwrap().parse().unwrap();
             assert!(height / size("width") * 8.0 / 2.54 * 72.0 > 6.0, "{height}");
             if text.attribute("transform").is_none() {
@@ -232,7 +231,6 @@ fn help_lists_the_figures() {
     );
 }
 
-/// A page of many screens begins with its contents, a link to every figure on it.
 #[test]
 fn the_page_begins_with_its_contents() {
     let page = fs::read_to_string(written().join("index.html")).unwrap();
@@ -248,7 +246,6 @@ fn the_page_begins_with_its_contents() {
     assert!(!contents.contains("<figure"), "the contents come first");
 }
 
-/// Without a terminal every finished figure has its line, so that a run of a minute is not taken for one that hangs.
 #[test]
 fn every_finished_figure_is_told() {
     let folder = TempDir::new().unwrap();

@@ -1,7 +1,7 @@
-//! `cargo figures` as a person meets it, and the numbers in its tables: each table against a judge that shares no formula with
-//! the crate, or against values of a separate program.
+//! `cargo figures`, run as a program: each table against a reference that shares no formula with the crate, or against values of
+//! a separate program.
 //!
-//! The tool runs once, in full; every test reads what it has written.
+//! The tool runs once, in full; the tests read its files.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -31,7 +31,6 @@ fn figures(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Where the one full run has written its files.
 fn written() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     DIR.get_or_init(|| {
@@ -48,7 +47,6 @@ fn written() -> &'static Path {
     .path()
 }
 
-/// A table as it was written.
 struct Table {
     head: Vec<String>,
     rows: Vec<Vec<String>>,
@@ -75,14 +73,12 @@ impl Table {
             .unwrap_or_else(|| panic!("no {name} in {:?}", self.head))
     }
 
-    /// The rows in which each of these columns has this value.
     fn rows(&self, of: &[(&str, f64)]) -> Vec<Row<'_>> {
         let matches = |row: &Row<'_>| of.iter().all(|(name, value)| row.get(name) == Some(*value));
         let all = self.rows.iter().map(|cells| Row { table: self, cells });
         all.filter(matches).collect()
     }
 
-    /// The only such row.
     fn row(&self, of: &[(&str, f64)]) -> Row<'_> {
         let mut rows = self.rows(of);
         assert_eq!(rows.len(), 1, "{of:?}");
@@ -101,7 +97,6 @@ impl Row<'_> {
         &self.cells[self.table.column(name)]
     }
 
-    /// The number in a column, if there is one.
     fn get(&self, name: &str) -> Option<f64> {
         self.text(name).parse().ok()
     }
@@ -112,12 +107,11 @@ impl Row<'_> {
     }
 }
 
-/// The relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }
 
-/// Panics unless `got` is at most `most` above `want` and at most `least` below it, both relative.
+/// Panics unless `got` is at most `most` above and `least` below `want`, both relative.
 #[track_caller]
 fn within(got: f64, want: f64, least: f64, most: f64) {
     assert!(

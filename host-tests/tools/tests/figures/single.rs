@@ -1,4 +1,4 @@
-//! One relay: the locus, its best place by altitude, and what the gain may be said to be.
+//! One relay: the equal-SIR locus, the best position by altitude, and the readings of the gain.
 
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::{Link, Station};
@@ -7,7 +7,7 @@ use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
 use super::{Table, off, within};
 
-/// The dual-hop scenario of the paper's third sub-table.
+/// Returns the dual-hop scenario of the paper's third sub-table.
 fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     Link {
         distance_m: 35.0,
@@ -23,7 +23,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     }
 }
 
-/// A link with one relay, under the interferer of a row.
+/// Returns a link with one relay and the interferer of a row.
 fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
     Link {
         distance_m: 35.0,
@@ -50,7 +50,7 @@ fn both_hops_are_equal_on_the_locus_and_nowhere_between() {
             assert!(off(sir[0], sir[1]) < 1e-4, "{sir:?} at {x}, {altitude}");
             on += 1;
         }
-        // As many changes of the better hop on the way up as there are altitudes.
+        // Counts the changes of the better hop on the way up: one per altitude.
         let first_is_better = |h: f64| {
             let sir = locus_link(row, h).sir_hops(&[x]);
             sir[0] > sir[1]
@@ -94,7 +94,7 @@ fn the_locus_is_the_reference_programs() {
     }
 }
 
-/// What the page says: more power shifts the locus toward Rx, an interferer nearer by shifts it down.
+/// Checks the page: more power shifts the locus toward Rx, an interferer nearer to the line shifts it down.
 #[test]
 fn the_locus_moves_as_it_is_said_to() {
     let table = Table::read("locus");
@@ -104,7 +104,7 @@ fn the_locus_moves_as_it_is_said_to() {
     };
     for x in [14.0, 20.0, 30.0] {
         for y in [30.0, 60.0] {
-            // An arm that rises with x has moved toward Rx if it is lower at a place.
+            // A branch that rises with x has moved toward Rx if it is lower at the same x.
             assert!(upper(40.0, y, x).unwrap() < upper(20.0, y, x).unwrap());
         }
         for tx in [20.0, 40.0] {
@@ -155,7 +155,7 @@ fn the_best_place_and_the_baselines_are_the_references() {
     }
 }
 
-/// The mean over all places of what `of` makes of the SIR.
+/// Returns the mean of `of` applied to the SIR, over all positions.
 fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     let points = 2000;
     let place = |k: u32| link.distance_m * (f64::from(k) + 0.5) / f64::from(points);
@@ -163,7 +163,7 @@ fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     sum / f64::from(points)
 }
 
-/// The SIR where the weaker of both signals is strongest, by trying places.
+/// Returns the SIR at the interference-blind position, found by trying positions.
 fn blind(link: &Link) -> f64 {
     let relay = link.relays[0];
     let h2 = relay.altitude_m.powi(2);
@@ -231,7 +231,7 @@ fn every_reading_of_the_gain_is_what_it_says() {
     );
 }
 
-/// What the page says of the printed averages: in linear SIR no choice of powers comes near 30.14 % over random.
+/// Checks the page: in linear SIR no powers come near the printed 30.14 % over random.
 #[test]
 fn no_linear_reading_comes_near_what_is_printed() {
     let table = Table::read("single-gains");
@@ -244,6 +244,6 @@ fn no_linear_reading_comes_near_what_is_printed() {
         .map(|row| row.number("over_random_percent"))
         .fold(f64::INFINITY, f64::min);
     println!("least gain over random {least:.2} %");
-    // An independent program found 39.2 % over its own ratios.
+    // Result of an independent program over its own power ratios.
     assert!((least - 39.2).abs() < 0.7, "{least}");
 }

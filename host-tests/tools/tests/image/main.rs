@@ -1,4 +1,4 @@
-//! What a board is flashed with: the files hold the bytes of the ELF at the addresses where it stores them, as others read these files.
+//! Flash images: the files contain the bytes of the ELF at their load addresses, as independent readers read them.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::expect_used)]
 
 use std::process::{Command, Output};
@@ -10,7 +10,6 @@ use uav_relay_tools::image::uf2::{Family, PAGE};
 use uav_relay_tools::image::{hex, uf2};
 use uav_relay_tools::provision::config::LEN;
 
-/// An ELF of 32 bits with these segments: where they are stored, where they run, their bytes.
 fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
     let count = u16::try_from(segments.len()).unwrap();
     let mut file = Vec::from(*b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0");
@@ -38,7 +37,7 @@ fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
     file
 }
 
-/// Vectors, code 70 KiB behind them, and data that run in RAM.
+/// Returns vectors, code 70 KiB after them, and data that run in RAM.
 fn example() -> Vec<Piece> {
     let code: Vec<u8> = (0..70_000_u32).map(|at| (at % 251) as u8).collect();
     let file = elf(&[
@@ -88,7 +87,7 @@ fn a_uf2_file_has_whole_blocks_with_whole_pages() {
     let word = |block: &[u8], at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
     assert_eq!(file.len() % 512, 0);
     let count = u32::try_from(file.len() / 512).unwrap();
-    // 276 bytes are 2 pages, 70 000 from the beginning of one are 274, and there is one more.
+    // 276 bytes take 2 pages, 70 000 bytes from a page boundary 274, and the last segment one.
     assert_eq!(count, 2 + 274 + 1);
     let whole = flat(&example).unwrap().bytes;
     for (number, block) in (0..).zip(file.chunks_exact(512)) {
@@ -167,7 +166,7 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
     }
 }
 
-/// A block that lies in the image would be gone with the next one.
+/// A block inside the image would be overwritten by the next image.
 #[test]
 fn a_board_has_its_block_where_its_memory_says_that_no_image_reaches() {
     let embassy = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/embassy");

@@ -1,8 +1,7 @@
-//! A reader that has gone is no reason to fail otherwise than the command would.
+//! A closed output pipe does not change the exit status.
 
 use std::process::{Command, Stdio};
 
-/// The exit status with standard output and standard error that nobody reads.
 fn unheard(tool: &str, arguments: &[&str]) -> Option<i32> {
     let pipe = || {
         let (reader, writer) = std::io::pipe().unwrap();

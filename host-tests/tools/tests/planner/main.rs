@@ -1,4 +1,4 @@
-//! What `cargo plan` says and refuses, line by line.
+//! Output and error messages of `cargo plan`.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -21,14 +21,12 @@ fn plan(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// What it prints.
 fn said(arguments: &[&str]) -> String {
     let output = plan(arguments);
     assert!(output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The exit status, and the one line on standard error.
 fn refusal(arguments: &[&str]) -> (i32, String) {
     let output = plan(arguments);
     let line = String::from_utf8(output.stderr).unwrap();

@@ -1,4 +1,4 @@
-//! The noise that a bandwidth and a noise figure make, with the numbers it came from.
+//! Reported noise computed from bandwidth and noise figure.
 
 use std::io::Write as _;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{plan, said};
 
-/// The paper's scenario with these lines more.
+/// Returns the paper's scenario with extra lines in `[power]`.
 fn with(sections: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let text = std::fs::read_to_string(super::example("scenario.toml")).unwrap();
@@ -27,7 +27,7 @@ fn json(file: &tempfile::NamedTempFile) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// 1.380649e-23 J/K x 290 K = 4.0038821e-21 W/Hz, x 20 MHz = 8.0077642e-14 W, x 10^0.6 = 3.1879483e-13 W; 10 lg of that over 1 mW is -94.96489.
+/// k T0 B F: 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
 #[test]
 fn the_noise_is_k_t_b_f_and_says_of_what() {
     let noisy = "\n[noise]\nbandwidth_hz = 20e6\nfigure_db = 6.0\n";
@@ -49,7 +49,7 @@ fn the_noise_is_k_t_b_f_and_says_of_what() {
     is("temperature_k", 290.0, 1e-15);
     is("effective_w", 3.187_948_3e-13, 1e-7);
 
-    // Antennas of 3 dBi at the relays and of 5 dBi at the receiver: the lower gain counts, 10^0.3 = 1.99526231.
+    // Antennas of 3 dBi at the relays and 5 dBi at the receiver: the lower gain counts, 10^0.3 = 1.99526231.
     let gains = "uav_gain_dbi = 3.0\nrx_gain_dbi = 5.0";
     let aired = with(gains);
     let text = std::fs::read_to_string(aired.path()).unwrap();
@@ -60,7 +60,7 @@ fn the_noise_is_k_t_b_f_and_says_of_what() {
         "{effective:e}"
     );
 
-    // One that the file says itself came from nothing else, and there may be none.
+    // No derivation for a power stated in the file, or without noise.
     for given in ["\n[noise]\npower_dbm = -95.0\n", ""] {
         std::fs::write(file.path(), format!("{plain}{given}")).unwrap();
         assert!(json(&file)["noise"].is_null(), "{given}");

@@ -1,4 +1,4 @@
-//! What is refused, in a line that says what would be right.
+//! Error messages, which state what is allowed.
 
 use super::{example, refusal, said};
 
@@ -82,7 +82,7 @@ fn what_is_not_there_is_not_planned() {
         assert!(!line.contains("invalid digit"), "{line}");
     }
     assert!(!std::path::Path::new(map).exists());
-    // Who has no scenario file is told of the numbers, and where others would stand.
+    // Without a scenario file the message names the numbers and the keys of such a file.
     let (status, line) = refusal(&["--uavs", "300"]);
     assert_eq!(status, 1);
     assert!(

@@ -1,4 +1,4 @@
-//! Answers in the unit that was asked for, and in words.
+//! Answers in the requested unit, and in words.
 
 use serde_json::Value;
 
@@ -106,7 +106,7 @@ fn a_scenario_in_field_units_is_planned() {
     assert!(table.contains("worst hop: 8.00"), "{table}");
 }
 
-/// A map is read by people: measures to the millimetre and a thousandth of a decibel, counts as counts.
+/// Map numbers are rounded for people: millimetres, thousandths of a decibel, whole counts.
 #[test]
 fn a_map_has_rounded_numbers_with_units_in_their_names() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! From a plan to the blocks of all drones, without a number typed twice.
+//! From a plan to the blocks of all drones, without entering a number twice.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -28,7 +28,6 @@ fn text(path: &Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// The names of what is in a folder.
 fn names(dir: &Path) -> BTreeSet<String> {
     let entries = std::fs::read_dir(dir).unwrap();
     entries
@@ -36,7 +35,7 @@ fn names(dir: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-/// The block of that relay in `dir` is the plan's, and the summary has it.
+/// Asserts that the block of relay `index` matches the plan, and that the summary lists it.
 fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
     let plan = scenario.plan.as_ref().unwrap();
     let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
@@ -49,7 +48,7 @@ fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
     assert_eq!(config.method, Method::Align);
     assert!(config.sites.is_some());
     assert_eq!(secret(&block).unwrap().map(|secret| secret.epoch), Some(77));
-    // The table has its place, on the line and on earth; a line to type has its file.
+    // The summary has the relay's position on the line and on earth, and the command for its file.
     let place = plan.places[usize::from(index) - 1];
     let row = summary
         .lines()
@@ -104,7 +103,7 @@ fn a_plan_goes_to_every_drone() {
         "{said}"
     );
     assert!(plan.sir_db >= 8.0, "{}", plan.sir_db);
-    // All else is as it was.
+    // The rest of the scenario is unchanged.
     let before = std::fs::read_to_string(&decibels).unwrap();
     assert!(std::fs::read_to_string(&file).unwrap().starts_with(&before));
 
@@ -140,7 +139,7 @@ fn a_plan_goes_to_every_drone() {
     }
     assert!(!summary.contains("0123456789abcdef"));
 
-    // What is there stays, unless it is forced; then nothing of a larger flight is left.
+    // Existing blocks stay without --force; with it nothing of a larger flight remains.
     let again = refusal(&words);
     assert!(
         again.contains("relay1.bin is there already; --force"),
@@ -200,7 +199,7 @@ fn a_joint_plan_is_flown_jointly_and_planned_anew_in_place() {
 fn all_or_none_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("blocks");
-    // A block that no drone takes: a field with more points than it has room for.
+    // A block that no drone accepts: a field with more points than it can hold.
     let points = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
         .map(|x| format!("{{ x_m = {x}, alpha = 3, beta = 2 }}"))
         .join(", ");
@@ -221,7 +220,7 @@ fn all_or_none_is_written() {
     let line = refusal(&wide);
     assert!(line.contains("a drone has room for 16 points"), "{line}");
     assert!(!dir.exists());
-    // A name that is taken by a folder cannot be written: what was named before is taken back.
+    // A folder with the name of a block cannot be replaced: files renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
     let line = refusal(&[
         "--uavs",
@@ -310,7 +309,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
     assert!(line.contains("--all"), "{line}");
 }
 
-/// The very loss that is refused: what the planner finds, over what the relays settle on.
+/// The refused loss is the planner's best over what the relays settle on.
 #[test]
 fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let folder = tempfile::tempdir().unwrap();
@@ -360,7 +359,7 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
         let line = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success() && line.contains(&words), "{line}");
     }
-    // Two that are next to each other lose nothing.
+    // Two interferers next to each other lose nothing.
     let near = std::fs::read_to_string(&several).unwrap();
     let near = near
         .replace("x_m = 200.0", "x_m = 790.0")
@@ -380,7 +379,7 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     assert!(output.status.success(), "{output:?}");
 }
 
-/// drone.toml without the settings that the firmware does not have.
+/// Returns drone.toml without the settings that the firmware does not support.
 fn for_the_firmware(text: &str) -> String {
     let own = ["baud = 57600", "probe_after_ms", "dead_after_ms"];
     let kept = text
@@ -389,7 +388,6 @@ fn for_the_firmware(text: &str) -> String {
     kept.collect::<Vec<_>>().join("\n")
 }
 
-/// The command that `plan --out` names takes the file that it has written.
 #[test]
 fn the_next_command_takes_the_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -420,7 +418,7 @@ fn the_next_command_takes_the_file() {
         &text(&dir),
     ]);
     assert!(line.contains("network.baud = 57600"), "{line}");
-    // For the firmware the last line is one that succeeds.
+    // For the firmware the last line is a command that succeeds.
     std::fs::write(&scenario, for_the_firmware(&drone)).unwrap();
     let said = planned(&[&arguments[..], &["--force"]].concat());
     let command = said.lines().last().unwrap().trim();
@@ -432,7 +430,6 @@ fn the_next_command_takes_the_file() {
     assert_eq!(names(&dir).len(), 4);
 }
 
-/// One file has one number of relays.
 #[test]
 fn a_plan_and_a_network_of_different_sizes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -454,7 +451,7 @@ fn a_plan_and_a_network_of_different_sizes_are_refused() {
         );
         assert!(!Path::new(&file).exists());
     }
-    // A file that was made so by hand.
+    // A file edited by hand.
     planned(&["--scenario", &scenario, "--uavs", "4", "--out", &file]);
     let four = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&scenario, four.replace("relays = 4", "relays = 6")).unwrap();

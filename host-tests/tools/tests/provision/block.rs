@@ -1,4 +1,4 @@
-//! What stands in a block: the table of `config/mod.rs`, byte by byte, and what a drone reads of it.
+//! Content of a block against the table of `config/mod.rs`, byte by byte, and as a drone reads it.
 
 use uav_relay::{Adjust, Local, Measure, Method};
 use uav_relay_scenario::Scenario;
@@ -7,7 +7,7 @@ use uav_relay_tools::provision::config::{ConfigError, LEN, MAX_POINTS};
 
 use super::{example, field, in_a_field, paper, reads};
 
-/// A block by hand: `method` as its number and as what adjust is told, and what of it is not the paper's scenario.
+/// Builds a block by hand: the method's number and parameters, and differences from the paper's scenario.
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
@@ -35,7 +35,6 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
 
 const PAPER: ([f32; 3], &[u8]) = ([80.0, 500.0, 400.0], &[]);
 
-/// The table in `config/mod.rs`, byte by byte.
 #[test]
 fn a_block_is_what_the_table_says() {
     assert_eq!(by_hand((0, false, 0.0, 0), [20.0; 2], PAPER), paper());
@@ -77,7 +76,6 @@ fn a_block_is_what_the_table_says() {
     );
 }
 
-/// Relays that ask a silent neighbour less often than usual.
 #[test]
 fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
     let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
@@ -97,7 +95,6 @@ fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
     assert_eq!(ms(usual), times.map(uav_relay::Duration::as_micros));
 }
 
-/// What is set, and whatever else a block can say, comes back as it was.
 #[test]
 fn a_drone_reads_what_it_is_to_do() {
     let scenario = Scenario {
@@ -115,7 +112,7 @@ fn a_drone_reads_what_it_is_to_do() {
             let config = reads(&flight.block(index).unwrap()).unwrap();
             assert_eq!(config.method, method);
             assert_eq!(config.measure, None);
-            // Relay 2 has an altitude of its own, relay 5 but a power.
+            // Relay 2 has its own altitude, relay 5 only its own power.
             assert_eq!(config.hold_altitude, index == 2);
             let band = config.mission.config().band;
             assert_eq!((band.least_m, band.most_m), (40.0, 120.0));

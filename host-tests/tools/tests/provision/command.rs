@@ -1,4 +1,4 @@
-//! The command: what it writes, and what it refuses.
+//! Output and error messages of `cargo provision`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -65,7 +65,6 @@ fn the_command_writes_what_the_relay_is_to_do() {
     );
 }
 
-/// A scenario with a field of `points` points.
 fn toml(points: usize) -> String {
     let mut text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n\
                     [power]\ntx_w = 80.0\nuav_w = 1.0\n\
@@ -197,7 +196,7 @@ fn what_is_wrong_is_said_in_one_line() {
     assert!(!Path::new(out).exists());
 }
 
-/// A channel of the firmware's data rate carries 25 relays; with more it is refused, with the numbers.
+/// A channel at the firmware's data rate carries 25 relays; more are refused with the numbers.
 #[test]
 fn a_channel_that_cannot_carry_the_chain_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -244,7 +243,6 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     assert!(refusal(&both).contains("--wires"));
 }
 
-/// What section `network` says reaches the block, or is refused: nothing of it is passed over.
 #[test]
 fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -337,7 +335,7 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     }
 }
 
-/// The firmware has no UDP; the mistake in the file of all drones is one all the same.
+/// The firmware has no UDP, but a wrong address in a shared file is reported.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What a block says of listening, and where `cargo provision` has it from.
+//! Settings for locating the interferer in a block, and their source in the scenario.
 
 use uav_relay::{Duration, Interference, Listen};
 use uav_relay_scenario::Scenario;
@@ -23,7 +23,7 @@ fn what_the_relays_do_not_know_stands_as_nothing() {
     let config = reads(&block).unwrap();
     assert_eq!(config.mission.config().interference, Interference::Unknown);
     assert_eq!(config.listen, Some(Listen::default()));
-    // Relays that do not listen are told of an interferer.
+    // Relays that do not measure need a known interferer.
     let deaf = changed(block, 352, &[0; 20]);
     assert!(matches!(reads(&deaf), Err(ConfigError::Mission(_))));
 }
@@ -75,13 +75,13 @@ fn the_ranges_are_those_of_a_relay() {
             Err(ConfigError::Listen)
         };
         assert_eq!(reads(&block).map(|config| config.listen), expected);
-        // Not in a field.
+        // Not allowed in a field.
         let block = changed(field(2), 352, &block[352..372]);
         assert_eq!(reads(&block), Err(ConfigError::Listen));
     }
 }
 
-/// A listening relay of a mission with a field is none that a program can ask for, either.
+/// A mission with a field cannot locate an interferer, even if a program asks for it.
 #[test]
 fn a_field_has_nothing_to_find() {
     let mut scenario = super::in_a_field(3);

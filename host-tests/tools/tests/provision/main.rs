@@ -1,4 +1,4 @@
-//! The configuration of a drone: `cargo provision` writes it, the firmware's own code reads it, and nothing damaged gets through.
+//! Configuration of a drone: `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -32,7 +32,6 @@ fn paper() -> Block {
     flight.block(3).unwrap()
 }
 
-/// A field of `points` points, up to 2e-10 W.
 fn in_a_field(points: usize) -> Scenario {
     let point = |k| BetaPoint {
         x_m: 100.0 * k as f64,
@@ -53,19 +52,18 @@ fn field(points: usize) -> Block {
     flight.block(3).unwrap()
 }
 
-/// Writes a key as a key is to be kept: for its owner alone.
+/// Writes a key file readable by its owner only.
 fn write_key(file: impl AsRef<Path>, key: &str) {
     use std::os::unix::fs::PermissionsExt as _;
     std::fs::write(&file, key).unwrap();
     std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
 }
 
-/// What a drone makes of a block.
 fn reads(block: &Block) -> Result<Config, ConfigError> {
     read(block, Box::leak(Box::new(EMPTY)))
 }
 
-/// The block of the paper's scenario with `bytes` at `at`, and the CRC that belongs to it.
+/// Returns the block of the paper's scenario with `bytes` at `at`, and a matching CRC.
 fn with(at: usize, bytes: &[u8]) -> Block {
     changed(paper(), at, bytes)
 }
@@ -77,7 +75,6 @@ fn changed(mut block: Block, at: usize, bytes: &[u8]) -> Block {
     block
 }
 
-/// What has the command write the block of [`paper`] to `out`.
 fn of_paper(out: &str) -> [&str; 8] {
     [
         "--uavs",
@@ -98,7 +95,7 @@ fn provision(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// The one line on standard error; the exit status is 2.
+/// Returns the single line on standard error of a run that exits with status 2.
 fn refusal(arguments: &[&str]) -> String {
     let output = provision(arguments);
     let text = String::from_utf8(output.stderr).unwrap();

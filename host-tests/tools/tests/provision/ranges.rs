@@ -1,4 +1,4 @@
-//! Whatever is in the flash: a configuration within its ranges, or an error that names the number.
+//! Robustness of reading: any flash content is a valid configuration, or an error that names the number.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -74,7 +74,7 @@ fn a_number_out_of_range_is_named() {
             &(-0.5_f32).to_le_bytes(),
             ConfigError::Mission(MissionError::Lateral),
         ),
-        // Nobody adjusts, nothing is measured, and there is no field.
+        // Without adjust, without measurements and without a field.
         (108, &1.0_f32.to_le_bytes(), ConfigError::Adjust),
         (108, &(-0.0_f32).to_le_bytes(), ConfigError::Adjust),
         (112, &[1, 0], ConfigError::Adjust),
@@ -85,11 +85,11 @@ fn a_number_out_of_range_is_named() {
         (120, &[100, 0], ConfigError::Measure),
         (124, &[1], ConfigError::Unused),
         (251, &[0x80], ConfigError::Unused),
-        // Nobody listens.
+        // Without locating the interferer.
         (352, &[1], ConfigError::Listen),
         (360, &[1], ConfigError::Listen),
         (368, &0.1_f32.to_le_bytes(), ConfigError::Listen),
-        // There are no sites.
+        // Without sites.
         (312, &1.0_f32.to_le_bytes(), ConfigError::Speed),
         (312, &(-0.0_f32).to_le_bytes(), ConfigError::Speed),
     ] {
@@ -99,7 +99,7 @@ fn a_number_out_of_range_is_named() {
     assert_eq!(reads(&[0; LEN]), Err(ConfigError::Blank));
 }
 
-/// `explore` and `rounds` of adjust, then `i_max_w` and `samples` of measuring, just inside and just outside.
+/// Checks values just inside and just outside the ranges of `explore`, `rounds`, `i_max_w` and `samples`.
 #[test]
 fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
     for (explore_m, rounds, good) in [
@@ -158,7 +158,7 @@ fn a_field_out_of_range_is_named() {
         (52, &one, ConfigError::Interferer),
         (114, &[2, 0], ConfigError::Unused),
         (114, &[4, 0], ConfigError::Field(FieldError::Order)),
-        // Without points it is an interferer, and the points are not 0.
+        // Zero points mean an interferer, so the points' bytes must be 0.
         (114, &[0, 0], ConfigError::Unused),
         (114, &[17, 0], ConfigError::Points),
         (124, &nan, ConfigError::Field(FieldError::Place)),
@@ -182,7 +182,6 @@ fn a_field_out_of_range_is_named() {
     }
 }
 
-/// A relay takes what has been read.
 fn flies(config: &Config) {
     let settings = Settings {
         profile: Some(config.profile),
@@ -201,7 +200,6 @@ fn flies(config: &Config) {
     }
 }
 
-/// Whatever is in the flash, with a good CRC: a configuration in range, or an error.
 #[test]
 fn any_bytes_are_a_configuration_or_an_error() {
     let mut rng = ChaCha8Rng::seed_from_u64(uav_relay_oracle::random::seed(41));
@@ -220,7 +218,7 @@ fn any_bytes_are_a_configuration_or_an_error() {
         for _ in 0..20_000 {
             let at = rng.random_range(8..LEN - 8);
             let bytes: [u8; 4] = rng.random();
-            // Four bytes of noise, or one, which is more often good.
+            // Four random bytes, or one, which is valid more often.
             let cut = if rng.random() { 1 } else { 4 };
             if let Ok(config) = reads(&changed(block, at, &bytes[..cut])) {
                 flies(&config);

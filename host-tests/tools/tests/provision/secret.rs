@@ -1,4 +1,4 @@
-//! Key and epoch in a block, and where `cargo provision` has them from.
+//! Key and epoch in a block, and their source.
 
 use std::path::Path;
 
@@ -121,7 +121,6 @@ fn a_bad_key_is_named_and_not_shown() {
     assert!(!Path::new(&out).exists());
 }
 
-/// A key that every user of the computer can read is no secret.
 #[test]
 fn a_key_file_that_others_can_read_is_refused() {
     use std::os::unix::fs::PermissionsExt as _;

@@ -1,4 +1,4 @@
-//! The sites in a block, the line that a drone makes of them, and where `cargo provision` has them from.
+//! Sites in a block, the line that a drone computes from them, and their source in the scenario.
 
 use uav_relay::flight::axis::AxisError;
 use uav_relay::flight::course::{Course, CourseError};
@@ -26,7 +26,7 @@ pub(super) fn flight() -> Flight {
     Flight::new(&scenario(), 5, 1e-4, 7).unwrap()
 }
 
-/// Latitude, longitude and height of both, as the table has them.
+/// Latitude, longitude and height of both sites, as the table encodes them.
 const ENDS: [[i32; 3]; 2] = [
     [474_000_000, 85_400_000, 420_000],
     [474_100_000, 85_500_000, 431_000],
@@ -109,7 +109,7 @@ fn what_is_wrong_with_sites_is_named() {
         course(&near, flight().mission()),
         Err(CourseError::Axis(AxisError::TooShort { .. }))
     ));
-    // Whoever writes a block is told before a drone is.
+    // The error occurs when the block is written, before the drone would report it.
     let moved = Scenario {
         distance_m: 1_340.0,
         ..scenario()

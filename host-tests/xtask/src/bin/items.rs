@@ -10,7 +10,7 @@ fn main() -> ExitCode {
     let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
     let page = Path::new(&target).join("doc/uav_relay/all.html");
     let items = match std::fs::read_to_string(&page) {
-        // Links with `#` lead to the sections of the page itself.
+        // Links with `#` lead to sections of the page itself.
         Ok(text) => {
             text.matches("<li><a href=\"").count() - text.matches("<li><a href=\"#").count()
         }

@@ -1,10 +1,11 @@
-//! What the workspace builds with: licences that its own goes with, one place it all comes from, nothing twice in what flies; run
-//! by `cargo ci`. Advisories are not looked up: they change without a commit, and have to be fetched.
+//! Checks the workspace's dependencies: licences, a single registry, and no duplicate versions in the library; run by `cargo ci`.
+//!
+//! Advisories are not checked, because they change without a commit and have to be fetched.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::{Command, ExitCode};
 
-/// Those that ask for no more than to be named.
+/// Allowed licences, which require only attribution.
 const ALLOWED: [&str; 10] = [
     "0BSD",
     "Apache-2.0",
@@ -18,10 +19,10 @@ const ALLOWED: [&str; 10] = [
     "Zlib",
 ];
 
-/// Packages of the tests alone, under a licence that binds who hands them on.
+/// Packages used only by tests, under a licence that restricts redistribution.
 const TESTS_ALONE: [&str; 2] = ["alterable_logger", "colored"];
 
-/// Whether each part of a licence expression that stands between `AND`s offers one of [`ALLOWED`]. An older `/` is an `OR`.
+/// Returns true if each part of a licence expression between `AND`s offers one of [`ALLOWED`]. An older `/` is an `OR`.
 fn is_allowed(expression: &str) -> bool {
     let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
     let one = |licence: &str| {
@@ -31,10 +32,10 @@ fn is_allowed(expression: &str) -> bool {
     plain.split(" AND ").all(|part| part.split(" OR ").any(one))
 }
 
-/// In the library's tree in two versions: embedded-hal 1.0 asks for the older defmt, which is the newer one under another name.
+/// Allowed duplicates: embedded-hal 1.0 needs the older defmt, a re-export of the newer one.
 const TWICE: [&str; 1] = ["defmt"];
 
-/// What `cargo tree` prints of the locked packages, for every target and feature.
+/// Returns the output of `cargo tree` for the locked packages, with every target and feature.
 fn tree(arguments: &[&str]) -> Result<String, String> {
     let output = Command::new("cargo")
         .args([
@@ -54,7 +55,6 @@ fn tree(arguments: &[&str]) -> Result<String, String> {
     }
 }
 
-/// The packages whose licence is not among those allowed.
 fn licences() -> Result<Vec<String>, String> {
     let text = tree(&["--workspace", "--edges=all", "--format={l}|{p}"])?;
     let lines = text.lines().filter(|line| line.contains('|'));
@@ -68,7 +68,7 @@ fn licences() -> Result<Vec<String>, String> {
     Ok(refused.map(|line| format!("licence: {line}")).collect())
 }
 
-/// The packages that the library, not its tests or its build, needs in several versions.
+/// Returns the packages that the library needs in several versions, without tests and build.
 fn twice() -> Result<Vec<String>, String> {
     let text = tree(&[
         "--package=uav-relay",
@@ -87,7 +87,6 @@ fn twice() -> Result<Vec<String>, String> {
     Ok(versions.into_iter().map(told).collect())
 }
 
-/// The locked packages that come from elsewhere than the registry.
 fn elsewhere(lock: &str) -> Vec<String> {
     let sources = lock.lines().filter(|line| line.starts_with("source = "));
     let other = sources.filter(|line| !line.starts_with("source = \"registry+"));

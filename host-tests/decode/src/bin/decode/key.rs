@@ -1,11 +1,9 @@
-//! Where the key of a network comes from.
+//! Reads the network key.
 
 use std::path::Path;
 
-/// Bytes of a key.
 const LENGTH: usize = 32;
 
-/// The key in a file of 64 hexadecimal digits.
 pub(crate) fn load(file: &Path) -> Result<[u8; LENGTH], String> {
     let text = std::fs::read_to_string(file)
         .map_err(|error| format!("--key {}: cannot be read: {error}", file.display()))?;
@@ -15,7 +13,7 @@ pub(crate) fn load(file: &Path) -> Result<[u8; LENGTH], String> {
     })
 }
 
-/// The key that the comment of a simulated run ends in.
+/// Returns the key at the end of a simulation's capture comment.
 pub(crate) fn of_comment(comment: &str) -> Option<[u8; LENGTH]> {
     let (_, key) = comment.rsplit_once(", key ")?;
     parse(key)

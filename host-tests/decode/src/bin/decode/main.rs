@@ -1,4 +1,4 @@
-//! `cargo decode`: frames field by field, from a capture, a file of bytes or a port.
+//! `cargo decode`: prints frames field by field, from a capture, a byte file or a port.
 
 mod key;
 mod options;
@@ -42,7 +42,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let (name, input) = open(options.file.as_deref())?;
     match source::read(input, |item| printer.take(item)) {
         Ok(()) => Ok(()),
-        // A reader that has had enough, such as `head`, is no fault of the command.
+        // A reader that closes the pipe, such as `head`, is not an error.
         Err(Trouble::Taken(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(Trouble::Taken(error)) => {
             let line = format!("standard output: cannot be written: {error}");
@@ -57,7 +57,6 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// What to read, and what it is called.
 fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
     match file.filter(|file| *file != Path::new("-")) {
         Some(file) => {
@@ -74,7 +73,6 @@ fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
     }
 }
 
-/// Prints frame after frame.
 struct Printer<'f, W: Write> {
     format: &'f Format,
     members: Members,
@@ -87,7 +85,7 @@ impl<W: Write> Printer<'_, W> {
     fn take(&mut self, item: Item<'_>) -> io::Result<()> {
         match item {
             Item::Comment(comment) => {
-                // A simulated run says the key that it has drawn.
+                // A simulation's capture comment contains the key.
                 if let Some(key) = key::of_comment(comment)
                     && !self.members.has_key()
                 {

@@ -1,10 +1,9 @@
-//! The options of `cargo decode`.
-
 use std::path::PathBuf;
 
 use clap::Parser;
 
-/// Prints the frames of a capture or of a stream of bytes field by field, each as soon as it is whole, and says of one that is refused why.
+/// Prints the frames of a capture or of a byte stream field by field, as soon as each is complete, and why a rejected one is
+/// rejected.
 #[derive(Parser, Debug)]
 #[command(
     name = "decode",
@@ -12,13 +11,13 @@ use clap::Parser;
     disable_version_flag = true
 )]
 pub(crate) struct Options {
-    /// A capture (pcapng), or the bytes of a port; without it or with `-` standard input, as of `cat /dev/ttyUSB0`
+    /// Capture (pcapng), or bytes of a port; by default or with `-` standard input, as of `cat /dev/ttyUSB0`
     #[arg(value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
-    /// One JSON object for each frame, on a line of its own. Numbers are as on the wire
+    /// Print one JSON object per frame and line. Numbers are as on the wire
     #[arg(long)]
     pub(crate) json: bool,
-    /// The key of the network, 64 hexadecimal digits: of tags it is said whether they are right, once the handshake of the two was seen
+    /// File with the network key, 64 hexadecimal digits: checks the tags of two nodes once their handshake was captured
     #[arg(long, value_name = "FILE")]
     pub(crate) key: Option<PathBuf>,
     /// Write the dissector for Wireshark to this file instead, or with `-` to standard output

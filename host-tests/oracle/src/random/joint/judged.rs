@@ -1,4 +1,4 @@
-//! Two thousand scenarios in space whose optima are stored, so that a solver can be judged without searching for them again.
+//! Two thousand scenarios in space with stored optima, to test a solver without searching for them again.
 
 use std::io;
 
@@ -7,26 +7,25 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Scenario, in_space};
 
-/// How many there are.
+/// Number of scenarios.
 pub const COUNT: u32 = 2000;
 
-/// Where the optima are stored.
+/// File with the optima.
 pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
-/// The seed that the scenarios are drawn from, each in a stream of its own.
 const SEED: u64 = 2021;
 
-/// The scenario of a number below [`COUNT`]: 1 to 100 relays, numbers as relays know them.
+/// Returns the scenario of a number below [`COUNT`]: 1 to 100 relays, numbers rounded to f32.
 pub fn numbered(number: u32) -> Scenario {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     rng.set_stream(number.into());
     in_space(&mut rng, &(1..=100)).as_relays_know_it()
 }
 
-/// The optimum SIR (linear) of each, by number; 0 where no chain is possible.
+/// Returns the optimum SIR (linear) of each scenario, by number; 0 if no chain is possible.
 ///
 /// # Errors
-/// Where the file cannot be read, or a row of it is not a number and an SIR.
+/// If the file cannot be read, or a row is not a number and an SIR.
 pub fn optima() -> io::Result<Vec<f64>> {
     let mut optima = Vec::new();
     for row in csv::Reader::from_path(PATH)?.deserialize() {

@@ -45,19 +45,19 @@ use crate::reference::joint::{Corridor, Hold};
 use crate::reference::{Link, Station};
 use uav_relay_scenario::number::narrow;
 
-/// A link and the corridor of its relays, which stand at its lowest altitude in the link.
+/// A link and the corridor of its relays, which are at its lowest altitude in the link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// The link.
+    /// Link.
     pub link: Link,
-    /// The corridor.
+    /// Corridor.
     pub corridor: Corridor,
-    /// The relays that hold their place in its cross-section.
+    /// Relays with a fixed lateral position and altitude.
     pub held: Vec<Hold>,
 }
 
 impl Scenario {
-    /// The same with every number rounded to the f32 that a relay is given.
+    /// Rounds every number to the f32 of relays.
     #[must_use]
     pub fn as_relays_know_it(&self) -> Self {
         let round = |value: f64| f64::from(narrow(value));
@@ -79,10 +79,10 @@ impl Scenario {
     }
 }
 
-/// How far apart neighbours must stay in half of the scenarios, as a part of D / (N + 1): it hardly ever binds.
+/// Least separation in half of the scenarios, as a fraction of D / (N + 1): it hardly ever binds.
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
-/// The same where it often binds: about a tenth of those scenarios lose SIR by it.
+/// Least separation that often binds, as a fraction of D / (N + 1): about a tenth of those scenarios lose SIR by it.
 pub const CROWDED: (f64, f64) = (0.03, 0.3);
 
 /// Draws one scenario; the distribution is in the module's table. `relays` within 1 to 1000, `apart` [`ROOMY`] or [`CROWDED`].
@@ -130,7 +130,7 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
     }
 }
 
-/// Draws one scenario with room to the side; the distribution is in the module's second table. `relays` within 1 to 1000.
+/// Draws one scenario with lateral room; the distribution is in the module's second table. `relays` within 1 to 1000.
 pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     let apart = if rng.random() { ROOMY } else { CROWDED };
     let mut drawn = scenario(rng, relays, apart);
@@ -153,7 +153,7 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// The scenario with powers and places that single relays have to themselves; the distribution is in the module's last table.
+/// Gives relays their own powers and fixed positions; the distribution is in the module's last table.
 #[must_use]
 pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
     let (powers, holds): (bool, bool) = (rng.random(), rng.random());
@@ -173,7 +173,6 @@ pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
     of
 }
 
-/// How many relays.
 fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
     if rng.random() {
         return rng.random_range(relays.clone());
@@ -187,7 +186,7 @@ fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
         .unwrap_or(fewest)
 }
 
-/// X as a share of D.
+/// Draws X as a share of D.
 fn along(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..40) {
         0..32 => rng.random_range(0.0..=1.0),
@@ -200,7 +199,7 @@ fn along(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// Y as a share of D.
+/// Draws Y as a share of D.
 fn aside(rng: &mut impl Rng) -> f64 {
     if rng.random_bool(0.7) {
         log_uniform(rng, 0.003, 0.1)
@@ -209,7 +208,6 @@ fn aside(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// `mu_los`, `mu_nlos` and eta.
 fn channel(rng: &mut impl Rng) -> (f64, f64, f64) {
     if rng.random() {
         let Link {

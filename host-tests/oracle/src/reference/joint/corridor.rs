@@ -1,20 +1,20 @@
-//! Where relays may fly, and where one does.
+//! Corridor open to relays, and positions in it.
 
-/// Where relays may fly, seen along Tx-Rx.
+/// Region open to relays, seen along Tx-Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
-    /// Lowest altitude above the ground of Tx, Rx and the interferer, metres, > 0.
+    /// Lowest altitude above the ground of Tx, Rx and the interferer, m, > 0.
     pub least_m: f64,
-    /// Highest altitude, metres, >= `least_m`.
+    /// Highest altitude, m, >= `least_m`.
     pub most_m: f64,
-    /// Least y, metres; seldom > 0.
+    /// Least y, m; seldom > 0.
     pub left_m: f64,
-    /// Largest y, metres, >= `left_m`.
+    /// Largest y, m, >= `left_m`.
     pub right_m: f64,
 }
 
 impl Corridor {
-    /// The plane above Tx-Rx, within a band of altitudes.
+    /// Creates the plane above Tx-Rx, within a band of altitudes.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -24,7 +24,7 @@ impl Corridor {
         }
     }
 
-    /// Whether a place is within, `slack_m` forgiven.
+    /// Returns true if a position is inside, with a tolerance of `slack_m`.
     pub fn contains(&self, place: &Place, slack_m: f64) -> bool {
         let within =
             |low: f64, value: f64, high: f64| (low - slack_m..=high + slack_m).contains(&value);
@@ -33,19 +33,19 @@ impl Corridor {
     }
 }
 
-/// A relay that holds its place in the cross-section, within the corridor or not.
+/// A relay with a fixed lateral position and altitude, inside the corridor or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hold {
-    /// Its number in the link, from 0.
+    /// Index of the relay in the link, from 0.
     pub relay: usize,
-    /// Its offset from the Tx-Rx plane, metres.
+    /// Offset from the Tx-Rx plane, m.
     pub y_m: f64,
-    /// Its altitude, metres, > 0.
+    /// Altitude, m, > 0.
     pub altitude_m: f64,
 }
 
 impl Hold {
-    /// The corridor of one relay: of no width if it holds its place.
+    /// Returns the corridor of one relay: a single point if its cross-section is fixed.
     pub(super) fn room(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
         let own = held.iter().find(|hold| hold.relay == relay);
         own.map_or(corridor, |hold| Corridor {
@@ -57,19 +57,19 @@ impl Hold {
     }
 }
 
-/// Where one relay flies.
+/// Position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Coordinate along Tx-Rx, metres, in [0, D].
+    /// Coordinate along Tx-Rx, m, in [0, D].
     pub x_m: f64,
-    /// Offset from the Tx-Rx plane, to the side on which the interferer's is positive, metres.
+    /// Offset from the Tx-Rx plane, m, with the sign of the interferer's `y_i`.
     pub y_m: f64,
-    /// Altitude, metres.
+    /// Altitude, m.
     pub altitude_m: f64,
 }
 
 impl Place {
-    /// A place in the plane above Tx-Rx.
+    /// Creates a position in the plane above Tx-Rx.
     pub const fn in_plane(x_m: f64, altitude_m: f64) -> Self {
         Self {
             x_m,
@@ -78,7 +78,7 @@ impl Place {
         }
     }
 
-    /// Distance from another place, metres.
+    /// Returns the distance to another position, m.
     pub fn distance_m(&self, other: &Self) -> f64 {
         let aside = (self.y_m - other.y_m).hypot(self.altitude_m - other.altitude_m);
         (self.x_m - other.x_m).hypot(aside)

@@ -1,4 +1,4 @@
-//! Places in the cross-section that are drawn for a search.
+//! Random positions in the cross-section for the search.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -6,19 +6,18 @@ use rand_chacha::ChaCha8Rng;
 use super::scene::{Room, Scene};
 use super::space::Across;
 
-/// Where levels may lie.
+/// Part of the corridor for random levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
-    /// Anywhere in the corridor.
     Any,
-    /// Where y is at most the interferer's.
+    /// Positions with y at most the interferer's.
     Left,
-    /// Where y is at least the interferer's.
+    /// Positions with y at least the interferer's.
     Right,
 }
 
 impl Side {
-    /// The part of the corridor on this side of the interferer; `None` if there is none.
+    /// Returns the part of the corridor on this side of the interferer; `None` if there is none.
     pub(super) fn part(self, scene: &Scene) -> Option<Room> {
         let (mut room, y_i) = (scene.corridor, scene.interferer.y);
         match self {
@@ -31,8 +30,8 @@ impl Side {
     }
 }
 
-/// Levels over a room with some jitter, its walls and corners included: `columns` to the side, `rows` up, closer at the bottom
-/// or evenly; about as many in all where the room has no width or no height.
+/// Returns a jittered grid of `columns` x `rows` levels with walls and corners; as many in all if the room has no width or
+/// height.
 pub(super) fn levels(room: &Room, rng: &mut ChaCha8Rng, columns: u32, rows: u32) -> Vec<Across> {
     let free = room.free();
     let (columns, rows) = match (free.y > 0.0, free.h > 0.0) {
@@ -50,7 +49,7 @@ pub(super) fn levels(room: &Room, rng: &mut ChaCha8Rng, columns: u32, rows: u32)
                 .map(|h| room.within(y, h)),
         );
     }
-    // The plane of Tx and Rx is the shortest way.
+    // The plane of Tx and Rx has the shortest hops.
     if room.low.y < 0.0 && room.high.y > 0.0 {
         levels.extend((0..3).map(|i| {
             room.nearest(
@@ -62,7 +61,7 @@ pub(super) fn levels(room: &Room, rng: &mut ChaCha8Rng, columns: u32, rows: u32)
     levels
 }
 
-/// `count` shares from 0 to 1 with some jitter, both ends included.
+/// Returns `count` shares from 0 to 1 with some jitter, both ends included.
 fn shares(rng: &mut ChaCha8Rng, count: u32, skew: f64) -> Vec<f64> {
     let last = f64::from(count.max(2) - 1);
     let mut jitter = |i: u32| match i {
@@ -75,7 +74,7 @@ fn shares(rng: &mut ChaCha8Rng, count: u32, skew: f64) -> Vec<f64> {
         .collect()
 }
 
-/// One place: half of the time on a wall, for each of both directions.
+/// Draws a position: in each direction on a wall half of the time.
 pub(super) fn place(room: &Room, rng: &mut ChaCha8Rng) -> Across {
     let mut share = || match rng.random_range(0..4) {
         0 => 0.0,
@@ -85,7 +84,7 @@ pub(super) fn place(room: &Room, rng: &mut ChaCha8Rng) -> Across {
     room.within(share(), share())
 }
 
-/// A bowed chain's places in the cross-section: straight from one place to a second, somewhere on the way, and to a third.
+/// Draws a bent chain in the cross-section: straight from a start to a bend, then straight to an end.
 pub(super) fn bow(room: &Room, rng: &mut ChaCha8Rng, relays: usize) -> Vec<Across> {
     let [start, bend, end] = [(); 3].map(|()| place(room, rng));
     let turn: f64 = rng.random_range(0.05..=0.95);

@@ -1,4 +1,4 @@
-//! Changes of a good chain that lead to the basins around its own.
+//! Random perturbations of a good chain, to reach neighbouring local optima.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,7 +8,7 @@ use super::scene::Scene;
 use super::space::{Across, Triple};
 use crate::random::log_uniform;
 
-/// A chain changed at random; not yet in order, apart and within its rooms.
+/// Returns a randomly perturbed chain; order, separation and rooms are not yet restored.
 pub(super) fn kicked(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     match rng.random_range(0..8) {
         0..4 => reinserted(chain, rng),
@@ -18,7 +18,6 @@ pub(super) fn kicked(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> V
     }
 }
 
-/// The numbers of some relays in a row.
 fn row(chain: &[Triple], rng: &mut ChaCha8Rng) -> std::ops::RangeInclusive<usize> {
     let (one, other) = (
         rng.random_range(0..chain.len()),
@@ -27,7 +26,6 @@ fn row(chain: &[Triple], rng: &mut ChaCha8Rng) -> std::ops::RangeInclusive<usize
     one.min(other)..=one.max(other)
 }
 
-/// One to three relays, each taken out of the chain and put between two others or at an end.
 fn reinserted(chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let mut chain = chain.to_vec();
     for _ in 0..rng.random_range(1..=3) {
@@ -47,7 +45,7 @@ fn reinserted(chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     chain
 }
 
-/// Some relays in a row moved at random, each on its own or all together.
+/// Moves a range of relays at random, each on its own or all together.
 fn shaken(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let mut chain = chain.to_vec();
     let row = row(&chain, rng);
@@ -70,7 +68,6 @@ fn shaken(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> 
     chain
 }
 
-/// Some relays in a row on the other side of the interferer.
 fn mirrored(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let mut chain = chain.to_vec();
     let row = row(&chain, rng);
@@ -84,7 +81,7 @@ fn mirrored(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple
     chain
 }
 
-/// All relays pulled toward one place in the cross-section, those nearest to some place along Tx-Rx most.
+/// Pulls all relays toward one cross-section position, most strongly near some position along Tx-Rx.
 fn pulled(scene: &Scene, chain: &[Triple], rng: &mut ChaCha8Rng) -> Vec<Triple> {
     let to = place(&scene.corridor, rng);
     let (centre, breadth): (f64, f64) = (rng.random(), log_uniform(rng, 0.03, 1.0));

@@ -1,10 +1,9 @@
-//! The best chain whose relays fly at given levels, each a place in the cross-section: exact for those levels, whatever the
-//! interferer.
+//! The best chain for given levels (positions in the cross-section) of each relay: exact, whatever the interferer.
 //!
-//! For a target, the places each relay can reach at each of its levels are a union of intervals (see `reference::sets`): a
-//! sender at another level matters only through its nearest place, which is the least advance away or at the end of an
-//! interval, and either way the receiver's places solve a quadratic inequality. The target is bisected. Quadratics are solved
-//! here, unlike in the rest of the reference, for speed: what comes out is judged by its SIR alone.
+//! For a target, the positions that each relay can reach at each of its levels are a union of intervals (see `reference::sets`).
+//! A sender at another level matters only through its nearest position, which is the least advance away or at the end of an
+//! interval; either way the receiver's positions solve a quadratic inequality. The target is bisected. Unlike the rest of the
+//! reference, this solves quadratics, for speed; the result is evaluated by its SIR alone.
 
 use super::roots;
 use super::scene::{Room, Scene};
@@ -12,19 +11,17 @@ use super::space::{Across, Triple};
 
 type Interval = (f64, f64);
 
-/// Reachable places of one relay: a level and its sorted, disjoint intervals, for every level.
+/// Reachable positions of one relay: each level with its sorted, disjoint intervals.
 type Reach = Vec<(Across, Vec<Interval>)>;
 
-/// Where each relay may be.
+/// Positions open to a relay.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
-    /// Its places in the cross-section.
     pub(super) levels: Vec<Across>,
-    /// Its places along Tx-Rx, both ends included.
     pub(super) window: Interval,
 }
 
-/// One level for each relay: the nearest in its room to that of `places`.
+/// Returns one level per relay: the nearest in its room to that of `places`.
 pub(super) fn at_places(scene: &Scene, places: &[Across]) -> Vec<Slot> {
     let places = places
         .iter()
@@ -38,7 +35,6 @@ pub(super) fn at_places(scene: &Scene, places: &[Across]) -> Vec<Slot> {
         .collect()
 }
 
-/// The nearest places to `levels` in a room, each once.
 pub(super) fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
     let mut inside: Vec<Across> = Vec::with_capacity(levels.len());
     for level in levels {
@@ -50,7 +46,7 @@ pub(super) fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
     inside
 }
 
-/// The best chain, one slot per relay, to `tolerance` in ln SIR; `None` if no chain reaches `floor`, a ln SIR.
+/// Returns the best chain, one slot per relay, to `tolerance` in ln SIR; `None` if no chain reaches `floor`, a ln SIR.
 pub(super) fn best_chain(
     scene: &Scene,
     slots: &[Slot],
@@ -62,7 +58,7 @@ pub(super) fn best_chain(
     let mut high = scene.ceiling();
     let mut stride = 0.02;
     while high - low > tolerance {
-        // Strides that double find the bracket; most calls start just below the optimum.
+        // Doubles the stride to bracket the optimum; most calls start just below it.
         let middle = low.midpoint(high).min(low + stride);
         match chain(scene, slots, middle) {
             Some(found) => {
@@ -76,7 +72,7 @@ pub(super) fn best_chain(
     Some(best)
 }
 
-/// A chain that meets a target, ln SIR.
+/// Returns a chain that meets a target, ln SIR.
 fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Triple>> {
     let mut reaches: Vec<Reach> = Vec::with_capacity(slots.len());
     for (slot, &constant) in slots.iter().zip(&scene.hops) {
@@ -108,7 +104,7 @@ fn chain(scene: &Scene, slots: &[Slot], target: f64) -> Option<Vec<Triple>> {
     trace_back(scene, &reaches, target)
 }
 
-/// The last relay nearest to Rx, then each relay nearest to its successor.
+/// Traces the chain back: the last relay nearest to Rx, then each relay nearest to its successor.
 fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Triple>> {
     let mut next = Triple::new(1.0, 0.0, 0.0);
     let mut places = Vec::with_capacity(reaches.len());
@@ -134,13 +130,12 @@ fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Tripl
     Some(places)
 }
 
-/// How far past its sender a relay must be for the least separation, `across_2` being the square of their distance in the
-/// cross-section.
+/// Returns the least advance past the sender that keeps the separation; `across_2` is the squared cross-section distance.
 pub(super) fn least_advance(scene: &Scene, across_2: f64) -> f64 {
     (scene.apart * scene.apart - across_2).max(0.0).sqrt()
 }
 
-/// A relay at one level that a hop is to reach: l <= `ease` s / (1 + nu s), with l = (sender to relay)^2 and s = (relay to interferer)^2.
+/// A receiver at one level: l <= `ease` s / (1 + nu s), with l = (sender to relay)^2 and s = (relay to interferer)^2.
 struct Landing<'a> {
     scene: &'a Scene,
     ease: f64,
@@ -149,7 +144,7 @@ struct Landing<'a> {
 }
 
 impl Landing<'_> {
-    /// Places at least `advance` past one sender.
+    /// Adds the positions at least `advance` beyond one sender.
     fn after_place(&self, from: Triple, advance: f64, pieces: &mut Vec<Interval>) {
         let ahead = self.scene.interferer.x - from.x;
         let across_2 = self.level.apart_2(from.across());
@@ -186,14 +181,14 @@ impl Landing<'_> {
         );
     }
 
-    /// Places reached from a whole set of one level.
+    /// Adds the positions reached from a whole set of one level.
     fn after_level(&self, level: Across, set: &[Interval], pieces: &mut Vec<Interval>) {
         let across_2 = self.level.apart_2(level);
         let advance = least_advance(self.scene, across_2);
         let rest = self.level.apart_2(self.scene.interferer.across());
         let x_i = self.scene.interferer.x;
         for &(start, end) in set {
-            // The sender just the least advance behind.
+            // The sender is exactly the least advance behind.
             let nearest = advance * advance + across_2;
             let ease = self.ease - self.scene.noise * nearest;
             not_positive(
@@ -224,7 +219,7 @@ fn not_positive(a: f64, b: f64, c: f64, within: Interval, mut found: impl FnMut(
         }
         return;
     }
-    // The root of larger size first, for its digits; infinite where the inequality is linear.
+    // Computes the larger root first, for its accuracy; infinite if the inequality is linear.
     let sum = -(b + discriminant.sqrt().copysign(b));
     let (far, near) = (sum / a, if sum == 0.0 { 0.0 } else { c / sum });
     let (first, second) = (far.min(near), far.max(near));
@@ -242,7 +237,6 @@ fn not_positive(a: f64, b: f64, c: f64, within: Interval, mut found: impl FnMut(
     }
 }
 
-/// Sorts intervals and joins those that touch.
 fn merge(mut pieces: Vec<Interval>) -> Vec<Interval> {
     pieces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut merged: Vec<Interval> = Vec::with_capacity(4);
@@ -255,7 +249,6 @@ fn merge(mut pieces: Vec<Interval>) -> Vec<Interval> {
     merged
 }
 
-/// The last place of `set` that is not beyond `limit`.
 fn last_at_or_before(set: &[Interval], limit: f64) -> Option<f64> {
     set.iter()
         .rev()

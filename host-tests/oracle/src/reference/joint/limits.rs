@@ -1,8 +1,8 @@
-//! What limits a chain, with slopes and curvatures.
+//! Constraints of a chain, with slopes and curvatures.
 //!
-//! A hop's SIR is a constant times (receiver to interferer)^2 / (sender to receiver)^2, at Rx a constant over (sender to
-//! Rx)^2. So its logarithm is a sum of logarithms of squared distances, whose derivatives are those of ln(q), q = d^2: slope
-//! 2 d / q, curvature 2 I / q - 4 d d^T / q^2. With noise the first of them is ln(q / w), w = 1 + nu q: slope 2 d / (q w), curvature
+//! A hop's SIR is a constant times (receiver to interferer)^2 / (sender to receiver)^2, at Rx a constant over (sender to Rx)^2.
+//! Its logarithm is a sum of logarithms of squared distances, with the derivatives of ln(q), q = d^2: slope 2 d / q, curvature
+//! 2 I / q - 4 d d^T / q^2. With noise the first of them is ln(q / w), w = 1 + nu q: slope 2 d / (q w), curvature
 //! 2 I / (q w) - (1 + 2 nu q) (2 d / (q w)) (2 d / (q w))^T.
 
 use super::scene::Scene;
@@ -13,7 +13,7 @@ use super::space::{Square, Triple};
 pub(super) struct Log {
     value: f64,
     slope: Triple,
-    /// The curvature is `even` times the identity less `sharp` times the square of the slope.
+    /// Curvature: `even` times the identity less `sharp` times the outer square of the slope.
     even: f64,
     sharp: f64,
 }
@@ -29,7 +29,7 @@ impl Log {
         }
     }
 
-    /// ln(q / (1 + nu q)).
+    /// Returns ln(q / (1 + nu q)).
     fn in_noise(d: Triple, noise: f64) -> Self {
         let q = d.dot(d);
         let w = 1.0 + noise * q;
@@ -45,33 +45,28 @@ impl Log {
         Square::even(self.even) - Square::outer(self.slope, self.slope) * self.sharp
     }
 
-    /// Half the curvature along a step: what the second order adds to a change.
+    /// Returns half the curvature along a step: the second-order part of the change.
     fn bend(&self, step: Triple) -> f64 {
         0.5 * (self.even * step.dot(step) - self.sharp * self.slope.dot(step).powi(2))
     }
 }
 
-/// Something that must stay >= 0 (a hop's ln SIR over the target, a margin of order, corridor or separation), of one relay and
-/// the one before it.
+/// A constraint `value` >= 0 on a relay and its predecessor: a hop's ln SIR over the target, or a margin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
-    /// Number of the relay, from 0.
     pub(super) relay: usize,
     pub(super) value: f64,
-    /// Slope by the relay's own place.
     pub(super) own: Triple,
-    /// Slope by the place of the relay before.
     pub(super) before: Triple,
     /// Slope by the target: -1 for hops, 0 for margins.
     pub(super) target: f64,
-    /// The part that depends on the step from the relay before to this one.
+    /// Curved part that depends on the step from the predecessor to this relay.
     pub(super) leap: Log,
-    /// The curved part that depends on the relay's own place alone.
+    /// Curved part that depends on the relay's own position alone.
     pub(super) alone: Log,
 }
 
 impl Limit {
-    /// A linear margin.
     fn margin(relay: usize, value: f64, own: Triple, before: Triple) -> Self {
         Self {
             relay,
@@ -84,7 +79,7 @@ impl Limit {
         }
     }
 
-    /// What both logarithms add to `value`; with `target`, so much less.
+    /// Creates a curved constraint: `value` plus both logarithms, less `target` if given.
     fn curved(relay: usize, value: f64, leap: Log, alone: Log, target: Option<f64>) -> Self {
         Self {
             relay,
@@ -97,18 +92,18 @@ impl Limit {
         }
     }
 
-    /// The first-order change by a step of the relay, of the one before and of the target.
+    /// Returns the first-order change for steps of the relay, its predecessor and the target.
     pub(super) fn change(&self, own: Triple, before: Triple, raise: f64) -> f64 {
         self.own.dot(own) + self.before.dot(before) + self.target * raise
     }
 
-    /// What the second order adds to that.
+    /// Returns the second-order part of the change.
     pub(super) fn bend(&self, own: Triple, before: Triple) -> f64 {
         self.leap.bend(own - before) + self.alone.bend(own)
     }
 }
 
-/// Everything that limits a chain when its ln SIR is to exceed `target`.
+/// Returns the constraints of a chain whose ln SIR must exceed `target`.
 pub(super) fn limits(scene: &Scene, places: &[Triple], target: f64) -> Vec<Limit> {
     let mut limits = Vec::with_capacity(7 * places.len() + 2);
     let mut from = Triple::default();
@@ -139,7 +134,7 @@ pub(super) fn limits(scene: &Scene, places: &[Triple], target: f64) -> Vec<Limit
             limits.push(Limit::margin(relay, room.high.h - place.h, -up, none));
         }
         if relay > 0 && scene.apart > 0.0 {
-            // As a logarithm: the margin then has the size of those of the hops.
+            // In logarithmic form the margin has the same scale as those of the hops.
             limits.push(Limit::curved(
                 relay,
                 -2.0 * scene.apart.ln(),

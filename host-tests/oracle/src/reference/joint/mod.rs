@@ -1,13 +1,13 @@
-//! The joint problem: relays choose their places in a corridor along Tx-Rx, to make the worst hop's SIR as large as can be.
+//! The joint problem: relays choose positions in a corridor along Tx-Rx that maximise the worst hop's SIR.
 //!
-//! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (but for those that hold their place in its
-//! cross-section), neighbouring relays at least the link's least separation apart. The problem is not concave: a chain may pass
-//! the interferer on either side or above, leave it between any two of its relays, climb early or late. So [`optimum`] collects
-//! fair chains by searches that are global on a coarse scale (`levels`: exact for given places in the cross-section), follows
-//! each to its local optimum (`polish`: to about 1e-9), kicks the best (`kicks`), and keeps the best of all. Nothing proves that
-//! it is the global optimum; the tests show how seldom two seeds disagree.
+//! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (except relays with a fixed cross-section position), and
+//! neighbours at least the link's least separation apart. The problem is not concave: a chain may pass the interferer on either
+//! side or above, between any two of its relays, and climb early or late. So [`optimum`] collects good chains by searches that
+//! are global on a coarse scale (`levels`: exact for given cross-section positions), follows each to its local optimum (`polish`:
+//! to about 1e-9), perturbs the best (`kicks`), and keeps the best of all. The global optimum is not proven; the tests show how
+//! seldom two seeds disagree.
 //!
-//! What is reported is the SIR of the places themselves, computed from received powers: never more than can be flown.
+//! The reported SIR is computed from received powers at the positions found: never more than can be flown.
 
 mod corridor;
 mod draws;
@@ -27,19 +27,19 @@ use scene::Scene;
 use space::Triple;
 pub use starts::Effort;
 
-/// The best chain that was found.
+/// Best chain found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointOptimum {
-    /// SIR (linear) of its worst hop, computed from `places`.
+    /// SIR (linear) of the worst hop, computed from `places`.
     pub sir: f64,
-    /// Its relays from Tx to Rx.
+    /// Positions from Tx to Rx.
     pub places: Vec<Place>,
 }
 
-/// The best chain of a link in a corridor; the altitudes in `link` are not looked at.
+/// Returns the best chain of a link in a corridor; the altitudes in `link` are ignored.
 ///
-/// `None` without relays, with an empty corridor, where no chain has a positive SIR, or where no chain was found that keeps the
-/// least separation. Deterministic.
+/// `None` without relays, with an empty corridor, if no chain has a positive SIR, or if no chain was found that keeps the least
+/// separation. Deterministic.
 pub fn optimum(
     link: &Link,
     corridor: Corridor,
@@ -58,10 +58,9 @@ pub fn optimum(
         .then_some(JointOptimum { sir, places })
 }
 
-/// The best SIR (linear) of a link whose relays hold the altitudes they have above the line, with its least separation; to 1e-6
-/// relative.
+/// Returns the best SIR (linear) of a link with relays at their altitudes above the line, with the least separation.
 ///
-/// `None` as for [`optimum`].
+/// Accurate to 1e-6 relative. `None` as for [`optimum`].
 pub fn at_their_altitudes(link: &Link) -> Option<f64> {
     let heights = || link.relays.iter().map(|relay| relay.altitude_m);
     let corridor = Corridor::plane(heights().reduce(f64::min)?, heights().reduce(f64::max)?);
@@ -79,7 +78,7 @@ pub fn at_their_altitudes(link: &Link) -> Option<f64> {
     Some(scene.worst(&best).exp())
 }
 
-/// The SIR (linear) of the worst hop of a chain; `None` without relays, or unless there is one place per relay.
+/// Returns the SIR (linear) of the worst hop; `None` without relays, or unless there is one position per relay.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let (tail, last) = (places.last()?, link.relays.last()?);
     if places.len() != link.len() {
@@ -112,7 +111,7 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     Some(hops.fold(rx, f64::min))
 }
 
-/// Whether a chain keeps order, corridor and least separation (but for 1e-9 of it, for rounding), and what is held.
+/// Returns true if a chain keeps order, corridor, fixed positions and least separation (to 1e-9 of it, for rounding).
 pub fn keeps_rules(link: &Link, corridor: Corridor, held: &[Hold], places: &[Place]) -> bool {
     let mut each = (0..).zip(places);
     let within = each.all(|(relay, place)| {

@@ -1,26 +1,25 @@
-//! From a fair chain to the local optimum near it: a primal-dual interior-point method that stays feasible.
+//! Local optimisation of a chain: a feasible primal-dual interior-point method.
 //!
-//! Places and target are the unknowns, the target is maximised, every [`Limit`] stays > 0. A Newton step costs O(N); where the
-//! Lagrangian is not convex, a multiple of the identity is added until it is.
+//! Unknowns are the positions and the target; the target is maximised while every [`Limit`] stays > 0. A Newton step costs O(N);
+//! if the Lagrangian is not convex, a multiple of the identity is added until it is.
 
 use super::limits::{Limit, limits};
 use super::scene::Scene;
 use super::space::{Square, Triple};
 use super::system::{Block, solve};
 
-/// The last weight of the barrier: the target ends below the local optimum by this times the number of limits.
+/// Final barrier weight: the target ends below the local optimum by this times the number of constraints.
 const LAST_WEIGHT: f64 = 1e-12;
 
-/// The least error of the optimality conditions that rounding lets through.
+/// Least error of the optimality conditions above rounding.
 const LEAST_ERROR: f64 = 1e-10;
 
-/// Newton steps after which the polishing gives up; 30 to 100 are usual.
 const STEPS: u32 = 400;
 
-/// Share of the way to the nearest limit that one step may go.
+/// Largest part of the distance to the nearest constraint that one step may take.
 const NEARLY: f64 = 0.995;
 
-/// A chain with its target and the multipliers of its limits.
+/// A chain with its target and the multipliers of its constraints.
 struct Iterate {
     places: Vec<Triple>,
     target: f64,
@@ -28,11 +27,10 @@ struct Iterate {
     duals: Vec<f64>,
 }
 
-/// The chain at the local optimum that is reached from `start`, which must be strictly within all limits; `None` if it is not,
-/// or as soon as that optimum is known not to exceed `hope`, a ln SIR.
+/// Returns the local optimum reached from `start`; `None` if `start` is not strictly feasible.
 ///
-/// `slack` > 0 is how far below the SIR of `start` the target begins, and how strong the barrier does: a larger slack forgets
-/// more of `start`.
+/// Also `None` as soon as the optimum cannot exceed `hope`, a ln SIR. `slack` > 0 is the difference of the initial target below
+/// the SIR of `start`, and sets the initial barrier: a larger slack forgets more of `start`.
 pub(super) fn polish(
     scene: &Scene,
     start: &[Triple],
@@ -56,7 +54,7 @@ pub(super) fn polish(
     for _ in 0..STEPS {
         let is_central = at.error(scene, weight) < weight.max(LEAST_ERROR);
         if is_central {
-            // The optimum lies about the number of limits times the weight above the target.
+            // The optimum is about the number of constraints times the weight above the target.
             if at.target + 2.0 * count * weight < hope {
                 return None;
             }
@@ -69,21 +67,19 @@ pub(super) fn polish(
             if weight <= LAST_WEIGHT {
                 break;
             }
-            // Rounding hides what is left to gain at this weight.
+            // Rounding hides the remaining gain at this weight.
             weight = (0.1 * weight).max(LAST_WEIGHT);
         }
     }
     Some(at.places)
 }
 
-/// A change of places and target.
 struct Direction {
     steps: Vec<Triple>,
     raise: f64,
 }
 
 impl Direction {
-    /// The step of a relay and of the one before it.
     fn of(&self, relay: usize) -> (Triple, Triple) {
         let step = |i: usize| self.steps.get(i).copied();
         let before = relay.checked_sub(1).and_then(step);
@@ -92,7 +88,7 @@ impl Direction {
 }
 
 impl Iterate {
-    /// The largest violation of the optimality conditions at a barrier's weight.
+    /// Returns the largest violation of the optimality conditions at a barrier weight.
     fn error(&self, scene: &Scene, weight: f64) -> f64 {
         let mut slopes = vec![Triple::default(); self.places.len()];
         let (mut target, mut worst) = (1.0, 0.0_f64);
@@ -109,9 +105,9 @@ impl Iterate {
         slopes.fold(worst.max(target.abs()), f64::max)
     }
 
-    /// One damped Newton step; `false` when nothing is gained by it.
+    /// Takes one damped Newton step; returns false if it gains nothing.
     ///
-    /// It follows an arc: the limits bend, and a straight step along a narrow valley would soon run into its wall.
+    /// The step is an arc, because the constraints are curved and a straight step along a narrow valley would soon hit its wall.
     fn step(&mut self, scene: &Scene, weight: f64) -> bool {
         let Some((damping, line)) = self.direction(scene, weight) else {
             return false;
@@ -155,7 +151,6 @@ impl Iterate {
         false
     }
 
-    /// The change of every limit along a direction, to first order.
     fn changes(&self, along: &Direction) -> Vec<f64> {
         self.limits
             .iter()
@@ -166,7 +161,6 @@ impl Iterate {
             .collect()
     }
 
-    /// What the second order adds to that.
     fn bends(&self, along: &Direction) -> Vec<f64> {
         self.limits
             .iter()
@@ -177,13 +171,13 @@ impl Iterate {
             .collect()
     }
 
-    /// The target plus the barrier: what a step must raise.
+    /// Returns the merit function: target plus barrier.
     fn merit(&self, weight: f64) -> f64 {
         let barrier: f64 = self.limits.iter().map(|limit| limit.value.ln()).sum();
         self.target + weight * barrier
     }
 
-    /// The Newton direction, and the damping that it needed.
+    /// Returns the Newton direction and its damping.
     fn direction(&self, scene: &Scene, weight: f64) -> Option<(f64, Direction)> {
         let dampings = std::iter::once(0.0).chain((0..30).map(|i| 1e-6 * 8_f64.powi(i)));
         dampings
@@ -191,7 +185,7 @@ impl Iterate {
             .find_map(|(damping, found)| Some((damping, found?)))
     }
 
-    /// The Newton direction with `damping` on the diagonal, and with limits that lie higher by `bends`.
+    /// Returns the Newton direction with `damping` on the diagonal, and with constraints raised by `bends`.
     fn damped_direction(
         &self,
         scene: &Scene,
@@ -239,7 +233,7 @@ impl Iterate {
         Some(Direction { steps, raise })
     }
 
-    /// The multipliers after a step: Newton's, kept > 0 and near `weight` / value.
+    /// Returns the multipliers after a Newton step, kept > 0 and near `weight` / value.
     fn next_duals(&self, changes: &[f64], limits: &[Limit], weight: f64) -> Vec<f64> {
         let old = self.limits.iter().zip(&self.duals).zip(changes);
         let steps: Vec<f64> = old

@@ -1,9 +1,9 @@
-//! Where a polynomial is not above zero, by the roots of its derivatives: between two of them it only rises or only falls.
+//! Sign intervals of a polynomial, by the roots of its derivatives, between which it is monotone.
 
-/// Halvings that bring an f64 to its own step.
+/// Bisection steps to the resolution of f64.
 const HALVINGS: usize = 80;
 
-/// The intervals of [`low`, `high`] in which the polynomial with these coefficients, constant first, is <= 0.
+/// Returns the intervals of [`low`, `high`] where the polynomial (coefficients from the constant up) is <= 0.
 pub(super) fn not_positive(coefficients: &[f64], low: f64, high: f64) -> Vec<(f64, f64)> {
     if !(low <= high) {
         return Vec::new();
@@ -24,7 +24,7 @@ pub(super) fn not_positive(coefficients: &[f64], low: f64, high: f64) -> Vec<(f6
     found
 }
 
-/// Its roots in (`low`, `high`) at which it changes its sign, rising.
+/// Returns the roots in (`low`, `high`) where the sign changes, rising.
 fn roots(coefficients: &[f64], low: f64, high: f64) -> Vec<f64> {
     let Some((_, rest)) = coefficients.split_first() else {
         return Vec::new();

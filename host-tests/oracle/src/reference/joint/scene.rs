@@ -4,10 +4,10 @@ use super::super::link::Link;
 use super::corridor::{Corridor, Hold};
 use super::space::{Across, Triple};
 
-/// A side of a room that is narrower than this has no width, in units of D.
+/// Width below which a room's side counts as a point, in units of D.
 const NO_WIDTH: f64 = 1e-9;
 
-/// The cross-section that one relay may be in.
+/// Cross-section open to one relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Room {
     pub(super) low: Across,
@@ -27,7 +27,7 @@ impl Room {
         is_room.then_some(Self { low, high })
     }
 
-    /// 1 for each coordinate that a relay may choose, 0 for the others.
+    /// Returns 1 for each coordinate that a relay may choose, 0 for the others.
     pub(super) fn free(&self) -> Triple {
         let wide = |low: f64, high: f64| f64::from(u8::from(high - low > NO_WIDTH));
         Triple::new(
@@ -37,7 +37,6 @@ impl Room {
         )
     }
 
-    /// Whether there is nothing to choose.
     pub(super) fn is_point(&self) -> bool {
         self.free() == Triple::new(1.0, 0.0, 0.0)
     }
@@ -46,7 +45,7 @@ impl Room {
         Across::new(self.high.y - self.low.y, self.high.h - self.low.h)
     }
 
-    /// The nearest to `across` that is in the room, and `share` of its width off the walls.
+    /// Returns the nearest point to `across` inside the room, at least `share` of its width off the walls.
     pub(super) fn nearest(&self, across: Across, share: f64) -> Across {
         let clamp = |value: f64, low: f64, high: f64| {
             let room = share * (high - low);
@@ -58,7 +57,7 @@ impl Room {
         )
     }
 
-    /// The place at these shares of the width.
+    /// Returns the point at these shares of the width.
     pub(super) fn within(&self, y: f64, h: f64) -> Across {
         let width = self.width();
         self.nearest(
@@ -68,27 +67,24 @@ impl Room {
     }
 }
 
-/// A link and its corridor with all lengths in units of D.
+/// A link and its corridor, with all lengths in units of D.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
-    /// Where the interferer is, on the ground.
     pub(super) interferer: Triple,
-    /// The room of most relays.
+    /// Room of relays without a fixed position.
     pub(super) corridor: Room,
-    /// The room of each relay.
     pub(super) rooms: Vec<Room>,
-    /// Least separation of neighbouring relays.
     pub(super) apart: f64,
     /// ln of the constant of the hop that ends at each relay.
     pub(super) hops: Vec<f64>,
     /// ln of the constant of the hop to Rx.
     pub(super) last: f64,
-    /// The noise over what of the interferer arrives at a relay D from it.
+    /// Noise over the interference at a relay at distance D from the interferer.
     pub(super) noise: f64,
 }
 
 impl Scene {
-    /// `None` without relays, with an empty corridor, or where every chain has an SIR of zero.
+    /// Creates the scene; `None` without relays, with an empty corridor, or if every chain has an SIR of zero.
     pub(super) fn new(link: &Link, corridor: Corridor, held: &[Hold]) -> Option<Self> {
         let unit = link.distance_m.recip();
         let powers = || link.relays.iter().map(|relay| relay.power_w);
@@ -119,13 +115,13 @@ impl Scene {
         self.hops.len()
     }
 
-    /// No chain's ln SIR exceeds this: the best that the hop to Rx can do.
+    /// Returns an upper bound on any chain's ln SIR: the best possible for the hop to Rx.
     pub(super) fn ceiling(&self) -> f64 {
         let nearest = |room: &Room| Across::default().apart_2(room.nearest(Across::default(), 0.0));
         self.last - self.rooms.last().map_or(1.0, nearest).ln()
     }
 
-    /// ln SIR of a chain's worst hop; minus infinity for a chain of another length.
+    /// Returns the ln SIR of a chain's worst hop; minus infinity for a chain of another length.
     pub(super) fn worst(&self, places: &[Triple]) -> f64 {
         let Some(&tail) = places.last().filter(|_| places.len() == self.len()) else {
             return f64::NEG_INFINITY;

@@ -1,8 +1,8 @@
-//! Places in space and 3 x 3 matrices over (along, aside, up).
+//! Positions in space and 3 x 3 matrices over (along, sideways, up).
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// Where a relay is in the cross-section: to the side and up.
+/// Position in the cross-section: sideways and up.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Across {
     pub(super) y: f64,
@@ -14,13 +14,12 @@ impl Across {
         Self { y, h }
     }
 
-    /// Square of the distance to another.
     pub(super) fn apart_2(self, other: Self) -> f64 {
         (self.y - other.y).powi(2) + (self.h - other.h).powi(2)
     }
 }
 
-/// A place, a step or a slope: along Tx-Rx, to the side and up.
+/// A position, step or slope: along Tx-Rx, sideways and up.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Triple {
     pub(super) x: f64,
@@ -45,12 +44,10 @@ impl Triple {
         self.x * other.x + self.y * other.y + self.h * other.h
     }
 
-    /// Each coordinate times that of `other`.
     pub(super) fn times(self, other: Self) -> Self {
         Self::new(self.x * other.x, self.y * other.y, self.h * other.h)
     }
 
-    /// The largest coordinate in size.
     pub(super) fn size(self) -> f64 {
         self.x.abs().max(self.y.abs()).max(self.h.abs())
     }
@@ -84,7 +81,6 @@ impl Neg for Triple {
     }
 }
 
-/// A 3 x 3 matrix, by its rows.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Square {
     x: Triple,
@@ -101,12 +97,10 @@ impl Square {
         }
     }
 
-    /// `value` times the identity.
     pub(super) fn even(value: f64) -> Self {
         Self::diagonal(Triple::new(value, value, value))
     }
 
-    /// `row` times the transpose of `column`.
     pub(super) fn outer(row: Triple, column: Triple) -> Self {
         Self {
             x: column * row.x,
@@ -127,7 +121,6 @@ impl Square {
         Triple::new(self.x.dot(to), self.y.dot(to), self.h.dot(to))
     }
 
-    /// The matrix with its rows scaled by `rows` and its columns by `columns`.
     pub(super) fn scaled(self, rows: Triple, columns: Triple) -> Self {
         Self {
             x: self.x.times(columns) * rows.x,
@@ -136,7 +129,6 @@ impl Square {
         }
     }
 
-    /// Each row by a function of it.
     pub(super) fn by_rows(self, of: impl Fn(Triple) -> Triple) -> Self {
         Self {
             x: of(self.x),
@@ -145,7 +137,7 @@ impl Square {
         }
     }
 
-    /// The Cholesky factor of a symmetric matrix, if that is positive definite.
+    /// Returns the Cholesky factor of a symmetric matrix; `None` unless it is positive definite.
     pub(super) fn factor(self) -> Option<Factor> {
         let root = |pivot: f64, of: f64| (pivot > 1e-14 * of && pivot > 0.0).then(|| pivot.sqrt());
         let xx = root(self.x.x, self.x.x)?;
@@ -185,16 +177,14 @@ impl Mul<f64> for Square {
     }
 }
 
-/// A lower triangular matrix whose product with its transpose is a symmetric one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Factor {
     diagonal: Triple,
-    /// (y, x), (h, x) and (h, y).
     below: Triple,
 }
 
 impl Factor {
-    /// What the symmetric matrix takes to `to`.
+    /// Solves the symmetric system with right-hand side `to`.
     pub(super) fn solve(self, to: Triple) -> Triple {
         let (of, below) = (self.diagonal, self.below);
         let x = to.x / of.x;

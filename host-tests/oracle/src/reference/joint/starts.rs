@@ -1,4 +1,4 @@
-//! Where to look: chains to polish, from searches over levels, bows, and kicks of the best.
+//! Multi-start search: chains from searches over levels, bends and perturbations, each locally optimised.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,50 +11,48 @@ use super::scene::{Room, Scene};
 use super::space::{Across, Triple};
 use crate::random::log_uniform;
 
-/// How hard to search.
+/// Search effort.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Effort {
-    /// Seed of all that is drawn: the same seed gives the same optimum.
+    /// Seed of all random numbers: the same seed gives the same optimum.
     pub seed: u64,
-    /// Searches over levels drawn anew, >= 1; the time is about proportional.
+    /// Rounds over newly drawn levels, >= 1; the time is about proportional.
     pub rounds: u32,
 }
 
 impl Effort {
-    /// Two rounds: some milliseconds with few relays, about half a second with 50 (release build).
+    /// Returns two rounds: some milliseconds with few relays, about half a second with 50 (release build).
     pub fn usual(seed: u64) -> Self {
         Self { seed, rounds: 2 }
     }
 }
 
-/// ln SIR below which no chain is looked for.
+/// ln SIR below which no chain is searched.
 const LEAST: f64 = -200.0;
 
 /// Accuracy of a search over levels, in ln SIR: its chain is polished afterwards.
 const COARSE: f64 = 2e-3;
 
-/// Accuracy of a search that nothing follows.
+/// Accuracy of a search without later polishing.
 const FINE: f64 = 1e-12;
 
-/// By how much, in ln SIR, a chain must be better than the best to be worth the last digits.
+/// Least improvement on the best chain, in ln SIR, for which polishing continues.
 const WORTH: f64 = 1e-8;
 
-/// How far below its SIR the polishing of a chain begins, in ln SIR: much to slide far from it, little to stay near.
+/// Initial slack of polishing, in ln SIR: large to move far from the chain, small to stay near.
 const FAR: f64 = 1.0;
 const NEAR: f64 = 0.03;
 
-/// Every place along Tx-Rx.
 const ANYWHERE: (f64, f64) = (0.0, 1.0);
 
-/// Columns and rows of the levels of a round.
+/// Columns and rows of the levels by round.
 const GRIDS: [(u32, u32); 4] = [(5, 4), (4, 6), (7, 4), (6, 5)];
 
-/// Bowed chains, random chains and kicks of the best chain that are tried in each round.
+/// Bent chains, random chains and perturbations of the best chain per round.
 const BOWS: u32 = 8;
 const SCATTERED: u32 = 2;
 const KICKS: u32 = 10;
 
-/// The best chain of all starts.
 pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
     if scene.rooms.iter().all(Room::is_point) {
         let any = vec![Across::default(); scene.len()];
@@ -93,18 +91,15 @@ pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
     search.best.map(|(_, chain)| chain)
 }
 
-/// The starts of one scene and the best chain so far.
 struct Search<'a> {
     scene: &'a Scene,
-    /// The same with a somewhat larger least separation, so that what is found can be moved a little.
+    /// Scene with a slightly larger least separation, so that its chains can be moved a little.
     roomy: Scene,
-    /// ln SIR and chain.
     best: Option<(f64, Vec<Triple>)>,
 }
 
 impl Search<'_> {
-    /// Chains at one common place in the cross-section: for a few offsets to the side, all over and on either side of the
-    /// interferer, the best of a few altitudes is followed.
+    /// Tries chains at one common cross-section position: several lateral positions, each with the best of a few altitudes.
     fn one_level(&mut self) {
         for side in [Side::Any, Side::Left, Side::Right] {
             let Some(room) = side.part(self.scene) else {
@@ -120,7 +115,7 @@ impl Search<'_> {
         }
     }
 
-    /// The best chain at one offset to the side and one altitude of a room.
+    /// Returns the best chain at one lateral position over several altitudes of a room.
     fn best_altitude(&self, y: f64, room: &Room) -> Option<Vec<Triple>> {
         let mut best: Option<(f64, Vec<Triple>)> = None;
         for row in 0..8 {
@@ -135,8 +130,7 @@ impl Search<'_> {
         best.map(|(_, chain)| chain)
     }
 
-    /// The best chain on some levels, with the relays' windows split at the interferer: the first `count` relays before it,
-    /// or anywhere if `split` is `None`.
+    /// Tries the best chain on some levels; with `split`, the first `count` relays are before the interferer.
     fn on_levels(&mut self, levels: &[Across], split: Option<usize>, below: f64) {
         let x_i = self.scene.interferer.x;
         let window = |k: usize| match split {
@@ -157,7 +151,7 @@ impl Search<'_> {
         }
     }
 
-    /// Chains that pass the interferer a few relays earlier or later than the best one.
+    /// Tries chains that pass the interferer a few relays earlier or later than the best one.
     fn other_splits(&mut self, levels: &[Across]) {
         let x_i = self.scene.interferer.x;
         if !(0.0..=1.0).contains(&x_i) {
@@ -174,7 +168,7 @@ impl Search<'_> {
         }
     }
 
-    /// Chains near the best one, at some places around each relay's own.
+    /// Tries chains near the best one, on a grid around each relay's position.
     fn around(&mut self) {
         for share in [0.08, 0.02] {
             let Some((sir, chain)) = &self.best else {
@@ -202,7 +196,6 @@ impl Search<'_> {
         }
     }
 
-    /// Chains with a bend, at the best places along.
     fn bowed(&mut self, rng: &mut ChaCha8Rng) {
         for _ in 0..BOWS {
             let bow = bow(&self.scene.corridor, rng, self.scene.len());
@@ -213,7 +206,6 @@ impl Search<'_> {
         }
     }
 
-    /// A chain of places drawn at random, put in order.
     fn scattered(&mut self, rng: &mut ChaCha8Rng) {
         let mut along: Vec<f64> = (0..self.scene.len()).map(|_| rng.random()).collect();
         along.sort_unstable_by(f64::total_cmp);
@@ -224,7 +216,6 @@ impl Search<'_> {
         self.consider_apart(chain, FAR);
     }
 
-    /// The best chain, kicked.
     fn kicked(&mut self, rng: &mut ChaCha8Rng) {
         if let Some((_, chain)) = &self.best {
             let chain = kicked(self.scene, chain, rng);
@@ -232,7 +223,7 @@ impl Search<'_> {
         }
     }
 
-    /// Considers a chain after moving its relays into their rooms, and along until they are in order and apart.
+    /// Considers a chain after restoring rooms, order and separation.
     fn consider_apart(&mut self, mut chain: Vec<Triple>, slack: f64) {
         let mut before: Option<Triple> = None;
         for (place, room) in chain.iter_mut().zip(&self.scene.rooms) {
@@ -257,7 +248,7 @@ impl Search<'_> {
         }
     }
 
-    /// Keeps a chain, or the local optimum that is reached from it, if that is the best so far.
+    /// Keeps a chain, or the local optimum reached from it, if it is the best so far.
     fn consider(&mut self, chain: &[Triple], slack: f64) {
         let hope = self.sir() + WORTH;
         let polished = [1e-3, 1e-5, 1e-2]
@@ -273,7 +264,7 @@ impl Search<'_> {
         }
     }
 
-    /// The chain moved by `share` toward evenly spread places within the rooms, off every limit it touches.
+    /// Moves the chain by `share` toward evenly spread positions within the rooms, off every active constraint.
     fn inward(&self, chain: &[Triple], share: f64) -> Vec<Triple> {
         let gap = 1.0 / (self.scene.len() as f64 + 1.0);
         let mut even = 0.0;
@@ -285,7 +276,7 @@ impl Search<'_> {
         moved.collect()
     }
 
-    /// Whether neighbours are farther apart than they must be.
+    /// Returns true if neighbours are in order and more than the least separation apart.
     fn is_fair(&self, chain: &[Triple]) -> bool {
         let apart_2 = self.scene.apart * self.scene.apart;
         let neighbours = chain.iter().zip(chain.iter().skip(1));
@@ -293,7 +284,6 @@ impl Search<'_> {
         steps.all(|step| step.x > 0.0 && step.dot(step) > apart_2)
     }
 
-    /// ln SIR of the best chain so far.
     fn sir(&self) -> f64 {
         self.best.as_ref().map_or(LEAST, |(sir, _)| *sir)
     }

@@ -1,22 +1,19 @@
-//! The linear system of a chain: one 3 x 3 block per relay, coupled to its neighbours, and one more unknown coupled to all.
+//! Linear system of a chain: one 3 x 3 block per relay, coupled to its neighbours, and one more unknown coupled to all.
 
 use super::space::{Factor, Square, Triple};
 
-/// The rows of one relay in a symmetric system.
+/// Rows of one relay in a symmetric system.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Block {
-    /// Against the relay itself; symmetric.
+    /// Coefficients of the relay itself; symmetric.
     pub(super) own: Square,
-    /// Against the relay before.
     pub(super) before: Square,
-    /// Against the unknown that is common to all.
     pub(super) common: Triple,
-    /// Right-hand side.
     pub(super) right: Triple,
 }
 
 impl Block {
-    /// The rows with those coordinates held for which `free`, or that of the relay before, is 0 instead of 1.
+    /// Fixes the coordinates for which `free`, or `free_before` of the predecessor, is 0.
     pub(super) fn held(self, free: Triple, free_before: Triple) -> Self {
         let fixed = Triple::new(1.0, 1.0, 1.0) - free;
         Self {
@@ -28,20 +25,19 @@ impl Block {
     }
 }
 
-/// Solves the system, `corner` and `corner_right` being the row of the common unknown; `None` unless the matrix is positive
-/// definite. O(N).
+/// Solves the system in O(N), with `corner` on the common unknown's diagonal; `None` unless it is positive definite.
 pub(super) fn solve(
     blocks: &[Block],
     corner: f64,
     corner_right: f64,
 ) -> Option<(Vec<Triple>, f64)> {
-    // Per relay: the factor of its reduced block, and the reduced right-hand sides (of the system, of the common column).
+    // Per relay: factor of its reduced block, and reduced right-hand sides (of the system, of the common column).
     let mut reduced: Vec<(Factor, Triple, Triple)> = Vec::with_capacity(blocks.len());
     for block in blocks {
         let (mut own, mut right, mut common) = (block.own, block.right, block.common);
         if let Some(&(factor, last_right, last_common)) = reduced.last() {
             let carry = block.before.by_rows(|row| factor.solve(row));
-            // Rows of `before` times columns of the transpose of `carry`, which stays symmetric but for rounding.
+            // Rows of `before` times columns of the transpose of `carry`, symmetric except for rounding.
             own = own - carry.by_rows(|row| block.before.apply(row));
             right = right - carry.apply(last_right);
             common = common - carry.apply(last_common);

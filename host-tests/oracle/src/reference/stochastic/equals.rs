@@ -1,13 +1,13 @@
-//! The best chain of relays that are all alike.
+//! The best chain of identical relays.
 
 use super::link::StochasticLink;
 
 impl StochasticLink {
-    /// The best expected SIR of relays that are all alike where Upsilon is the same everywhere, from the equation that says
-    /// that all hops are equal and as long as the distance; about 2000 evaluations of it at most.
+    /// Returns the best expected SIR of identical relays with a constant Upsilon.
     ///
-    /// `None` without relays, or where relays or Upsilon differ. Never above the SIR of the weaker outer hop with the outer
-    /// relays straight above Tx and Rx.
+    /// Solves the equation that all hops are equal and span the distance; at most about 2000 evaluations. `None` without relays,
+    /// or if relays or Upsilon differ. Never above the SIR of the weaker outer hop with the outer relays straight above Tx and
+    /// Rx.
     pub fn iid_optimum(&self) -> Option<f64> {
         let (first, (_, u)) = (self.relays.first()?, *self.upsilon.first()?);
         let alike = self.relays.iter().all(|relay| relay == first)
@@ -42,8 +42,9 @@ impl StochasticLink {
         Some(low)
     }
 
-    /// SIR (linear) of the worst hop of the best chain of relays that are all as the first one, in any field, no least separation:
-    /// relays may stand back from where they could stand.
+    /// Returns the SIR (linear) of the worst hop of the best chain of relays like the first, in any field.
+    ///
+    /// Without a least separation; relays need not be as far out as they could be.
     pub fn best(&self) -> f64 {
         let Some(relay) = self.relays.first() else {
             return 0.0;
@@ -78,7 +79,7 @@ impl StochasticLink {
             for _ in 1..self.relays.len() {
                 low = least(low, &hop).max(0.0).min(low);
             }
-            // Convex where the first hop's square is above 0, which is where it counts.
+            // Convex where the first hop's square is above 0, which is the relevant part.
             let head = |x: f64| x * x + h2 - self.tx_w * self.upsilon_at(x) / (self.eta * target);
             least(low, &head) <= 0.0
         };

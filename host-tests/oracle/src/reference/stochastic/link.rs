@@ -5,22 +5,22 @@ use super::super::link::{Station, received_w};
 /// A chain of relays between Tx at (0, 0) and Rx at (D, 0) under interference with a known Upsilon(x).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StochasticLink {
-    /// Tx-Rx distance D, metres, > 0.
+    /// Tx-Rx distance D, m, > 0.
     pub distance_m: f64,
-    /// Transmit power of Tx, watts, > 0.
+    /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,
     /// Path-loss factor between two relays, 1/m^2, > 0.
     pub mu_los: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Places, metres, strictly rising, with Upsilon there, 1/W: straight lines between them, held beyond the ends.
+    /// Strictly rising positions, m, with Upsilon, 1/W: linear in between, constant beyond the ends.
     pub upsilon: Vec<(f64, f64)>,
-    /// The relays from Tx to Rx; their number is N.
+    /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Station>,
 }
 
 impl StochasticLink {
-    /// Upsilon at `x` metres, 1/W; NaN for an empty table.
+    /// Returns Upsilon at `x` metres, 1/W; NaN for an empty table.
     pub fn upsilon_at(&self, x: f64) -> f64 {
         let mut left: Option<(f64, f64)> = None;
         for &(at, value) in &self.upsilon {
@@ -35,8 +35,9 @@ impl StochasticLink {
         left.map_or(f64::NAN, |(_, value)| value)
     }
 
-    /// Expected SIR (linear) of the N+1 hops with relay k at `x[k-1]` metres; empty if the numbers of the two differ or
-    /// there is no relay. Infinite where two relays share one place.
+    /// Returns the expected SIR (linear) of the N+1 hops with relay k at `x[k-1]` metres.
+    ///
+    /// Empty without relays or if the lengths differ. Infinite if two relays share a position.
     pub fn hop_sirs(&self, x: &[f64]) -> Vec<f64> {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return Vec::new();
@@ -63,7 +64,7 @@ impl StochasticLink {
         sir
     }
 
-    /// Expected SIR (linear) of the chain: that of its worst hop; 0 where [`StochasticLink::hop_sirs`] is empty.
+    /// Returns the expected SIR (linear) of the worst hop; 0 if [`StochasticLink::hop_sirs`] is empty.
     pub fn chain_sir(&self, x: &[f64]) -> f64 {
         self.hop_sirs(x).into_iter().reduce(f64::min).unwrap_or(0.0)
     }

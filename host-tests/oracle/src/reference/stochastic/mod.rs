@@ -1,7 +1,7 @@
-//! An f64 judge of plans against interference that is known by its distribution alone.
+//! Reference f64 optimisers for interference known only by its distribution.
 //!
-//! Nothing of `uav-relay` is used. The expected SIR of a hop is its received signal power times Upsilon = E[1/I] where it
-//! ends; [`upsilon_by_mgf`] finds Upsilon for any distribution, and [`StochasticLink`] judges whole chains, by the paper's
+//! Independent of `uav-relay`. The expected SIR of a hop is its received signal power times Upsilon = E[1/I] at the receiver.
+//! [`upsilon_by_mgf`] computes Upsilon for any distribution, and [`StochasticLink`] evaluates whole chains, by the paper's
 //! fixed-step algorithms and by brute force.
 
 mod backward;

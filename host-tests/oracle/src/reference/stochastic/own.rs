@@ -2,10 +2,10 @@
 
 use super::link::StochasticLink;
 
-/// Stretches of the line, m, rising, apart.
+/// Disjoint intervals of the line, m, rising.
 type Stretches = Vec<(f64, f64)>;
 
-/// The least value of a convex function between `low` and `high`.
+/// Returns the least value of a convex function between `low` and `high`.
 fn least(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (mut a, mut b) = (low, high);
     for _ in 0..80 {
@@ -15,7 +15,6 @@ fn least(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     value(0.5 * (a + b)).min(value(low)).min(value(high))
 }
 
-/// The same stretches, joined where they touch.
 fn joined(mut all: Stretches) -> Stretches {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out = Stretches::new();
@@ -29,10 +28,10 @@ fn joined(mut all: Stretches) -> Stretches {
 }
 
 impl StochasticLink {
-    /// SIR (linear) of the worst hop of the best chain whose relays are at least `apart_m` from each other; 0 if there is none.
+    /// Returns the SIR (linear) of the worst hop of the best chain with relays at least `apart_m` apart; 0 if there is none.
     ///
-    /// Going back from Rx, the places from which a relay can be continued are stretches of the line: a receiver that moves along one
-    /// lets its sender stand in a stretch that moves with it. No place is left out, however far a relay has to stand back.
+    /// Going back from Rx, the feasible positions of each relay are intervals: as a receiver moves along an interval, so does the
+    /// interval of its sender. No position is left out, however far a relay has to stay behind its reach.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;
@@ -60,7 +59,7 @@ impl StochasticLink {
         low
     }
 
-    /// The parts of a stretch in which Upsilon is a straight line.
+    /// Splits an interval into parts with linear Upsilon.
     fn pieces(&self, (low, high): (f64, f64)) -> Stretches {
         let inside = self.upsilon.iter().map(|point| point.0);
         let inside = inside.filter(|x| *x > low && *x < high);
@@ -89,11 +88,11 @@ impl StochasticLink {
             let climb = (to.altitude_m - from.altitude_m).powi(2);
             let shortest = (apart_m.powi(2) - climb).max(0.0);
             let scale = from.power_w / (self.mu_los * target);
-            // What the square of a hop to y may be, along x.
+            // Upper bound on the squared hop to y, along x.
             let room = |y: f64| scale * self.upsilon_at(y) - climb;
             let mut senders = Stretches::new();
             for piece in places.iter().flat_map(|places| self.pieces(*places)) {
-                // Linear there: the part of it that leaves room for the shortest hop.
+                // Linear there: the part that leaves room for the shortest hop.
                 let (mut a, mut b) = piece;
                 let (at_a, at_b) = (room(a) - shortest, room(b) - shortest);
                 if at_a < 0.0 && at_b < 0.0 {

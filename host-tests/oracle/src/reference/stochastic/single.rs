@@ -1,37 +1,37 @@
-//! One relay: the paper's Algorithm 3, as printed and as it should be, and its optimum by brute force.
+//! One relay: the paper's Algorithm 3, as printed and corrected, and its optimum by brute force.
 
 use super::link::StochasticLink;
 
-/// Where one relay ends up.
+/// Result of Algorithm 3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Single {
-    /// Its place, metres.
+    /// Position of the relay, m.
     pub x_m: f64,
-    /// The lesser of the target and the first hop's expected SIR there, linear.
+    /// The lesser of the target and the first hop's expected SIR, linear.
     pub sir: f64,
-    /// Targets tried.
+    /// Number of targets tried.
     pub iterations: usize,
 }
 
 impl StochasticLink {
-    /// Algorithm 3 as printed: it stops at the first target that the first hop meets, else takes the best seen.
+    /// Runs Algorithm 3 as printed: stops at the first target that the first hop meets, else returns the best seen.
     ///
     /// The second hop's targets fall from its largest value in steps of `step`; `None` unless there is exactly one relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
-    /// Algorithm 3 put right: it goes on while a lower target could still be better than the best seen.
+    /// Runs the corrected Algorithm 3: continues while a lower target could still be better than the best seen.
     ///
-    /// Between the two steps around the optimum this prefers the place where the first hop is the weaker one, so for a
-    /// constant Upsilon its place may be one step off the printed one's, with an SIR at least as high.
+    /// Of the two steps around the optimum this prefers the one where the first hop is weaker, so for a constant Upsilon its
+    /// position may be one step off the printed one's, with an SIR at least as high.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
         })
     }
 
-    /// Lowers the target until `end`, given the place at hand, the best one and the target, names where to stay.
+    /// Lowers the target until `end` returns a result, given the current position, the best one and the target.
     fn descend(
         &self,
         step: f64,
@@ -65,8 +65,9 @@ impl StochasticLink {
         best.map(|best| Single { iterations, ..best })
     }
 
-    /// The best expected SIR of one relay over all places, by a grid of `points` per piece of the table of Upsilon,
-    /// refined four times around the best place; `None` unless there is exactly one relay.
+    /// Returns the best position and expected SIR of one relay by brute force; `None` unless there is exactly one relay.
+    ///
+    /// A grid of `points` per piece of the table of Upsilon, refined four times around the best position.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
         let [_] = self.relays.as_slice() else {
             return None;

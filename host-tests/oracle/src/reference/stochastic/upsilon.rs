@@ -1,13 +1,13 @@
 //! Upsilon = E[1/I] of any distribution.
 
-/// Upsilon = E[1/I] in 1/W, as the integral of the moment-generating function `m` over the negative half line.
+/// Returns Upsilon = E[1/I] in 1/W, as the integral of the moment-generating function `m` over the negative half line.
 ///
-/// `m`(t) = E[exp(t I)] for t <= 0, I > 0 in W. With y = e^z the integrand is analytic and falls off exponentially on both
-/// sides, so the trapezoidal rule is good to about 1e-13. `None` where the integral has no end in f64: E[1/I] infinite, or
-/// nearly so (a Beta distribution with alpha below about 1.1). At most some 4000 evaluations of `m`.
+/// `m`(t) = E[exp(t I)] for t <= 0, I > 0 in W. With y = e^z the integrand is analytic and falls off exponentially on both sides,
+/// so the trapezoidal rule is accurate to about 1e-13. `None` if the integral diverges in f64: E[1/I] infinite, or nearly so (a
+/// Beta distribution with alpha below about 1.1). At most some 4000 evaluations of `m`.
 pub fn upsilon_by_mgf(m: impl Fn(f64) -> f64) -> Option<f64> {
     const STEP: f64 = 0.25;
-    // Somewhere about 1 / I: where the function has fallen to a half.
+    // Near 1 / I, where the function has fallen to a half.
     let centre = (-1000..=1000)
         .map(|k| f64::from(k) * 0.69)
         .find(|z| m(-z.exp()) < 0.5)?;
@@ -19,7 +19,7 @@ pub fn upsilon_by_mgf(m: impl Fn(f64) -> f64) -> Option<f64> {
         }
         let term = y * m(-y);
         sum += term;
-        // What is left, if the terms go on falling as from the last one to this.
+        // Remainder, if the terms continue to fall at the current ratio.
         let ratio = term / last;
         let left = if ratio < 1.0 {
             term * ratio / (1.0 - ratio)

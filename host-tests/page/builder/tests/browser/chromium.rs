@@ -9,7 +9,7 @@ use base64::Engine as _;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-/// How long a page may take, however slow the machine is.
+/// Time limit of a page, however slow the machine is.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 pub(crate) struct Browser {
@@ -18,12 +18,10 @@ pub(crate) struct Browser {
     session: String,
     number: u64,
     errors: Vec<String>,
-    /// Its profile, which goes with it.
     _folder: tempfile::TempDir,
 }
 
 impl Browser {
-    /// Opens `url` in a window of that size.
     pub(crate) fn start(url: &str, width: u32, height: u32) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut process = Command::new("chromium")
@@ -44,7 +42,7 @@ impl Browser {
                     .map(str::to_owned)
             })
             .expect("an address");
-        // Somebody has to read what it says.
+        // Keeps reading, because a full pipe would block the browser.
         std::thread::spawn(move || lines.for_each(drop));
         let host = address
             .strip_prefix("ws://")
@@ -81,7 +79,6 @@ impl Browser {
         browser
     }
 
-    /// Opens `url` in the same window.
     pub(crate) fn open(&mut self, url: &str) {
         self.call("Page.navigate", &json!({"url": url}));
     }
@@ -114,7 +111,6 @@ impl Browser {
         }
     }
 
-    /// What an expression of the page's script is.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters =
             json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
@@ -138,7 +134,6 @@ impl Browser {
         self.value(&format!("(() => {{ {script}; return 0; }})()"));
     }
 
-    /// Waits until that is so.
     pub(crate) fn until(&mut self, condition: &str) {
         let begun = Instant::now();
         while self.value(&format!("Boolean({condition})")) != true {
@@ -147,7 +142,7 @@ impl Browser {
         }
     }
 
-    /// A finger or a mouse goes down, over there in so many steps, and up.
+    /// Drags the mouse from one point to another in a number of steps.
     pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
         let mut mouse = |kind: &str, [x, y]: [f64; 2]| {
             let parameters = json!({
@@ -166,7 +161,7 @@ impl Browser {
         mouse("mouseReleased", to);
     }
 
-    /// The same with a finger.
+    /// Drags a finger from one point to another in a number of steps.
     pub(crate) fn finger(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
         let mut touch = |kind: &str, points: Value| {
             let parameters = json!({"type": kind, "touchPoints": points});
@@ -181,13 +176,12 @@ impl Browser {
         touch("touchEnd", json!([]));
     }
 
-    /// As who has chosen dark colours sees it.
     pub(crate) fn prefer_dark(&mut self) {
         let features = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
         self.call("Emulation.setEmulatedMedia", &features);
     }
 
-    /// What a screen reader is told of: every node.
+    /// Returns the accessibility tree: every node.
     pub(crate) fn accessible(&mut self) -> Vec<Value> {
         let tree = self.call("Accessibility.getFullAXTree", &json!({}));
         tree["nodes"].as_array().unwrap().clone()
@@ -200,7 +194,6 @@ impl Browser {
         }
     }
 
-    /// Types into the field that has the focus.
     pub(crate) fn types(&mut self, text: &str) {
         for letter in text.chars() {
             let parameters = json!({"text": letter.to_string()});
@@ -208,7 +201,7 @@ impl Browser {
         }
     }
 
-    /// What the page looks like, as PNG.
+    /// Returns the whole page as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let parameters = json!({"format": "png", "captureBeyondViewport": true});
         let picture = self.call("Page.captureScreenshot", &parameters);
@@ -216,16 +209,15 @@ impl Browser {
         base64::prelude::BASE64_STANDARD.decode(data).unwrap()
     }
 
-    /// What a user sees of the page without scrolling, as PNG.
+    /// Returns the visible part of the page as PNG.
     pub(crate) fn seen(&mut self) -> Vec<u8> {
         let picture = self.call("Page.captureScreenshot", &json!({"format": "png"}));
         let data = picture["data"].as_str().unwrap();
         base64::prelude::BASE64_STANDARD.decode(data).unwrap()
     }
 
-    /// Errors that the page has told its console.
     pub(crate) fn errors(&mut self) -> Vec<String> {
-        // What was said before is heard by then.
+        // Waits for a reply, after all earlier messages.
         self.value("0");
         self.errors.clone()
     }

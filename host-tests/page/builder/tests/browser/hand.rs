@@ -1,4 +1,4 @@
-//! Mouse, finger, keyboard.
+//! Mouse, finger and keyboard input.
 
 use crate::numbers::is_native;
 use crate::opened::{choose, middle, number, opened, said, settled, sir};
@@ -31,7 +31,7 @@ fn a_hand_and_the_keyboard_move_the_chain() {
     is_native(&mut browser, "by an arrow");
     assert_eq!(browser.text("document.activeElement.id"), "jammer");
 
-    // A relay is switched off by a press, and on again by the keyboard.
+    // A click switches a relay off, the keyboard switches it on again.
     let at = middle(&mut browser, "relay4");
     browser.drag(at, at, 0);
     browser.until("window.last.told.report.left === 7 && want.off.has(4)");
@@ -42,7 +42,7 @@ fn a_hand_and_the_keyboard_move_the_chain() {
     browser.until("window.last.told.report.relays.length === 8");
     settled(&mut browser);
     is_native(&mut browser, "and on again");
-    // Tab comes to one relay; arrows go from that to the next.
+    // Tab reaches one relay; arrow keys move from there to the next.
     let stops = "document.querySelectorAll('#above [role=switch][tabindex=\"0\"]').length";
     assert_eq!(browser.value(stops), 1);
     browser.key("ArrowRight", 39);
@@ -69,7 +69,7 @@ fn a_finger_drags_what_it_touches_and_else_scrolls_the_page() {
 
     let before = number(&mut browser, "window.scrollY");
     let [x, y] = middle(&mut browser, "jammer");
-    // Beside everything, on the picture.
+    // A point on the picture, away from everything on it.
     let from = [x - 150.0, y - 20.0];
     let below = browser.value(&format!(
         "document.elementFromPoint({}, {}).closest('svg').id",
@@ -81,7 +81,7 @@ fn a_finger_drags_what_it_touches_and_else_scrolls_the_page() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// A user types and looks at the picture, and has not left the field.
+/// The user types and looks at the picture without leaving the field.
 #[test]
 fn a_number_counts_as_soon_as_it_is_typed() {
     let mut browser = opened(1280, 900);

@@ -1,8 +1,8 @@
-//! Wide and narrow, light and dark, and for who cannot see it.
+//! Layout: wide and narrow, light and dark, and accessibility.
 
 use crate::opened::{opened, press, root, settled};
 
-/// Signs and numbers of the axes that lie on each other, or stick out of their picture.
+/// Script that lists overlapping or clipped signs and axis numbers.
 const CLASHES: &str = "(() => { const clashes = []; \
     for (const svg of document.querySelectorAll('svg')) { \
       const out = svg.getBoundingClientRect(); \
@@ -51,7 +51,6 @@ fn it_is_laid_out_for_wide_and_for_narrow_screens() {
     }
 }
 
-/// What a screen reader is told.
 #[test]
 fn all_of_it_can_be_heard() {
     let mut browser = opened(1280, 900);
@@ -93,7 +92,7 @@ fn all_of_it_can_be_heard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// The differences of a chain that has agreed are those of its tolerance, 1e-7.
+/// An agreed chain has differences up to its tolerance, 1e-7.
 #[test]
 fn no_hop_is_red_where_all_are_equal() {
     let mut browser = opened(1280, 900);
@@ -105,7 +104,7 @@ fn no_hop_is_red_where_all_are_equal() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// On the screens of small laptops and telephones, as the page is opened.
+/// Checks small laptop and telephone screens, as the page is opened.
 #[test]
 fn play_is_in_view() {
     for (width, height) in [

@@ -1,15 +1,15 @@
-//! The page in a headless Chromium, opened as a file: what a hand does moves the chain, and its numbers are those of `cargo chain --json`.
+//! The page in a headless Chromium, opened as a file: user input moves the chain, and its numbers equal `cargo chain --json`.
 //!
-//! | file | what it asks |
+//! | file | content |
 //! | --- | --- |
 //! | `chromium` | a browser, over its own protocol |
-//! | `opened` | the page in it, and what a user does there |
-//! | `numbers` | are its numbers those of the command? |
-//! | `hand` | mouse, finger, keyboard |
-//! | `wrong` | what is said where something is wrong |
-//! | `played` | a run from its beginning to its end |
-//! | `speed` | is it there at once, and does it follow? |
-//! | `layout` | wide and narrow, light and dark, and for who cannot see it |
+//! | `opened` | the page in it, and user actions |
+//! | `numbers` | comparison with the command |
+//! | `hand` | mouse, finger and keyboard input |
+//! | `wrong` | error messages |
+//! | `played` | playing a run |
+//! | `speed` | loading and response times |
+//! | `layout` | wide and narrow, light and dark, and accessibility |
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

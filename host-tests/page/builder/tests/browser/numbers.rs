@@ -1,11 +1,10 @@
-//! Its numbers are those of `cargo chain --json`, to the last digit.
+//! The page's numbers equal those of `cargo chain --json`, to the last digit.
 
 use std::process::Command;
 
 use crate::chromium::Browser;
 use crate::opened::{choose, opened, press, root, sir};
 
-/// What `cargo chain --json` prints for the last run of the page.
 fn native(browser: &mut Browser) -> String {
     let toml = browser.text("window.last.toml");
     let words = browser.text("window.last.words");
@@ -21,7 +20,7 @@ fn native(browser: &mut Browser) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// The report in what the code told the page, as it wrote it.
+/// Extracts the report, character by character, from the result for the page.
 pub(crate) fn report(told: &str) -> &str {
     let report = told.strip_prefix("{\"report\":").unwrap();
     let end = report.find(",\"film\":{\"stands\":").unwrap();

@@ -1,4 +1,4 @@
-//! The page, and what a user does there.
+//! The page, and user actions.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,7 +13,6 @@ pub(crate) fn root() -> &'static Path {
         .unwrap()
 }
 
-/// The page, built once.
 pub(crate) fn page() -> &'static PathBuf {
     static PAGE: OnceLock<PathBuf> = OnceLock::new();
     PAGE.get_or_init(|| {
@@ -23,7 +22,6 @@ pub(crate) fn page() -> &'static PathBuf {
     })
 }
 
-/// Where it is.
 pub(crate) fn address() -> String {
     format!("file://{}", page().display())
 }
@@ -35,11 +33,11 @@ pub(crate) fn opened(width: u32, height: u32) -> Browser {
     browser
 }
 
-/// Whether the last run is of what is wanted, with a film, and nothing moves any more.
+/// Condition: the last run matches the input, has a recording, and nothing is pending.
 const SETTLED: &str = "!engine.running && !engine.next && !hand.holds && window.last.toml === scenario() \
     && window.last.words === options() && window.last.runs > 1";
 
-/// Waits for it, and has the run that is played stand at its end.
+/// Waits until the page has settled, and moves playback to the end.
 pub(crate) fn settled(browser: &mut Browser) {
     browser.until(SETTLED);
     browser.run("player.stop(); player.seek(Math.max(0, player.ticks.length - 1))");
@@ -59,7 +57,7 @@ pub(crate) fn press(browser: &mut Browser, id: &str) {
     settled(browser);
 }
 
-/// What the page says in that element.
+/// Returns the text of that element.
 pub(crate) fn said(browser: &mut Browser, id: &str) -> String {
     browser.text(&format!("byId('{id}').textContent"))
 }
@@ -68,12 +66,11 @@ pub(crate) fn number(browser: &mut Browser, expression: &str) -> f64 {
     browser.value(expression).as_f64().unwrap()
 }
 
-/// SIR of the worst hop, as the page's report has it.
 pub(crate) fn sir(browser: &mut Browser) -> f64 {
     number(browser, "window.last.told.report.sir")
 }
 
-/// Where that sign is on the screen.
+/// Returns the screen position of that sign.
 pub(crate) fn middle(browser: &mut Browser, id: &str) -> [f64; 2] {
     let at = browser.value(&format!(
         "(() => {{ const box = document.querySelector('#{id} .halo').getBoundingClientRect(); \

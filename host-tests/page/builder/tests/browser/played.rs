@@ -1,11 +1,11 @@
-//! A run from its beginning to its end.
+//! Playing a run from start to end.
 
 use serde_json::Value;
 
 use crate::chromium::Browser;
 use crate::opened::{choose, middle, number, opened, press, said, settled};
 
-/// What the page shows at each tick: its time, who is on and told a place, the least SIR, and who speaks.
+/// Returns each tick: time, relays that are on and have a position, least SIR, and sender.
 fn ticks(browser: &mut Browser) -> Vec<Value> {
     let ticks = browser.value(
         "player.ticks.map((tick) => ({ at_s: tick.at_s, says: tick.says, worst: Math.min(...tick.sirs), hops: tick.sirs.length, \
@@ -21,7 +21,7 @@ fn an_agreement_goes_from_hop_to_hop() {
     let all = ticks(&mut browser);
     assert_eq!(all[0]["told"], 0, "nobody knows a place before");
     assert_eq!(all.last().unwrap()["told"], 8);
-    // Down the line, and back.
+    // Messages travel down the line and back.
     let says: Vec<(u64, i64)> = all
         .iter()
         .filter_map(|tick| tick["says"].as_array())
@@ -30,7 +30,7 @@ fn an_agreement_goes_from_hop_to_hop() {
     let there = (1..8).map(|relay| (relay, 1));
     let back = (2..=8).rev().map(|relay| (relay, -1));
     assert_eq!(says, there.chain(back).collect::<Vec<_>>());
-    // Each of them is counted when it is sent.
+    // Each message is counted when it is sent.
     let counted =
         browser.value("player.ticks.filter((tick) => tick.says).map((tick) => tick.messages)");
     let all_of_them: Vec<u64> = (1..=14).collect();
@@ -43,7 +43,7 @@ fn an_agreement_goes_from_hop_to_hop() {
     }
     let slider = browser.value("[byId('time').value, byId('time').max]");
     assert_eq!(slider[0], slider[1], "it stands at its end");
-    // What the pictures are drawn from at the end is the report.
+    // The final picture is that of the report.
     let off = number(
         &mut browser,
         "Math.max(...player.ticks.at(-1).sirs.map((sir, at) => Math.abs(sir / [...window.last.told.report.relays.map((it) => it.sir), \
@@ -73,7 +73,7 @@ fn a_chain_is_seen_to_lose_a_relay_and_to_close_up() {
     assert!(gap < after && after < before, "{gap} {after} {before}");
     assert_eq!(all.last().unwrap()["hops"], 8, "seven relays");
 
-    // By the slider, from before to after: what is said and drawn is of that time.
+    // Moving the slider shows text and picture of that time.
     browser.run("byId('time').value = 0; byId('time').dispatchEvent(new Event('input'))");
     let words = said(&mut browser, "summary");
     assert_eq!(words, "At 0.000 s: 0 of 8 relays have a place; 0 messages.");
@@ -115,7 +115,7 @@ fn relays_that_follow_with_one_switched_off_are_shown_where_they_are() {
         }
     }
     assert_eq!(last[1][1], false, "relay 2 is off");
-    // It is moving: at the end it is 3 m/s times the time from where it was.
+    // A moving interferer: its final position is 3 m/s times the time from its start.
     let jammer = middle(&mut browser, "jammer");
     browser.run("player.seek(0)");
     let began = middle(&mut browser, "jammer");

@@ -1,6 +1,6 @@
-//! Is it there at once, and does it follow?
+//! Loading and response times of the page.
 //!
-//! Times here are noisy: what is asserted is far above what is printed, but for ratios within one run.
+//! Times are noisy: the asserted limits are far above the printed values, except for ratios within one run.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ fn median(mut all: Vec<f64>) -> f64 {
     all[all.len() / 2]
 }
 
-/// How long the code of the page takes for a run without a film, as while something is dragged, ms.
+/// Returns the computing time of a run without recording, as during dragging, ms.
 fn took(browser: &mut Browser, times: u32) -> f64 {
     let all = (0..times).map(|_| {
         let runs = number(browser, "window.last.runs");
@@ -27,7 +27,7 @@ fn took(browser: &mut Browser, times: u32) -> f64 {
 fn it_is_there_at_once_and_follows_a_hand() {
     let first = "performance.getEntriesByName('first-contentful-paint')[0]";
     let paints = (0..5).map(|_| {
-        // A browser that was there before the page: what it does at its own start is not counted.
+        // The browser is already running: its own start is not counted.
         let mut browser = Browser::start("about:blank", 1280, 900);
         std::thread::sleep(Duration::from_secs(1));
         browser.open(&address());
@@ -62,7 +62,7 @@ fn it_is_there_at_once_and_follows_a_hand() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// However long a run takes, the page goes on to be drawn, and what is wanted next does not wait for it.
+/// During a long run the page is redrawn, and new input does not wait for its end.
 #[test]
 fn the_page_stays_awake_while_it_computes() {
     let mut browser = opened(1280, 900);
@@ -81,7 +81,7 @@ fn the_page_stays_awake_while_it_computes() {
     assert!(computed > 500.0, "there was something to wait for");
     assert!(longest < 0.5 * computed, "{longest} ms of {computed} ms");
 
-    // A run that takes long is given up for what is wanted after it.
+    // A long run is cancelled for newer input.
     browser.run("window.begun = performance.now(); run(); setTimeout(() => { byId('method').value = 'align'; typed(); }, GIVEN_UP + 100)");
     browser.until(
         "window.last.words === options() && window.last.words.includes('align') && !engine.running",

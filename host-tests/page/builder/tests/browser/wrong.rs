@@ -1,4 +1,4 @@
-//! What is said where something is wrong.
+//! Error messages of the page.
 
 use crate::chromium::Browser;
 use crate::opened::{choose, middle, opened, said, settled};

@@ -1,4 +1,4 @@
-//! `cargo figures`: every figure of the paper's evaluation, and this project's own, as SVG, CSV and a page.
+//! `cargo figures`: the figures of the paper's evaluation and further ones, as SVG, CSV and a page.
 
 mod options;
 
@@ -33,7 +33,6 @@ fn failure(trouble: &Trouble) -> Failure {
     }
 }
 
-/// Makes the figures that are asked for, and says where they are.
 fn run(options: &Options) -> Result<(), Trouble> {
     let started = Instant::now();
     let dir = &options.out;
@@ -66,7 +65,7 @@ fn run(options: &Options) -> Result<(), Trouble> {
     Ok(())
 }
 
-/// The progress of a run: a bar on a terminal, elsewhere a line on standard error for every figure.
+/// Progress of a run: a bar on a terminal, otherwise a line on standard error per figure.
 struct Progress {
     bar: ProgressBar,
     is_terminal: bool,
@@ -99,7 +98,6 @@ impl Progress {
         }
     }
 
-    /// Counts a finished figure.
     fn made(&self, name: &str) {
         let made = self.made.fetch_add(1, Ordering::Relaxed) + 1;
         self.bar.set_message(format!("(last: {name})"));

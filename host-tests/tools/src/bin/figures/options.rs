@@ -1,5 +1,3 @@
-//! The options of `cargo figures`.
-
 use std::path::PathBuf;
 
 use clap::Parser;
@@ -10,10 +8,10 @@ use uav_relay_tools::figures::ALL;
 #[derive(Parser, Debug)]
 #[command(name = "figures", bin_name = "cargo figures", disable_version_flag = true, after_help = figures())]
 pub(crate) struct Options {
-    /// Where to put them; made if it is not there
+    /// Output folder; created if necessary
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     pub(crate) out: PathBuf,
-    /// Only this figure; repeatable. index.html then shows only those asked for
+    /// Make only this figure; repeatable. index.html then shows only the requested ones
     #[arg(long, value_name = "NAME", value_parser = name)]
     pub(crate) only: Vec<String>,
 }

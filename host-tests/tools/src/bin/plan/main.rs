@@ -1,4 +1,4 @@
-//! `cargo plan`: how many relays, where, and what to expect of them, before anything flies.
+//! `cargo plan`: number, positions and expected SIRs of relays, before flight.
 
 mod map;
 mod options;
@@ -61,7 +61,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             map::write(options, &scenario, &plan)?;
             let next = out::write(options, &scenario, &plan, number)?;
             let asked = match options.target_rate() {
-                // The SIR of a rate is not what was asked for.
+                // The SIR that a rate needs was not itself requested.
                 Some(_) => Number::Of(uavs),
                 None => number,
             };
@@ -104,15 +104,15 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// A plan, the number of relays or the SIR that it has to reach, and its data rates.
+/// Plan, requested number or SIR, and data rates.
 struct Planned {
-    /// Absent where no number of relays carries the target rate.
+    /// `None` if no number of relays carries the target rate.
     plan: Option<Plan>,
     number: Number,
     rates: Option<RateReport>,
 }
 
-/// Plans for a number of relays or an SIR; with data rates where a bandwidth is given.
+/// Plans for a number of relays or an SIR, with data rates if a bandwidth is given.
 fn plain(scenario: &Scenario, ask: &Ask, bandwidth_hz: Option<f64>) -> Result<Planned, NoPlan> {
     let plan = plan::plan(scenario, ask)?;
     let rates = match bandwidth_hz {
@@ -129,7 +129,6 @@ fn plain(scenario: &Scenario, ask: &Ask, bandwidth_hz: Option<f64>) -> Result<Pl
     })
 }
 
-/// Plans the fewest relays that carry a data rate over a bandwidth.
 fn by_rate(
     scenario: &Scenario,
     ask: &Ask,
@@ -147,7 +146,6 @@ fn by_rate(
     })
 }
 
-/// The line on a data rate that no number of relays carries.
 fn too_fast(rates: &RateReport) -> String {
     let target_bps = rates.target_rate_bps.unwrap_or_default();
     let tried = rates.best.tried_uavs;
@@ -183,7 +181,7 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
     }
 }
 
-/// Prints the report; what it says went wrong is the failure.
+/// Prints the report, and fails with its error message, if any.
 fn show(options: &Options, report: &PlanReport) -> Result<(), Failure> {
     command::print(&if options.json {
         command::json(report)?

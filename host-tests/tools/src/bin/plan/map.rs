@@ -1,4 +1,4 @@
-//! The plan on earth, as `--geojson` and `--kml` write it.
+//! Writes the files of `--geojson` and `--kml`.
 
 use uav_relay_scenario::Scenario;
 use uav_relay_sim::command::{self, Failure};
@@ -8,7 +8,6 @@ use uav_relay_tools::plan::map::{Map, geojson, kml};
 use crate::options::Options;
 use crate::out::save;
 
-/// Whether there is an earth to show it on.
 pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let option = match (&options.geojson, &options.kml) {
         (Some(_), _) => "--geojson",
@@ -24,7 +23,6 @@ pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failur
     )))
 }
 
-/// Writes what is asked for.
 pub(crate) fn write(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
     if options.geojson.is_none() && options.kml.is_none() {
         return Ok(());

@@ -1,12 +1,10 @@
-//! The options of `cargo plan`, and their ranges.
-
 use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
 use uav_relay_sim::command::{number, whole};
 use uav_relay_tools::plan::{Number, Unit};
 
-/// How many relays a target SIR needs, or the best places for a given number, worked out without any messages.
+/// Computes how many relays a target SIR needs, or the best places for a given number, without any messages.
 #[derive(Parser, Debug)]
 #[command(name = "plan", bin_name = "cargo plan", disable_version_flag = true)]
 pub(crate) struct Options {
@@ -15,41 +13,41 @@ pub(crate) struct Options {
     pub(crate) scenario: Option<PathBuf>,
     #[command(flatten)]
     wanted: Wanted,
-    /// Whether each relay stays above the line at the altitude the scenario gives it, or may choose an altitude in the scenario's
+    /// Altitudes: each relay stays above the line at its altitude of the scenario, or may choose an altitude in the scenario's
     /// band (geometry.altitude_min_m to altitude_max_m) and a place beside the line (geometry.lateral_min_m to lateral_max_m)
     #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
     pub(crate) altitude: Altitude,
-    /// Where the only relay has to stand, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
+    /// Required place of the only relay, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
     #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
     pub(crate) x_m: Option<f64>,
-    /// Bandwidth of the one frequency that all hops share, hertz, 1 to 1e12: the data rate is added, log2(1 + SIR) bit/s per hertz of the worst
-    /// hop, divided by the N + 1 time slots, and the number of relays that carries most
+    /// Bandwidth of the one frequency that all hops share, hertz, 1 to 1e12. Adds the data rate: log2(1 + SIR) bit/s per hertz of
+    /// the worst hop, divided by the N + 1 time slots; and the number of relays with the largest data rate
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
     pub(crate) bandwidth_hz: Option<f64>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
     #[arg(long, value_name = "T", default_value_t = 1e-4, value_parser = |text: &str| number(text, 1e-6, 0.1))]
     pub(crate) tolerance: f64,
-    /// One JSON object on standard output and nothing else there
+    /// Print one JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
     /// Draw the chain from the side, and from above where there is room or an interferer beside the line, with each hop's SIR
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write sites, relays, hops and interferers on earth, for a map (GeoJSON); needs a scenario with a site
+    /// Write sites, relays, hops and interferers with geographic coordinates for a map (GeoJSON); needs a scenario with a site
     #[arg(long, value_name = "FILE")]
     pub(crate) geojson: Option<PathBuf>,
-    /// The same for a globe (KML), with altitudes above the sea
+    /// Write the same for a globe (KML), with altitudes above the sea
     #[arg(long, value_name = "FILE")]
     pub(crate) kml: Option<PathBuf>,
     /// Write the scenario with its plan, for cargo provision --scenario FILE --all
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-    /// Write over the file of --out
+    /// Overwrite the file of --out
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
 }
 
-/// What is wanted: exactly one of these.
+/// Request: exactly one of these.
 #[derive(Args, Debug)]
 #[group(required = true, multiple = false)]
 struct Wanted {
@@ -59,7 +57,7 @@ struct Wanted {
     /// The fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-9, 1e9))]
     target_sir: Option<f64>,
-    /// The same in dB, -90 to 90
+    /// --target-sir in dB, -90 to 90
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, -90.0, 90.0))]
     target_sir_db: Option<f64>,
     /// The fewest relays that carry this data rate, bit/s, 1e-9 to 1e15, while all hops share one frequency; needs --bandwidth-hz
@@ -67,7 +65,7 @@ struct Wanted {
     target_rate_bps: Option<f64>,
 }
 
-/// A place along the line: how far it may be is the scenario's to say.
+/// Parses a position along the line; its range depends on the scenario.
 fn along(text: &str) -> Result<f64, String> {
     text.parse()
         .map_err(|_| "must be a number, metres from Tx".to_owned())
@@ -75,14 +73,13 @@ fn along(text: &str) -> Result<f64, String> {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub(crate) enum Altitude {
-    /// As the scenario gives it
+    /// Altitudes of the scenario
     Given,
-    /// Any in the scenario's band, and anywhere beside the line that it leaves room
+    /// Free within the scenario's band, and beside the line within its limits
     Free,
 }
 
 impl Options {
-    /// The scenario, as a message names it.
     pub(crate) fn file(&self) -> String {
         self.scenario.as_ref().map_or_else(
             || "default scenario".into(),
@@ -90,7 +87,6 @@ impl Options {
         )
     }
 
-    /// The unit that SIRs are asked for in.
     pub(crate) const fn unit(&self) -> Unit {
         match self.wanted.target_sir_db {
             Some(_) => Unit::Decibels,
@@ -98,12 +94,12 @@ impl Options {
         }
     }
 
-    /// The data rate that is asked for, bit/s, and the bandwidth, hertz.
+    /// Returns the requested data rate, bit/s, and the bandwidth, hertz.
     pub(crate) fn target_rate(&self) -> Option<(f64, f64)> {
         self.wanted.target_rate_bps.zip(self.bandwidth_hz)
     }
 
-    /// How many relays are asked for; a data rate is asked for by [`target_rate`](Self::target_rate).
+    /// Returns the requested number of relays; for a data rate see [`target_rate`](Self::target_rate).
     pub(crate) fn number(&self) -> Number {
         let wanted = &self.wanted;
         match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {

@@ -1,4 +1,4 @@
-//! The scenario with its plan, as `--out` writes it for `cargo provision`.
+//! Writes the file of `--out`: the scenario with its plan, for `cargo provision`.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use uav_relay_tools::provision::firmware::probe_after_ms;
 
 use crate::options::{Altitude, Options};
 
-/// Whether what is asked for can be flown at all, before it is planned.
+/// Checks, before planning, that relays can fly the request by themselves.
 pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let Some(file) = &options.out else {
         return Ok(());
@@ -44,7 +44,7 @@ pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failur
     Ok(())
 }
 
-/// Writes the scenario and what its relays will fly; says what is next.
+/// Writes the scenario with the plan that its relays will fly, and returns the next command.
 pub(crate) fn write(
     options: &Options,
     scenario: &Scenario,
@@ -96,7 +96,7 @@ pub(crate) fn write(
     ))
 }
 
-/// The sections of the scenario file, whose number of relays has to be that of the plan.
+/// Loads the other sections of the scenario file; its number of relays must be that of the plan.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());
@@ -111,7 +111,6 @@ fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     Ok(sections)
 }
 
-/// The next command: it takes the file as it was written.
 fn next(file: &str, sections: &Deployment) -> String {
     let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR\n");
     let companions = format!("  cargo companion --config {file} --index INDEX\n");
@@ -136,7 +135,6 @@ fn db(sir: f64) -> f64 {
     10.0 * sir.log10()
 }
 
-/// Writes `text` to `file`, which `option` names.
 pub(crate) fn save(file: &Path, option: &str, text: &str) -> Result<(), Failure> {
     std::fs::write(file, text)
         .map_err(|error| Failure::input(format!("{option} {}: {error}", file.display())))

@@ -1,4 +1,4 @@
-//! `cargo provision`: what is written into one drone before it flies, from a scenario.
+//! `cargo provision`: writes the configuration block of one drone, or of all, from a scenario.
 
 mod network;
 mod options;
@@ -22,18 +22,17 @@ use uav_relay_tools::provision::{firmware, folder};
 
 use options::{Method, Options};
 
-/// What is written, after what the scenario and its plan leave to say.
+/// Options, completed with values of the scenario and its plan.
 struct Asked<'a> {
     options: &'a Options,
     scenario: Scenario,
-    /// The scenario, as a message names it.
     name: String,
     network: u16,
     key_file: Option<PathBuf>,
     uavs: u16,
     method: Method,
     tolerance: f64,
-    /// 0 for the usual ones.
+    /// Silence before a neighbour is probed, ms; 0 for the default.
     probe_after_ms: u32,
 }
 
@@ -93,7 +92,6 @@ fn run(options: &Options) -> Result<String, String> {
 }
 
 impl<'a> Asked<'a> {
-    /// What the options and the scenario's plan say together.
     fn new(options: &'a Options) -> Result<Self, String> {
         let (
             scenario,
@@ -181,7 +179,6 @@ impl<'a> Asked<'a> {
         })
     }
 
-    /// What all drones have in common.
     fn flight(&self, secret: Option<Secret>) -> Result<Flight, String> {
         let options = self.options;
         let method = match self.method {
@@ -219,7 +216,7 @@ impl<'a> Asked<'a> {
             .asking_after(self.probe_after_ms))
     }
 
-    /// Where the relays settle by themselves, where that is known before and needed; refuses a stand-in that loses too much.
+    /// Returns the positions that the relays settle on, if needed; rejects a hypothetical interferer that loses too much.
     fn flown(&self) -> Result<Option<Flown>, String> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
@@ -233,10 +230,10 @@ impl<'a> Asked<'a> {
         }
         let method = match self.method {
             Method::Joint => PlannedMethod::Joint,
-            // What adjust begins with.
+            // `adjust` starts from these.
             Method::Align | Method::Adjust => PlannedMethod::Align,
         };
-        // Relays that settle on nothing say so by themselves.
+        // Relays report by themselves that they settle on nothing.
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
@@ -259,7 +256,6 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
-    /// What all frames are signed with.
     fn secret(&self) -> Result<Option<Secret>, String> {
         let Some(file) = &self.key_file else {
             return match self.options.epoch {
@@ -280,7 +276,6 @@ impl<'a> Asked<'a> {
         }))
     }
 
-    /// Writes the blocks of all relays, and the summary.
     fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
         let heading = Heading {
             scenario: self.name.clone(),
@@ -312,7 +307,7 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// Refuses a channel that cannot carry the relays where they ask a silent neighbour after `probe_after`.
+/// Rejects a channel too slow for the relays when a silent neighbour is probed after `probe_after`.
 fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
     if options.wires {
         return Ok(());

@@ -1,4 +1,4 @@
-//! What the section `[network]` of a file says, held against the options.
+//! Checks section `[network]` of a file against the options.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use uav_relay_sim::command;
 
 use super::options::{Method, Options};
 
-/// Says what options say otherwise than the section: nobody is to write blocks by a file that does not count unawares.
+/// Reports options that override the section, so that nobody relies on a value in the file that is not used.
 pub(super) fn overridden(
     options: &Options,
     section: &Network,
@@ -44,8 +44,9 @@ pub(super) fn overridden(
     }
 }
 
-/// The method: that of the command line or of a plan, else that of section `network`, else `align`. A plan that was made by another one than
-/// the section's is refused; what the command line says otherwise is said.
+/// Returns the method of the command line or plan, else of section `network`, else `align`.
+///
+/// Rejects a plan made with a method other than the section's; reports an option that overrides the section.
 pub(super) fn method(
     method: Option<Method>,
     of_file: Option<&str>,
@@ -55,7 +56,7 @@ pub(super) fn method(
     let Some(text) = of_file else {
         return Ok(method.unwrap_or(Method::Align));
     };
-    // The scenario has checked it.
+    // The scenario has already been checked.
     let own = Method::from_str(text, false).unwrap_or(Method::Align);
     match method {
         Some(method) if method != own => {

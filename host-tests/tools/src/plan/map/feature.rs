@@ -1,4 +1,4 @@
-//! What there is to show of a plan, and where on earth it is.
+//! Map features of a plan and their geographic coordinates.
 
 use std::fmt;
 
@@ -7,20 +7,20 @@ use uav_relay_scenario::{Line, Scenario};
 
 use crate::plan::found::Plan;
 
-/// One thing to show.
+/// A feature of the map.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Feature {
-    /// What a person calls it.
+    /// Label.
     pub name: String,
     /// `tx`, `rx`, `relay`, `interferer` or `hop`.
     pub kind: &'static str,
-    /// Where: one point, or the two ends of a hop.
+    /// Coordinates: one point, or the two ends of a hop.
     pub at: Vec<Geodetic>,
-    /// Its numbers, by names with their units.
+    /// Numbers of the feature, by names that end in the unit.
     pub numbers: Vec<(&'static str, Number)>,
 }
 
-/// A number as a map shows it.
+/// A number, rounded for display.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Number {
     /// A count.
@@ -32,14 +32,14 @@ pub enum Number {
 }
 
 impl Number {
-    /// The value after rounding, where it is no count.
+    /// Returns the rounded value; counts are exact.
     pub(super) fn rounded(self) -> f64 {
         let (value, decimals) = match self {
             Self::Whole(count) => return f64::from(count),
             Self::Rounded(value) => (value, 1e3),
             Self::Ratio(value) => (value, 1e6),
         };
-        // Adding 0 makes -0 a 0.
+        // Adding 0 turns -0 into 0.
         (value * decimals).round() / decimals + 0.0
     }
 }
@@ -53,22 +53,22 @@ impl fmt::Display for Number {
     }
 }
 
-/// What there is to show.
+/// A plan as map features.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
-    /// What of it has a place: the sites, the relays, the interferers, then the hops from Tx on.
+    /// Sites, relays, interferers, then the hops from Tx on.
     pub features: Vec<Feature>,
-    /// How high the mean sea level is above the ellipsoid, m, where the scenario says it.
+    /// Height of the mean sea level above the ellipsoid, m, if the scenario states it.
     pub geoid_m: Option<f64>,
-    /// Interferers that are too far from the line to say where on earth they are, from 1.
+    /// Numbers (from 1) of interferers too far from the line for geographic coordinates.
     pub left_out: Vec<usize>,
 }
 
 impl Map {
-    /// The map of `plan`.
+    /// Creates the map of `plan`.
     ///
     /// # Errors
-    /// In one line, what the scenario lacks.
+    /// A line that says what the scenario lacks.
     pub fn new(scenario: &Scenario, plan: &Plan) -> Result<Self, String> {
         let line = scenario.line.as_ref().ok_or(
             "site: is missing; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }, which say where on earth the line is",
@@ -152,7 +152,7 @@ fn dbm(power_w: f64) -> f64 {
     10.0 * power_w.log10() + 30.0
 }
 
-/// Longitude and latitude, degrees, and the height above the mean sea level, m.
+/// Returns longitude and latitude, degrees, and the height above mean sea level, m.
 pub(super) fn position(at: Geodetic) -> [f64; 3] {
     [
         f64::from(at.lon_e7) / 1e7,

@@ -1,13 +1,13 @@
-//! A plan as GeoJSON, RFC 7946.
+//! GeoJSON (RFC 7946) output of a plan.
 //!
-//! Positions are longitude, latitude and, where the scenario has `site.geoid_m`, the height above the ellipsoid, which is what the third number
-//! of a position is there; heights above the mean sea level are in the property `amsl_m`. What crosses the antimeridian is cut there.
+//! Positions are longitude and latitude, and with `site.geoid_m` the height above the ellipsoid, as the RFC defines the third
+//! number. Heights above mean sea level are in the property `amsl_m`. Hops across the antimeridian are split there.
 
 use geojson::{FeatureCollection, Geometry, GeometryValue, JsonObject};
 
 use super::feature::{Feature, Map, Number, position};
 
-/// The text of a GeoJSON file.
+/// Returns the text of the GeoJSON file.
 pub fn text(map: &Map) -> String {
     let features = map.features.iter().map(|one| feature(one, map.geoid_m));
     let mut text = FeatureCollection::new(features).to_string();
@@ -51,7 +51,7 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
     }
 }
 
-/// Where the short way between two points crosses the antimeridian, as the point on either side of it; `None` where it does not.
+/// Returns the points on either side of the antimeridian where the short way crosses it; `None` if it does not.
 fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let [lon, lat, high] = from;
     let [other_lon, other_lat, other_high] = to;
@@ -59,7 +59,7 @@ fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
         return None;
     }
     let edge = if lon > 0.0 { 180.0 } else { -180.0 };
-    // Both as they are on the side of the first.
+    // Both longitudes relative to the side of the first point.
     let share = (edge - lon) / (other_lon + 2.0 * edge - lon);
     let at = |from: f64, to: f64| from + share * (to - from);
     let (lat, high) = (at(lat, other_lat), at(high, other_high));

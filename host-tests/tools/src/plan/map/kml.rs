@@ -1,4 +1,4 @@
-//! A plan as KML 2.2: places with their altitudes above the mean sea level, and the hops between them.
+//! KML 2.2 output of a plan: positions with altitudes above mean sea level, and the hops between them.
 
 use std::io;
 
@@ -7,10 +7,9 @@ use quick_xml::events::{BytesDecl, BytesText, Event};
 
 use super::feature::{Feature, Map, position};
 
-/// The namespace of KML 2.2.
 const NAMESPACE: &str = "http://www.opengis.net/kml/2.2";
 
-/// Colours of what is shown, as alpha, blue, green and red.
+/// Colours by kind of feature, as alpha, blue, green and red.
 const STYLES: [(&str, &str); 5] = [
     ("tx", "ff00a000"),
     ("rx", "ffa06000"),
@@ -21,10 +20,10 @@ const STYLES: [(&str, &str); 5] = [
 
 type Xml = Writer<Vec<u8>>;
 
-/// The text of a KML file, called `title`.
+/// Returns the text of a KML file with the given title.
 ///
 /// # Errors
-/// Those of writing, which memory does not have.
+/// Those of the XML writer, which cannot fail in memory.
 pub fn text(map: &Map, title: &str) -> io::Result<String> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 1);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
@@ -48,7 +47,7 @@ pub fn text(map: &Map, title: &str) -> io::Result<String> {
     Ok(text)
 }
 
-/// An element with a text alone.
+/// Writes an element that contains only text.
 fn leaf(xml: &mut Xml, name: &str, text: &str) -> io::Result<()> {
     xml.create_element(name)
         .write_text_content(BytesText::new(text))?;
@@ -90,7 +89,7 @@ fn placemark(xml: &mut Xml, feature: &Feature) -> io::Result<()> {
         let shape = if at.len() > 1 { "LineString" } else { "Point" };
         xml.create_element(shape).write_inner_content(|xml| {
             if shape == "Point" {
-                // A line down to the ground.
+                // Draws a line down to the ground.
                 leaf(xml, "extrude", "1")?;
             }
             leaf(xml, "altitudeMode", "absolute")?;

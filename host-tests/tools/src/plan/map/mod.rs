@@ -1,10 +1,10 @@
-//! A plan on earth: sites, relays, hops and interferers, for a map or a globe.
+//! Geographic output of a plan: sites, relays, hops and interferers for a map or globe.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `feature` | what there is to show, and where |
-//! | [`geojson`] | as GeoJSON (RFC 7946) |
-//! | [`kml`] | as KML 2.2 |
+//! | `feature` | features and their coordinates |
+//! | [`geojson`] | GeoJSON (RFC 7946) |
+//! | [`kml`] | KML 2.2 |
 
 mod feature;
 pub mod geojson;

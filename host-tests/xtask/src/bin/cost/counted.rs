@@ -1,4 +1,4 @@
-//! What the counting image reports, and which rows of the table that makes.
+//! Figures that the counting image reports, and their table rows.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -47,7 +47,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     ));
     rows.extend(table(&counted, SIGNED)?);
     rows.extend(table(&counted, UPLOADED)?);
-    // An image of its own: with more in it the compiler makes other choices in all of it.
+    // A separate image: more code would change the compiler's choices everywhere.
     let runners = count(&build("cost", &["--features", "async,internals"])?)?;
     rows.extend(table(&runners, RUNNERS)?);
     rows.extend(table(&runners, FLOWN)?);
@@ -73,7 +73,6 @@ fn table(counted: &BTreeMap<String, u64>, of: &[Counted]) -> Result<Vec<Row>, St
     Ok(rows)
 }
 
-/// Of frames with a tag.
 const SIGNED: &[Counted] = &[
     (
         "the tag of a body of 32 bytes, made or checked",
@@ -103,7 +102,7 @@ const SIGNED: &[Counted] = &[
     ),
 ];
 
-/// Of what moves bytes between ports and a relay.
+/// Figures of the runners, which move bytes between ports and a relay.
 const RUNNERS: &[Counted] = &[
     (
         "a full sweep on polled ports, bytes in to bytes out",
@@ -138,7 +137,7 @@ const RUNNERS: &[Counted] = &[
     ),
 ];
 
-/// Of missions in flight.
+/// Figures of mission uploads.
 const UPLOADED: &[Counted] = &[
     (
         "an offer of a new mission, taken",
@@ -149,7 +148,7 @@ const UPLOADED: &[Counted] = &[
     ("its frame", "bytes", &["offer_bytes"], Some(140)),
 ];
 
-/// A row of what the counting image reports: the largest of the figures with these names.
+/// A row of the table: description, unit, names of figures (the largest counts), and budget.
 pub(crate) type Counted = (
     &'static str,
     &'static str,
@@ -313,7 +312,7 @@ const COUNTED: &[Counted] = &[
     ),
 ];
 
-/// The line on earth, in the image of the runners.
+/// Figures of the geographic line, in the image of the runners.
 const FLOWN: &[Counted] = &[
     (
         "the line between two sites",
@@ -335,7 +334,7 @@ const FLOWN: &[Counted] = &[
     ),
 ];
 
-/// The figures that are calls of a relay.
+/// Figures that are calls of a relay.
 const CALLS: &[&str] = &[
     "begin_sweep",
     "sweep",
@@ -354,7 +353,7 @@ const CALLS: &[&str] = &[
     "estimate",
 ];
 
-/// Runs the counting image in QEMU; the figures it reports by name.
+/// Runs the counting image in QEMU and returns its figures by name.
 pub(crate) fn count(elf: &Path) -> Result<BTreeMap<String, u64>, String> {
     let arguments = [
         "300",

@@ -1,4 +1,4 @@
-//! What the documents say of costs: the table of `host-tests/RESULTS.md`, and three rows of `README.md`.
+//! Costs in the documents: the table of `host-tests/RESULTS.md`, and three rows of `README.md`.
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,11 @@ use crate::row::Row;
 const HEAD: &str =
     "| | measured | at 168 MHz, an instruction a cycle | budget |\n| --- | --- | --- | --- |\n";
 
-/// Instructions in a microsecond at the clock of the STM32F405, were each one cycle.
+/// Clock of the STM32F405, in instructions per microsecond at one per cycle.
 const CLOCK_MHZ: u64 = 168;
 
-/// A document as it stands, and as it should be.
+/// A document with its current and its expected text.
 pub(crate) struct Document {
-    /// Where it is in the checkout.
     name: &'static str,
     path: PathBuf,
     kept: String,
@@ -22,7 +21,7 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Whether it says what was measured.
+    /// Returns true if the document has the measured costs.
     pub(crate) fn is_right(&self) -> bool {
         self.kept == self.measured
     }
@@ -31,17 +30,12 @@ impl Document {
         self.name
     }
 
-    /// Has it say what was measured.
-    ///
-    /// # Errors
-    /// When it cannot be written.
     pub(crate) fn write(&self) -> Result<(), String> {
         let written = std::fs::write(&self.path, &self.measured);
         written.map_err(|error| format!("{}: {error}", self.name))
     }
 }
 
-/// The table of all rows.
 pub(crate) fn table(rows: &[Row]) -> String {
     let lines = rows.iter().map(|row| {
         let (what, unit, value) = (row.what, row.unit, row.value);
@@ -58,16 +52,12 @@ pub(crate) fn table(rows: &[Row]) -> String {
     std::iter::once(HEAD.to_owned()).chain(lines).collect()
 }
 
-/// The time of so many instructions, with three digits behind the point.
+/// Formats the time of a number of instructions, to the microsecond.
 fn milliseconds(instructions: u64) -> String {
     let micros = (instructions + CLOCK_MHZ / 2) / CLOCK_MHZ;
     format!("{}.{:03} ms", micros / 1_000, micros % 1_000)
 }
 
-/// Both documents of the checkout at `root`.
-///
-/// # Errors
-/// When one cannot be read, or has no place for what was measured.
 pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     let results = with(root, "host-tests/RESULTS.md", |text| {
         let begin = text.find(HEAD)?;
@@ -87,7 +77,7 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     Ok([results, readme])
 }
 
-/// Whether the documents are of this compiler and this emulator: others have other costs.
+/// Returns true if the documents are of this compiler and emulator, on which costs depend.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
     let results = std::fs::read_to_string(root.join("host-tests/RESULTS.md"));
     results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))
@@ -109,7 +99,7 @@ fn with(
     })
 }
 
-/// How rows of the README begin, and what they go on with.
+/// Returns the beginnings of the README's rows and their text.
 fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;

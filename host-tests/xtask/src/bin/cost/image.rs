@@ -1,4 +1,4 @@
-//! What is read from the relay image: its sizes, its deepest stack, and that no panic can be reached in it.
+//! Figures of the relay image: sizes, largest stack, and the proof that no panic is reachable.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -11,13 +11,11 @@ use super::row::{Row, row};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The image a person flashes.
 const RELAY: &str = "stm32f405";
 
-/// The same on asynchronous ports, to be held against [`RELAY`] with Algorithm 1 alone.
+/// Name of the image on asynchronous ports, compared with [`RELAY`] with Algorithm 1 alone.
 const ASYNC: &str = "stm32f405_async";
 
-/// Its features.
 const ASYNC_FEATURES: &[&str] = &["--no-default-features", "--features", "async"];
 
 pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
@@ -36,10 +34,10 @@ pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
     Ok(rows)
 }
 
-/// What an image is called, its features, and its budgets: flash, static RAM, stack.
+/// Description, features, and budgets of an image: flash, static RAM, stack.
 type Image = (&'static str, &'static [&'static str], [u64; 3]);
 
-/// From the smallest to the largest.
+/// Images from the smallest to the largest.
 const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
@@ -78,17 +76,19 @@ const IMAGES: &[Image] = &[
     (
         "flash of the relay image, everything",
         &[],
-        // Of these flash 26 KiB and RAM 2.3 KiB are the autopilot's: geodesy in f64 without a unit for it, MAVLink, a port, and the guard,
-        // which is on since the drone knows where it is, and 3 KiB that what is said there can be signed.
-        // Noise in every method takes 3 to 4 KiB of each image, and sensing, which solves in f64, 20 KiB of this one and the deepest stack. Of these
-        // 1.4 KiB are a firmware that listens: how, from its block, and what the radio hears, to the relay.
-        // That uploads may move the sites takes 3.5 KiB of it.
-        // That no failsafe is undone, no lag or late byte trusted and every reason to wait told takes 10 KiB, the halt of a chain out of order 2 KiB,
-        // the claims to a number that two drones use 1 to 2 KiB. The clock tree and the watchdog take 1 to 2 KiB of every image, and the cells of the
-        // best start 600 bytes of this one's RAM. That no part of a chain is stuck, no sensor wrong without being named and no clock that
-        // steps stops anything takes 3 KiB of each image and 7 KiB of this one. A memory of losses for each of four links a side, drones that are
-        // not flown as obstacles and copies of a relay with a key take 1 KiB of flash, 300 bytes of RAM and up to 900 bytes of stack
-        // of each image, in which a guard is built; the operator's command to clear a lost relay 1 KiB of those with an autopilot.
+        // Shares of this image, and of others where stated:
+        // - autopilot (f64 geodesy in software, MAVLink, a port, the guard): 26 KiB flash, 2.3 KiB RAM; signed MAVLink: 3 KiB
+        // - noise in every method: 3 to 4 KiB of each image
+        // - sensing, which solves in f64: 20 KiB and the largest stack; of these 1.4 KiB are settings and measurements
+        // - uploads that move the sites: 3.5 KiB
+        // - failsafes are never undone, lagging and late bytes distrusted, reasons to wait reported: 10 KiB
+        // - halt of a chain out of order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
+        // - clock tree and watchdog: 1 to 2 KiB of every image; cells of the best start: 600 bytes RAM
+        // - no stuck part of a chain, wrong sensors named, clock steps tolerated: 3 KiB of each image, 7 KiB of this one
+        // - losses of four links per side, unflown drones as obstacles, copies of a relay with a key: 1 KiB flash, 300 bytes RAM,
+        //   up to 900
+        //   bytes stack of each image with a guard; the operator's command to clear a lost relay: 1 KiB of those with an
+        //   autopilot
         [201 * 1024, 13_504, 7_232],
     ),
 ];
@@ -120,7 +120,6 @@ fn of(
     ])
 }
 
-/// Runs a command and gives its output if it succeeded.
 pub(crate) fn run(command: &mut Command) -> Result<Output, String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let output = command
@@ -136,7 +135,6 @@ pub(crate) fn run(command: &mut Command) -> Result<Output, String> {
     }
 }
 
-/// A command of cargo about one example with the firmware profile.
 fn cargo(command: &str, example: &str) -> Command {
     let mut cargo = Command::new("cargo");
     cargo
@@ -146,7 +144,7 @@ fn cargo(command: &str, example: &str) -> Command {
     cargo
 }
 
-/// Builds one example with the firmware profile; where its ELF is.
+/// Builds one example with the firmware profile and returns the path of its ELF.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
     run(cargo("build", example).args(more))?;
     Ok(PathBuf::from("target")
@@ -155,7 +153,6 @@ pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
         .join(example))
 }
 
-/// Bytes of flash and of static RAM that an image takes.
 pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
     let bytes = std::fs::read(elf).map_err(|error| format!("{}: {error}", elf.display()))?;
     let file = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
@@ -173,7 +170,7 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
     Ok((flash, ram))
 }
 
-/// The deepest stack of the thread, from the entry that `Reset` calls, and of an interrupt on top of it: its frame with the FPU's registers is 104 bytes.
+/// Returns the largest stack of the thread, from the entry that `Reset` calls, and of one interrupt with its FPU frame.
 pub(crate) fn deepest_stack(elf: &Path, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
@@ -204,7 +201,7 @@ pub(crate) fn deepest_stack(elf: &Path, flies: bool) -> Result<(u64, u64), Strin
     let (thread, path) = deepest("main")?;
     println!("deepest stack: {thread} bytes by {}", path.join(" > "));
     let mut handler = 0;
-    // Without the feature `flight` nobody serves the autopilot's port.
+    // Without the feature `flight` the autopilot's port is not used.
     let autopilot = flies.then_some("USART1");
     for name in ["USART2", "USART3", "SysTick"].into_iter().chain(autopilot) {
         handler = deepest(name)?.0.max(handler);
@@ -232,8 +229,10 @@ pub(crate) fn no_panic() -> Result<(), String> {
     }
 }
 
-/// On asynchronous ports that cannot be had: behind each `async fn` the compiler puts a panic for whoever polls it once more after it has
-/// completed, which an `await` never does. So that one may be called, and no other.
+/// Checks that the asynchronous image has no panics except those for polling a completed future.
+///
+/// The compiler adds such a panic to each `async fn`, so that image cannot be linked without a panic handler; an `await` never
+/// reaches it.
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";
     let image = build(ASYNC, ASYNC_FEATURES)?;
@@ -256,7 +255,7 @@ fn only_finished_futures_panic() -> Result<(), String> {
             finished += 1;
         }
     }
-    // Were there none, the search would have found nothing because it looks for the wrong thing.
+    // Finding none would mean that the search pattern is wrong.
     if finished == 0 {
         return Err("the asynchronous image has no panic at all: link it with the others".into());
     }

@@ -1,8 +1,8 @@
-//! `cargo cost`: what the firmware costs, held against its budgets and against what the documents say; and the proof that it cannot panic.
+//! `cargo cost`: costs of the firmware against its budgets and the documents, and the proof that it cannot panic.
 //!
-//! Builds the relay image and the counting image with the firmware profile, reads sizes and the deepest stack from the
-//! relay's ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked.
-//! `cargo cost --write` has the documents say what was measured.
+//! Builds the relay image and the counting image with the firmware profile, reads sizes and the largest stack from the relay's
+//! ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked.
+//! `cargo cost --write` writes the measured costs to the documents.
 
 mod counted;
 mod document;
@@ -76,7 +76,6 @@ fn report(rows: &[Row], write: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// The first two numbers of the version that `program` says.
 fn version(program: &str) -> Result<String, String> {
     let output = Command::new(program).arg("--version").output();
     let output = output.map_err(|error| format!("{program}: {error}"))?;

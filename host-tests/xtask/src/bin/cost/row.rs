@@ -1,6 +1,5 @@
-//! One row of the table of costs.
+//! A row of the table of costs.
 
-/// One row of the table.
 pub(crate) struct Row {
     pub(crate) what: &'static str,
     pub(crate) unit: &'static str,

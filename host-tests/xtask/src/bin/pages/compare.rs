@@ -1,9 +1,9 @@
-//! Compares what a page says that is printed with what is.
+//! Compares the output in a page with the actual output.
 
-/// Looks for every line of the page in the output, in that order; in a noisy block each number stands for any number.
+/// Checks that the page's lines occur in the output in order; in a noisy block each number matches any number.
 ///
 /// # Errors
-/// The first line that does not come, and the output's line that is most like it.
+/// The first missing line, and the most similar line of the output.
 pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), String> {
     let read = |line: &str| {
         if noisy {
@@ -30,7 +30,7 @@ pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), St
     Ok(())
 }
 
-/// Returns the line with each number in it as `#`, and each row of spaces as one.
+/// Replaces each number by `#`, and each run of spaces by one.
 fn unnumbered(line: &str) -> String {
     let (mut out, mut in_number) = (String::new(), false);
     for sign in line.trim_end().chars() {
@@ -47,7 +47,7 @@ fn unnumbered(line: &str) -> String {
     out
 }
 
-/// Returns how many words of one line are in the other.
+/// Returns the number of words of one line that are in the other.
 fn alike(one: &str, other: &str) -> usize {
     let words: Vec<&str> = other.split_whitespace().collect();
     let common = one.split_whitespace().filter(|word| words.contains(word));

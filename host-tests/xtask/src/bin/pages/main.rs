@@ -1,24 +1,24 @@
-//! Commands of the pages for users, typed: the blocks of commands are run in a folder that looks like a clean clone, and what a page
-//! says that they print is compared with what they print.
+//! Tests the commands in the user documentation: runs them in a folder like a clean clone and compares their output with the
+//! page.
 //!
-//! A page is read as a user reads it. A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are
-//! commands. A block `text` that follows it under the same heading is what it prints, and so are the other lines of a `console`.
+//! A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are commands. A
+//! following block `text` under the same heading is the expected output, and so are the other lines of a `console`.
 //!
-//! | word behind `sh`, `bash` or `console` | the block |
+//! | word after `sh`, `bash` or `console` | the block |
 //! | --- | --- |
 //! | none | is run |
 //! | `hardware` | needs a board, a drone, a radio or a simulator of one |
 //! | `root` | needs root |
-//! | `slow` | takes minutes, and is what another step of `cargo ci` does |
+//! | `slow` | takes minutes, and is run by another step of `cargo ci` |
 //! | `tested` | is run by a test of its own |
 //! | `window` | opens a window |
 //!
-//! A command has to succeed, unless its comment begins with `exit status N`: then it has to end with that one.
+//! A command must succeed, unless its comment begins with `exit status N`: then it must end with that status.
 //!
-//! Output is compared line by line: every line of the page has to come, in that order, with others between them. Spaces at the end do
-//! not count. A line `...` stands for any lines. In a block `text noisy` each number stands for any number.
+//! Output is compared line by line: every line of the page must occur, in order, with others in between. Trailing spaces are
+//! ignored. A line `...` matches any lines. In a block `text noisy` each number matches any number.
 //!
-//! The commands of `.cargo/config.toml` are the binaries that were built before, so no block waits for the compiler.
+//! The commands of `.cargo/config.toml` are binaries built beforehand, so no block waits for the compiler.
 
 mod compare;
 mod page;
@@ -32,7 +32,7 @@ use clap::Parser;
 
 use page::{Block, Kind};
 
-/// The pages, in the order in which a new user reads them.
+/// Pages in the order in which a new user reads them.
 const PAGES: [&str; 12] = [
     "README.md",
     "examples/LINUX.md",
@@ -48,7 +48,7 @@ const PAGES: [&str; 12] = [
     "src/docs/uploads.md",
 ];
 
-/// Runs the commands of the pages, and compares what they print with what the pages say.
+/// Runs the commands of the pages, and compares their output with the pages.
 #[derive(Parser)]
 #[command(name = "pages")]
 struct Options {
@@ -73,7 +73,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs every block that can be run; returns how many do not print what the page says.
+/// Runs every runnable block; returns the number of blocks with different output.
 fn walk(root: &Path, only: &str) -> Result<usize, String> {
     let shell = shell::Shell::build(root)?;
     let (mut faults, mut run, mut left_out) = (0, 0, 0);

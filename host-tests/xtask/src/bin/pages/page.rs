@@ -1,28 +1,27 @@
-//! The blocks of a page.
+//! Parses the code blocks of a page.
 
-/// Words that say why a block of commands is not run.
+/// Words that mark a block of commands as not run.
 const WHY_NOT: [&str; 5] = ["hardware", "root", "slow", "tested", "window"];
 
-/// What a block holds.
+/// Content of a block.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
-    /// Commands, and why they are not run.
+    /// Commands, and the word that marks them as not run.
     Commands(Option<String>),
-    /// What a command prints, or any other text.
+    /// Output of a command, or any other text.
     Text,
-    /// Another language.
     Other,
 }
 
-/// A block between two fences.
+/// A fenced block.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    /// Number of the line of its first fence.
+    /// Line number of its first fence.
     pub(crate) line: usize,
-    /// Number of the heading that it is under, from 1.
+    /// Number of its heading, from 1.
     heading: usize,
     pub(crate) kind: Kind,
-    /// True for lines that begin with `$ ` before what they print.
+    /// True for a `console`, where commands begin with `$ `.
     is_console: bool,
     /// True if numbers are not compared.
     pub(crate) noisy: bool,
@@ -30,7 +29,6 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Returns the commands, a script.
     pub(crate) fn commands(&self) -> String {
         let lines = self.lines.iter().map(String::as_str);
         let commands: Vec<&str> = if self.is_console {
@@ -46,7 +44,7 @@ impl Block {
         commands.join("\n")
     }
 
-    /// Returns what the page says that is printed.
+    /// Returns the expected output.
     pub(crate) fn printed(&self) -> Vec<&str> {
         let lines = self.lines.iter().map(String::as_str);
         match self.kind {
@@ -55,13 +53,13 @@ impl Block {
         }
     }
 
-    /// Returns true if this block is what `commands`, the one before it, print.
+    /// Returns true if this block is the output of `commands`, the previous block.
     pub(crate) fn prints(&self, commands: &Self) -> bool {
         self.kind == Kind::Text && self.heading == commands.heading
     }
 }
 
-/// Returns a command whose comment begins with the exit status that it ends with, and that status.
+/// Returns the command and its exit status, if its comment begins with one.
 fn status(line: &str) -> Option<(&str, u8)> {
     let (command, comment) = line.split_once(" # exit status ")?;
     let digits = comment.split(|sign: char| !sign.is_ascii_digit()).next()?;
@@ -71,7 +69,7 @@ fn status(line: &str) -> Option<(&str, u8)> {
 /// Returns the blocks of a page.
 ///
 /// # Errors
-/// The line of a fence that has a word that is not known, or no end.
+/// The line of a fence with an unknown word, or without an end.
 pub(crate) fn blocks(text: &str) -> Result<Vec<Block>, String> {
     let mut all: Vec<Block> = Vec::new();
     let (mut open, mut heading) = (None::<Block>, 0);

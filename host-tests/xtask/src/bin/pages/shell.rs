@@ -1,4 +1,4 @@
-//! A folder that looks like a clean clone, and a shell in it for which `cargo chain` and the like are binaries that are there.
+//! A folder like a clean clone, and a shell in it that maps `cargo chain` and other aliases to built binaries.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,13 +12,12 @@ const PACKAGES: [&str; 4] = [
     "uav-relay-linux",
 ];
 
-/// Time that a block may take, s.
+/// Time limit of a block, s.
 const LIMIT_S: u32 = 60;
 
-/// What is not in a clean clone.
 const NOT_CLONED: [&str; 2] = ["target", ".git"];
 
-/// A folder and what is defined before each block.
+/// Folder, and script that is run before each block.
 #[derive(Debug)]
 pub(crate) struct Shell {
     folder: PathBuf,
@@ -27,10 +26,6 @@ pub(crate) struct Shell {
 }
 
 impl Shell {
-    /// Builds the programs.
-    ///
-    /// # Errors
-    /// What does not work.
     pub(crate) fn build(root: &Path) -> Result<Self, String> {
         let failed = |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}");
         let mut build = Command::new("cargo");
@@ -59,13 +54,10 @@ impl Shell {
         })
     }
 
-    /// Makes the folder anew: a page is read in a clean clone.
-    ///
-    /// # Errors
-    /// What does not work.
+    /// Recreates the folder, so that each page starts in a clean clone.
     pub(crate) fn clean(&self) -> Result<(), String> {
         let failed = |error: std::io::Error| format!("{}: {error}", self.folder.display());
-        // Nothing may be there.
+        // The folder may not exist.
         let _ = std::fs::remove_dir_all(&self.folder);
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         for entry in std::fs::read_dir(&self.root).map_err(failed)?.flatten() {
@@ -78,10 +70,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Runs a script as a user types it, until its first command that fails; returns what it prints.
-    ///
-    /// # Errors
-    /// The status that it ends with, and its last lines.
+    /// Runs a script like a user, until its first command that fails; returns its output.
     pub(crate) fn run(&self, script: &str) -> Result<String, String> {
         let limit = format!("{LIMIT_S}");
         let script = format!("exec 2>&1\n{}\n{script}\n", self.before);
@@ -107,7 +96,7 @@ impl Shell {
     }
 }
 
-/// Returns a function `cargo` that runs the binaries in `bin` for the aliases of `config` whose programs are built.
+/// Returns a shell function `cargo` that runs the binaries in `bin` for those aliases of `config` that are built.
 fn functions(config: &str, bin: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {
@@ -118,7 +107,6 @@ fn functions(config: &str, bin: &Path) -> String {
         let program = words.by_ref().skip_while(|word| *word != "--bin").nth(1);
         let path = bin.join(program.unwrap_or_default());
         if path.is_file() {
-            // Writing to a string cannot fail.
             let _ = writeln!(cases, "{name}) shift; '{}' \"$@\";;", path.display());
         }
     }

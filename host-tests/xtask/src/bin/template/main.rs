@@ -1,4 +1,4 @@
-//! `cargo template`: writes a firmware of one main loop into an empty folder, from which it grows into that of a drone.
+//! `cargo template`: writes a minimal firmware with one main loop into an empty folder.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ fn write(name: &str, folder: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The folder is outside of this checkout, whose `.cargo/config.toml` would give the linker arguments that the template forgets.
+/// Writes, lints and builds a template outside this checkout, whose cargo settings would hide missing linker arguments.
 fn check(name: &str) -> Result<(), Box<dyn Error>> {
     let above = std::env::temp_dir().join(format!("uav-relay-template-{}", std::process::id()));
     let folder = above.join(name);
@@ -77,8 +77,9 @@ fn check(name: &str) -> Result<(), Box<dyn Error>> {
     is_placed(&std::fs::read(image)?).map_err(|why| format!("{name}: {why}").into())
 }
 
-/// Returns an error unless the vector table is at the start of the flash: without the linker script the link succeeds, and the image
-/// is empty.
+/// Returns an error unless the vector table is at the start of the flash.
+///
+/// Without the linker script the link succeeds, but the image is empty.
 fn is_placed(image: &[u8]) -> Result<(), String> {
     use object::{Object as _, ObjectSection as _};
     let file = object::File::parse(image).map_err(|error| error.to_string())?;
