@@ -21,7 +21,6 @@ use levels::Levels;
 
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
-use crate::relay::signed::{greeting, say};
 use crate::sensing::level::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -31,9 +30,10 @@ use crate::view::ViewId;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
-use crate::wire::frame::{self, FrameBuf, FrameError, Header};
+use crate::wire::endpoint::{Endpoint, Sent};
+use crate::wire::frame::FrameBuf;
 use crate::wire::message::{Hello, Message};
-use crate::wire::session::{Checked, Session};
+use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
 /// Silence of a relay after which another one with its number is believed.
@@ -81,7 +81,6 @@ const QUESTIONS: u8 = 3;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Ground {
-    network: u16,
     base: u16,
     end: Side,
     node: u16,
@@ -107,8 +106,7 @@ pub struct Ground {
     clock: MonotonicClock,
     levels: Levels,
     deframer: Deframer,
-    session: Session,
-    counter: u32,
+    endpoint: Endpoint,
     stats: Stats,
 }
 
@@ -121,14 +119,16 @@ impl Ground {
             Wiring::Pair => 1,
             Wiring::Shared => CANDIDATES,
         };
+        let node = match end {
+            Side::Upstream => 0,
+            Side::Downstream => all + 1,
+        };
+        let mut endpoint = Endpoint::new(network, node);
+        endpoint.sign(auth, 0, GONE_AFTER);
         Self {
-            network,
             base: digest(base),
             end,
-            node: match end {
-                Side::Upstream => 0,
-                Side::Downstream => all + 1,
-            },
+            node,
             within: reach.min(all),
             upload: None,
             progress: Progress::Idle,
@@ -144,8 +144,7 @@ impl Ground {
             clock: MonotonicClock::new(Instant::ZERO),
             levels: Levels::NONE,
             deframer: Deframer::new(),
-            session: Session::new(auth, 0, GONE_AFTER),
-            counter: 0,
+            endpoint,
             stats: Stats::default(),
         }
     }
@@ -207,7 +206,7 @@ impl Ground {
         }
         if self.levels.measured(power_w, self.within) {
             for distance in 1..=self.within {
-                self.session.greet(self.at(distance));
+                self.endpoint.greet(self.at(distance));
             }
         }
         true
@@ -228,7 +227,7 @@ impl Ground {
     }
 
     /// What it has counted of the frames that it sent and that came in, as a relay does. `mission` are relays that were loaded with another
-    /// one, `foreign` frames of another network, `overheard` those to another node, and `crc` all that are damaged.
+    /// one, `foreign` frames of another network, and `overheard` those to another node.
     pub const fn stats(&self) -> &Stats {
         &self.stats
     }
@@ -237,73 +236,54 @@ impl Ground {
     /// read what it is told. One that was switched on again, or has been greeted anew, has not until it answers. Work: four relays at most.
     pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.within).map(|distance| self.at(distance));
-        nodes.map(|node| (node, self.session.knows(node)))
+        nodes.map(|node| (node, self.endpoint.knows(node)))
     }
 
     /// Takes in bytes, however they are cut; at most one tag for each 19 of them.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            if let Some(Ok(plain)) = self.deframer.push(byte) {
-                let frame = match frame::open(plain) {
-                    Ok(frame) => frame,
-                    Err(FrameError::Version) => {
-                        bump(&mut self.stats.version);
-                        continue;
-                    }
-                    Err(_) => {
-                        bump(&mut self.stats.crc);
-                        continue;
-                    }
-                };
-                let Header {
-                    network,
-                    sender,
-                    destination,
-                    ..
-                } = frame.header;
-                if network != self.network {
-                    bump(&mut self.stats.foreign);
-                    continue;
-                }
-                if destination != self.node {
+            if let Some(decoded) = self.deframer.push(byte)
+                && let Some(frame) = self.endpoint.open(decoded, &mut self.stats)
+            {
+                let header = frame.header;
+                let distance = header.sender.abs_diff(self.node);
+                if header.destination != self.node {
                     bump(&mut self.stats.overheard);
-                    continue;
-                }
-                let distance = sender.abs_diff(self.node);
-                let near = (1..=self.within).contains(&distance);
-                if !near {
-                    bump(&mut self.stats.misaddressed);
-                    continue;
-                }
-                match self.session.check(self.clock.now(), sender, &frame) {
-                    Checked::Fresh { .. } => match Message::decode(frame.body) {
-                        Ok(Message::Hello(hello)) if hello.mission == self.base => {
-                            bump(&mut self.stats.received);
-                            self.answered(sender, distance, hello);
+                } else if (1..=self.within).contains(&distance) {
+                    let now = self.clock.now();
+                    match self.endpoint.check(now, &frame, &mut self.stats) {
+                        Some(Checked::Fresh { .. }) => {
+                            let message = Message::decode(frame.body);
+                            self.handle_message(header.sender, distance, message.ok());
                         }
-                        Ok(Message::Offer { upload, answer })
-                            if self.is_answer(&upload, answer) =>
-                        {
-                            bump(&mut self.stats.received);
-                            self.told(sender, upload);
-                        }
-                        Ok(Message::Hello(_)) => bump(&mut self.stats.mission),
-                        _ => bump(&mut self.stats.malformed),
-                    },
-                    Checked::Handshake { first } => {
-                        bump(&mut self.stats.handshakes);
-                        self.due |= first && (self.is_under_way() || self.is_asking());
-                        if first {
+                        Some(Checked::Handshake { first: true }) => {
+                            self.due |= self.is_under_way() || self.is_asking();
                             self.levels.owe(distance);
                         }
+                        _ => {}
                     }
-                    Checked::Unproven => bump(&mut self.stats.handshakes),
-                    Checked::Unsigned => bump(&mut self.stats.unsigned),
-                    Checked::Forged => bump(&mut self.stats.forged),
-                    Checked::Replayed | Checked::WentBack => bump(&mut self.stats.replayed),
+                } else {
+                    bump(&mut self.stats.misaddressed);
                 }
             }
         }
+    }
+
+    /// Handles a message of relay `sender`; `None` if it is malformed.
+    fn handle_message(&mut self, sender: u16, distance: u16, message: Option<Message>) {
+        let counter = match message {
+            Some(Message::Hello(hello)) if hello.mission == self.base => {
+                self.answered(sender, distance, hello);
+                &mut self.stats.received
+            }
+            Some(Message::Hello(_)) => &mut self.stats.mission,
+            Some(Message::Offer { upload, answer }) if self.is_answer(&upload, answer) => {
+                self.told(sender, upload);
+                &mut self.stats.received
+            }
+            _ => &mut self.stats.malformed,
+        };
+        bump(counter);
     }
 
     /// Returns true while a question waits for its answer.
@@ -427,7 +407,7 @@ impl Ground {
                 1
             };
             // It may have been switched on again, and know nothing of this node.
-            self.session.greet(self.to());
+            self.endpoint.greet(self.to());
         }
         self.due = true;
         self.again = Some(now + PATIENCE);
@@ -453,27 +433,19 @@ impl Ground {
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
     pub fn poll_transmit(&mut self, frame: &mut FrameBuf) -> Option<usize> {
-        if self.counter == u32::MAX {
+        if self.endpoint.is_exhausted() {
             return None;
         }
-        let mut header = Header {
-            network: self.network,
-            sender: self.node,
-            destination: 0,
-            counter: self.counter,
-        };
-        let len = self.next(&mut header, frame)?;
-        self.counter += 1;
-        bump(&mut self.stats.sent);
-        Some(len)
+        Some(self.next(frame)?.len)
     }
 
-    fn next(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
-        if let Some(len) = greeting(&mut self.session, header, frame) {
-            return Some(len);
+    fn next(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
+        let handshake = self.endpoint.transmit_handshake(frame, &mut self.stats);
+        if handshake.is_some() {
+            return handshake;
         }
         if !core::mem::take(&mut self.due) {
-            return self.next_level(header, frame);
+            return self.next_level(frame);
         }
         let to = self.to();
         let loaded = MissionId {
@@ -482,7 +454,7 @@ impl Ground {
         };
         let id = self.upload.map_or(loaded, |upload| upload.id());
         let older = self.holds.is_some_and(|holds| holds < id);
-        let answer = self.answer.filter(|_| older && self.session.knows(to));
+        let answer = self.answer.filter(|_| older && self.endpoint.knows(to));
         let message = if let (Some(upload), Some(answer)) = (self.upload, answer) {
             self.answer = None;
             Message::Offer { upload, answer }
@@ -506,18 +478,18 @@ impl Ground {
                 nonce: if asks { self.question } else { 0 },
             })
         };
-        say(&mut self.session, to, &message, header, frame)
+        self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
     /// Tells the next relay of the level; a handshake goes to one that could not read it.
-    fn next_level(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
+    fn next_level(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.levels.take(self.within)?;
         let message = Message::Level {
             mission: self.base,
             power_w,
         };
         let to = self.at(distance);
-        say(&mut self.session, to, &message, header, frame)
+        self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 }
 

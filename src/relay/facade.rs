@@ -1,23 +1,16 @@
 //! The relay: bytes and time in, frames and events out, and records of votes and uploads that a firmware keeps over a reboot.
 
-use super::incoming;
-use super::incoming::Addressed;
+use super::frames;
 use super::port::{Port, Transmit};
-#[cfg(feature = "auth")]
-use super::signed;
 use crate::event::Event;
 use crate::mission::Mission;
 use crate::node::Node;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
-use crate::side::Side;
-use crate::stats::bump;
 use crate::time::{Instant, MonotonicClock};
-use crate::wire::deframe::{DeframeError, Deframer};
-use crate::wire::frame;
-use crate::wire::frame::{FrameBuf, Header};
-#[cfg(feature = "auth")]
-use crate::wire::session::Session;
+use crate::wire::deframe::Deframer;
+use crate::wire::endpoint::Endpoint;
+use crate::wire::frame::FrameBuf;
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
@@ -71,14 +64,11 @@ use crate::wire::upload::{Upload, UploadError};
 #[derive(Clone, Debug)]
 pub struct Relay {
     pub(super) node: Node,
-    network: u16,
+    pub(super) endpoint: Endpoint,
     wiring: Wiring,
     /// Upstream or shared, and downstream.
     deframers: [Deframer; 2],
-    pub(super) counter: u32,
     pub(super) clock: MonotonicClock,
-    #[cfg(feature = "auth")]
-    session: Option<Session>,
 }
 
 impl Relay {
@@ -131,13 +121,10 @@ impl Relay {
     ) -> Self {
         Self {
             node: Node::new(mission, identity, settings, seed, now),
-            network: identity.network,
+            endpoint: Endpoint::new(identity.network, identity.index),
             wiring: settings.wiring,
             deframers: [Deframer::new(), Deframer::new()],
-            counter: 0,
             clock: MonotonicClock::new(now),
-            #[cfg(feature = "auth")]
-            session: None,
         }
     }
 
@@ -149,7 +136,9 @@ impl Relay {
             let Settings {
                 auth, dead_after, ..
             } = self.node.member().settings;
-            self.session = auth.map(|auth| Session::new(auth, number, dead_after));
+            if let Some(auth) = auth {
+                self.endpoint.sign(auth, number, dead_after);
+            }
         }
         self.node.begin(identity, seed, now);
     }
@@ -182,43 +171,10 @@ impl Relay {
             first
         };
         for &byte in bytes {
-            match deframer.push(byte) {
-                None => {}
-                Some(Err(error)) => {
-                    let stats = self.node.stats_mut();
-                    let counter = match error {
-                        DeframeError::Oversized => &mut stats.oversized,
-                        DeframeError::Truncated => &mut stats.truncated,
-                    };
-                    bump(counter);
-                }
-                Some(Ok(plain)) => {
-                    let addressed =
-                        incoming::addressed(&mut self.node, now, self.network, port, plain);
-                    let (side, frame) = match addressed {
-                        Some(Addressed::By(side, frame)) => (side, frame),
-                        Some(Addressed::ByDuplicate(frame)) => {
-                            #[cfg(feature = "auth")]
-                            let sender = match &self.session {
-                                Some(session) => Some(session.sender(&frame)),
-                                None => incoming::sender(&self.node, &frame),
-                            };
-                            #[cfg(not(feature = "auth"))]
-                            let sender = incoming::sender(&self.node, &frame);
-                            if let Some(sender) = sender {
-                                self.node.hear_duplicate(now, sender);
-                            }
-                            continue;
-                        }
-                        None => continue,
-                    };
-                    #[cfg(feature = "auth")]
-                    if let Some(session) = &mut self.session {
-                        signed::receive(&mut self.node, session, now, side, &frame);
-                        continue;
-                    }
-                    incoming::receive(&mut self.node, now, side, &frame);
-                }
+            if let Some(decoded) = deframer.push(byte)
+                && let Some(frame) = self.endpoint.open(decoded, self.node.stats_mut())
+            {
+                frames::receive(&mut self.node, &mut self.endpoint, now, port, &frame);
             }
         }
     }
@@ -282,41 +238,16 @@ impl Relay {
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
         let now = self.clock.advance(now);
-        let sender = self.node.member().node;
-        let mut header = Header {
-            network: self.network,
-            sender,
-            destination: 0,
-            counter: self.counter,
+        let sent = frames::poll_transmit(&mut self.node, &mut self.endpoint, now, frame)?;
+        let port = match self.wiring {
+            Wiring::Shared => Port::Shared,
+            Wiring::Pair if sent.to < self.node.member().node => Port::Upstream,
+            Wiring::Pair => Port::Downstream,
         };
-        #[cfg(feature = "auth")]
-        if let Some(session) = &mut self.session {
-            if self.node.is_passive() {
-                return None;
-            }
-            // A counter is never used twice: after four billion frames a new epoch is due.
-            if self.counter == u32::MAX {
-                return None;
-            }
-            let (side, len) = signed::next(&mut self.node, session, now, &mut header, frame)?;
-            return Some(self.sent(side, len));
-        }
-        let (side, to, message) = self.node.poll_message(now)?;
-        header.destination = to;
-        let len = frame::encode(header, &message, frame);
-        Some(self.sent(side, len))
-    }
-
-    /// One more frame has gone out.
-    fn sent(&mut self, side: Side, len: usize) -> Transmit {
-        self.counter = self.counter.wrapping_add(1);
-        bump(&mut self.node.stats_mut().sent);
-        let port = match (self.wiring, side) {
-            (Wiring::Shared, _) => Port::Shared,
-            (Wiring::Pair, Side::Upstream) => Port::Upstream,
-            (Wiring::Pair, Side::Downstream) => Port::Downstream,
-        };
-        Transmit { port, len }
+        Some(Transmit {
+            port,
+            len: sent.len,
+        })
     }
 
     /// The next thing the firmware should know of, if there is one. Call until there is none. Constant work.

@@ -5,14 +5,12 @@
 //! | `facade` | bytes and time into a relay, frames and events out of it; records and uploads over a reboot |
 //! | `readings` | what the firmware may read of it, and what it tells it of the world |
 //! | `port` | where frames come in and go out |
-//! | `incoming`, `signed` | a frame, without and with a tag, to the node and from it |
+//! | `frames` | frames to the node and from it |
 
 mod facade;
-mod incoming;
+mod frames;
 mod port;
 mod readings;
-#[cfg(feature = "auth")]
-pub(crate) mod signed;
 #[cfg(feature = "auth")]
 #[cfg(test)]
 mod tests;
