@@ -45,7 +45,7 @@ pub(crate) enum Deed {
     Off(usize),
     /// The relay is informed that the other drone with its number is gone.
     Clear(usize),
-    /// One more reason (`Mend`: one less) to lose all frames from `from` to `to`.
+    /// Cuts (`Mend`: mends) the link from `from` to `to`; overlapping cuts are counted.
     Cut {
         from: usize,
         to: usize,
@@ -136,8 +136,8 @@ pub(crate) struct Air {
     changed_us: u64,
     /// Frames sent, and events by relay and name.
     pub(crate) frames: u64,
-    /// Times of last reception between the relay and its copy, the start of their both having setpoints in spite of it, and its
-    /// longest span, µs.
+    /// Last reception between a relay and its copy, start of the time in which both have setpoints all the same, and its longest
+    /// span, µs.
     received_us: [Option<u64>; 2],
     both_us: Option<u64>,
     pub(crate) longest_both_us: u64,
