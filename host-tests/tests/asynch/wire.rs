@@ -44,7 +44,7 @@ pub(crate) struct Line {
     capacity: usize,
     talker: Option<usize>,
     frame: Vec<u8>,
-    /// All frames sent.
+    /// Frames sent by any end.
     pub(crate) heard: Vec<Heard>,
 }
 

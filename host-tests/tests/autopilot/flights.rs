@@ -34,7 +34,7 @@ enum Fault {
     Delay(u64),
 }
 
-/// One direction of a cable, which keeps the order of bytes.
+/// Direction of a cable, which keeps the order of bytes.
 struct Cable {
     /// Times of arrival and sending, and the bytes.
     waiting: VecDeque<(Instant, Instant, Vec<u8>)>,

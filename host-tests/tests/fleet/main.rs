@@ -1,13 +1,14 @@
-//! How many relays a target needs: against counts that know nothing of the crate's reaches and ranges.
+//! Number of relays for a target, compared with independent counts.
 //!
-//! `COUNT` and `SEED` in the environment take other scenarios.
+//! The environment variables `COUNT` and `SEED` select other scenarios.
 
 mod field;
 mod interferer;
 mod known;
 
-/// What rounding to f32 may take from a target, relative: half a step of x next to Rx is 6e-8 D, over the lowest altitude here,
-/// 0.002 D; and along hundreds of hops each place is rounded toward its sender.
+/// Relative loss of a target by f32 rounding.
+///
+/// Half a step of x next to Rx is 6e-8 D, over the lowest altitude of 0.002 D; each position is rounded toward its sender.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 pub(crate) fn count(default: usize) -> usize {
