@@ -19,7 +19,7 @@ const OTHER: [u8; 32] = [0xA5; 32];
 const UNIX_S: u64 = 1_795_348_800;
 const STAMP: u64 = (UNIX_S - 1_420_070_400) * 100_000;
 
-/// One minute in time stamp units.
+/// Minute in time stamp units.
 const MINUTE: u64 = 6_000_000;
 
 fn at(units: u64) -> Instant {
