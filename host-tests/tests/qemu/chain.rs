@@ -10,7 +10,7 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::fleet::{Fleet, Image};
 
-/// All faults at once.
+/// Combination of all faults.
 pub(crate) const BAD_DAY: Faults = Faults {
     loss: 0.3,
     corrupt: 0.15,

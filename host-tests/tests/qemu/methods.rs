@@ -10,8 +10,7 @@ use uav_relay_tools::provision::block::Flight;
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// Returns a flight past an interferer at `y_m`, with free altitudes and `aside_m` of lateral room; `held` fixes one relay's
-/// altitude.
+/// Returns a flight past an interferer at `y_m`; `aside_m` is the lateral room, `held` one relay's fixed altitude.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {

@@ -136,8 +136,7 @@ pub(crate) struct Air {
     changed_us: u64,
     /// Frames sent, and events by relay and name.
     pub(crate) frames: u64,
-    /// Last reception between a relay and its copy, start of the time in which both have setpoints all the same, and its longest
-    /// span, µs.
+    /// Last reception between a relay and its copy, start of their both having setpoints, and its longest duration, µs.
     received_us: [Option<u64>; 2],
     both_us: Option<u64>,
     pub(crate) longest_both_us: u64,
