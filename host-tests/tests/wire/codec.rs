@@ -1,12 +1,11 @@
-//! A second codec, written from the rules in `FORMAT.md` and not from the crate's code. It holds no postcard, and takes CRC
-//! and COBS from other crates.
+//! Second codec, written from the rules in `FORMAT.md` without the crate's code or postcard; CRC and COBS are of other crates.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `codec.rs` | which message a body says |
-//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | what the longer ones say: bytes, message, ranges |
-//! | `bytes.rs`, `reader.rs`, `limits.rs` | the parts that bodies are written of, read of, and held within |
-//! | `frame.rs` | what stands around a body |
+//! | `codec.rs` | message kinds |
+//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | longer messages: bytes, conversion, ranges |
+//! | `bytes.rs`, `reader.rs`, `limits.rs` | encoding, decoding and ranges of parts |
+//! | `frame.rs` | frame around a body |
 
 mod bytes;
 mod frame;
