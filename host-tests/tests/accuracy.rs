@@ -1,4 +1,4 @@
-//! Accuracy of micromath and libm in f32, function by function: reason to use micromath for bearings and libm elsewhere.
+//! Accuracy and cost of micromath and libm in f32: the reason to use micromath for bearings alone.
 //!
 //! `cargo test --test accuracy -- --nocapture` prints the table, with `--release` and `--include-ignored` also the times.
 

@@ -70,7 +70,7 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the best weakest signal over all ordered choices of `left` further positions on a grid of `points`.
+/// Returns the best weakest signal over all ordered choices of `left` further positions on a grid.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);

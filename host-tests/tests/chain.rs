@@ -273,8 +273,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
     }
 }
 
-/// Checks relays with own altitudes and powers: the leader mispredicts, and the bracketing search finds the exact optimum of the
-/// farthest chain.
+/// Checks own altitudes and powers: the leader mispredicts, and the search finds the farthest chain's optimum.
 #[test]
 fn a_mixed_chain_is_solved_as_it_is() {
     let mission = mission(8);
@@ -340,8 +339,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
         let noticed: Vec<_> = outcome.noticed.keys().copied().collect();
         assert_eq!(noticed, [(2, Side::Downstream), (4, Side::Upstream)]);
         for (&(by, _), &when) in &outcome.noticed {
-            // `Settings::dead_after` is 15 s since the last sign of life. The loss is noticed by the next question, at most a
-            // sixteenth of 10 s and an eighth of that later.
+            // The question after `dead_after` notices the loss, at most a sixteenth of 10 s and an eighth of that later.
             assert!(
                 when.since(killed) <= Duration::from_millis(15_000 + 625 * 9 / 8),
                 "relay {by} took until {when:?}"

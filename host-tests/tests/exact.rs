@@ -1,6 +1,6 @@
-//! Algorithms 1 and 4 where the farthest chain is not optimal: mixed altitudes, uneven fields, binding separations.
+//! Algorithms 1 and 4 where the farthest chain is not optimal, compared with the f64 optimum.
 //!
-//! Each chain, and the leader's bound, is compared with the f64 optimum. `COUNT` and `SEED` select other scenes.
+//! `COUNT` and `SEED` select other scenes.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -297,7 +297,7 @@ fn in_uneven_fields() {
     assert!(tally.tight() >= 99.0);
 }
 
-/// Checks relays of different altitude and power; half of the chains have a separation, or altitudes as large as a hop.
+/// Checks relays of different altitude and power, half with a separation or hop-sized altitudes.
 #[test]
 fn in_uneven_fields_by_relays_that_differ() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(905));
@@ -345,7 +345,7 @@ fn in_uneven_fields_by_relays_that_differ() {
     assert!(tally.near * 100 >= tally.scenes * 88 && tally.tight() >= 80.0);
 }
 
-/// Checks chains by messages, with and without prediction and losses: the results are equal and within the bound.
+/// Checks chains by messages, with and without prediction and losses: equal results within the bound.
 #[test]
 fn by_messages() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(904));

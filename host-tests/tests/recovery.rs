@@ -1,6 +1,4 @@
-//! Time of recovery from the loss of one relay, by chain length and relay.
-//!
-//! `cargo test --test recovery -- --nocapture` prints the table of `host-tests/RESULTS.md`.
+//! Time of recovery from a loss, by chain length and relay: the table of `host-tests/RESULTS.md`, with `-- --nocapture`.
 
 use host_tests::fixtures::mission;
 use uav_relay::Instant;
@@ -78,8 +76,8 @@ fn one_loss_is_noticed_within_15_s_and_costs_six_sweeps_at_most() {
             );
             assert!(noticed <= 15.0, "{name} of {relays}: {noticed}");
             assert!((1..=6).contains(&sweeps), "{name} of {relays}: {sweeps}");
-            // The next relay is found once it has noticed the loss too, up to a renewal period of 2.5 s later. The search for a
-            // missing neighbour takes as long as the silence did.
+            // The next relay has to notice the loss too, up to a renewal period of 2.5 s later; a search for a missing neighbour
+            // takes as long as the silence did.
             let search = if lost == 1 || lost == relays {
                 10.1
             } else {

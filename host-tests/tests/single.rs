@@ -93,9 +93,7 @@ fn the_algorithm_finds_what_the_reference_finds() {
     assert!(same > 400);
 }
 
-/// Checks a case where the first feasible target, 0.00998, is not the best.
-///
-/// D = 100 m, h = 10 m, 10 W and 1 W, Upsilon 100 from 90 m on and 0.1 before.
+/// Checks a field, 0.1 and from 90 m on 100, whose first feasible target, 0.00998, is not the best.
 #[test]
 fn the_first_target_that_is_met_is_not_the_best() {
     let steep = link(100.0, 10.0, 10.0, 1.0, vec![(89.99, 0.1), (90.0, 100.0)]);
@@ -107,7 +105,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
     assert!((found.sir / 0.121_95 - 1.0).abs() < 0.02, "{found:?}");
 }
 
-/// Compares the public reference: constant Upsilon of 4, 336 steps of 0.0001 to the target 0.0065 at x = 77.298.
+/// Compares the public reference: constant Upsilon of 4, 336 steps of 0.0001 to 0.0065 at x = 77.298.
 #[test]
 fn a_constant_field_is_as_a_separate_program_has_it() {
     let even = link(100.0, 10.0, 10.0, 1.0, vec![(0.0, 4.0)]);

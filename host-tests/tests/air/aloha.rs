@@ -1,4 +1,4 @@
-//! Throughput of Poisson traffic compared with Abramson (1970) for pure and Roberts (1975) for slotted ALOHA.
+//! Throughput of pure and slotted ALOHA, compared with Abramson (1970) and Roberts (1975).
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,10 +23,7 @@ fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
     Bench::new(access, (0..=NODES).map(hearers).collect(), seed)
 }
 
-/// Returns the fraction of time with intact frames at the listener, for `offered` frames per frame time over `frames` frame
-/// times.
-///
-/// With `slots` frames start at multiples of a frame time.
+/// Returns the fraction of time with intact frames at the listener, for `offered` frames per frame time.
 fn throughput(mut bench: Bench, offered: f64, frames: u64, slots: bool) -> f64 {
     let frame = bench.medium.air_time(BYTES).as_micros();
     let mut rng = ChaCha8Rng::seed_from_u64(7);

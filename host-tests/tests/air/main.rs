@@ -1,4 +1,4 @@
-//! Radio channel: collisions, burst losses, hidden nodes, and the availability of chains in spite of them.
+//! Radio channel: collisions, burst losses, hidden nodes, and the availability of chains.
 //!
 //! `cargo test --test air -- --ignored --nocapture` prints the results of chains on bad channels.
 

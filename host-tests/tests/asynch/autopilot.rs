@@ -84,7 +84,7 @@ impl Write for Uart {
     }
 }
 
-/// PX4 that reaches targets at once. Its pilot flies it until `given_at` and then gives it to its companion.
+/// PX4 that reaches targets at once; its pilot flies it until `given_at`, then its companion.
 struct Vehicle {
     mute: Cell<bool>,
     given_at: Cell<Instant>,

@@ -88,7 +88,7 @@ fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
     all.map(|(at, _)| at).collect()
 }
 
-/// Checks that a blocked writer affects other lines and events no more, to the microsecond, than one that loses its bytes.
+/// Checks that a blocked writer affects others no more, to the microsecond, than one that loses its bytes.
 #[test]
 fn a_stuck_port_delays_nobody() {
     let until = Instant::from_millis(60_000);

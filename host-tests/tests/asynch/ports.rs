@@ -1,5 +1,4 @@
-//! Guarantees of the port runner: received bytes reach the relay, a truncated frame is terminated, no port starves, and the pin
-//! is high during transmission.
+//! Guarantees of the port runner: delivery, termination of truncated frames, fairness, pin timing.
 
 use std::cell::{Cell, RefCell};
 use std::future::{pending, poll_fn};
@@ -188,7 +187,7 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
     assert!(whole + 3 >= usize::try_from(sent).unwrap() / 2, "{sent}");
 }
 
-/// Checks that a port that is always ready, or always fails, yields to the executor, the relay and the other port.
+/// Checks that a port that is always ready, or always fails, yields to all others.
 #[test]
 fn a_port_that_is_always_ready_starves_nobody() {
     for fails in [false, true] {

@@ -7,8 +7,7 @@ use uav_relay::{Instant, Phase, Side, Wiring};
 use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
 use super::net::{Deed, Net};
 
-/// Events: a middle relay reboots and the chain agrees again; after an upload, relays with and without stored missions and the
-/// leader reboot; a newer mission comes from the other end, and a relay next to either end reboots.
+/// Events: reboots of a relay, of relays with and without a stored upload, and of the leader, between two uploads.
 const DEEDS: [(u64, Deed); 11] = [
     (6_000, Deed::Reboot(4)),
     (6_500, Deed::Restart),

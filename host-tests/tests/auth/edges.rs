@@ -135,8 +135,7 @@ fn what_is_signed_for_other_nonces_is_forged() {
     assert_eq!(link.say(5), Some("received"));
 }
 
-/// Checks the warning at `Auth::epoch`: a relay with a reused epoch is ignored until its counter exceeds the old one, and old
-/// frames to it can be replayed.
+/// Checks the warning at `Auth::epoch`: with a reused epoch a relay is ignored, and old frames are accepted again.
 #[test]
 fn an_epoch_used_twice_is_no_fresh_start() {
     let mut link = Link::new();

@@ -65,7 +65,7 @@ fn recorded_handshakes_at_any_time_change_no_place() {
     }
 }
 
-/// Checks that a booted relay accepts each recorded handshake at most once, and the genuine one in spite of them.
+/// Checks that a booted relay accepts each recorded handshake at most once, and then the genuine one.
 #[test]
 fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -155,7 +155,7 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     assert!((15_000..15_100).contains(&lost_after), "{lost_after}");
 }
 
-/// Returns the time until relay 1 loses its silent neighbour in spite of a replay, ms, and the number of handshakes accepted.
+/// Returns the time until relay 1 loses its silent neighbour, ms, and the number of handshakes accepted.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut frame = [0; MAX_FRAME];

@@ -1,6 +1,6 @@
 //! Authenticated chains: same positions as plain chains, and only new frames of members are accepted.
 //!
-//! Random tests use the environment variables `SEED` (1 if unset), which each prints, and `COUNT`, the number of attacks.
+//! Random tests use `SEED` (1 if unset), which each prints, and `COUNT`, the number of attacks.
 
 mod attack;
 mod chain;

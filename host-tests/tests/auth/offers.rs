@@ -145,7 +145,7 @@ fn a_chain_without_tags_takes_no_mission_from_anybody() {
     }
 }
 
-/// Checks that recorded, altered or forged answers do not convince the ground station that an upload is complete.
+/// Checks that recorded, altered or forged answers do not complete an upload at the ground station.
 #[test]
 fn the_ground_is_not_told_lies_either() {
     for wiring in [Wiring::Pair, Wiring::Shared] {

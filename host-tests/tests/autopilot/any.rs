@@ -1,4 +1,4 @@
-//! Fuzz test of the link: every target sent is finite, near the line, and sent in a state that permits targets.
+//! Fuzz test of the link: targets are finite, near the line, and sent only in states that permit them.
 
 use mavlink::dialects::common::MavLandedState;
 use rand::{RngExt, SeedableRng};

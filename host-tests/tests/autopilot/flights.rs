@@ -1,5 +1,4 @@
-//! Random flights with failsafes, restarts, delaying cables, silences, pauses and pilots' modes: no drone is engaged without
-//! its pilot.
+//! Random flights with failsafes, restarts, delays and pilots: no drone is engaged without its pilot.
 
 use std::collections::VecDeque;
 
@@ -316,7 +315,7 @@ impl Flight {
         engages
     }
 
-    /// Runs the asynchronous runner, which takes the setpoint from its relay. Returns true if the drone becomes engaged.
+    /// Runs the asynchronous runner with its relay's setpoint. Returns true if the drone becomes engaged.
     fn run(&mut self, runner: &mut Runner) -> bool {
         let before = runner.is_flown();
         let mut engages = false;

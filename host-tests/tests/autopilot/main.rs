@@ -281,7 +281,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
     assert!(last.0 > stopped.0);
 }
 
-/// Checks setpoints that are not finite or too far away, which would end the stream and thereby a PX4's mode.
+/// Checks setpoints that are not finite or too far away: they must not end a PX4's stream.
 #[test]
 fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

@@ -175,8 +175,7 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     }
 }
 
-/// Checks the stopping time used by the guard: afterwards a drone moves less than 0.5 m, and not away from a setpoint behind
-/// it.
+/// Checks that after the guard's stopping time a drone moves less than 0.5 m, and not away from its setpoint.
 #[test]
 fn a_drone_has_stopped_after_the_stopping_time() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -254,7 +253,7 @@ fn a_px4_whose_gps_is_back_resumes_nothing() {
     assert!(rig.events.iter().any(failsafe), "{:?}", rig.events);
 }
 
-/// Checks an autopilot clock that is 1 % slow or loses 1.5 s: the link is blind for seconds at most, without oscillation.
+/// Checks clocks that are 1 % slow or lose 1.5 s: the link is blind for seconds at most.
 #[test]
 fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -343,7 +342,7 @@ fn what_an_autopilot_does_not_send_it_is_not_asked_for_again_and_again() {
     }
 }
 
-/// Checks a target outside the fence: the ArduCopter keeps the last velocity, and the link reports the refusal and the return.
+/// Checks a target outside the fence: the ArduCopter flies on, and the link reports refusal and return.
 #[test]
 fn a_fence_that_a_moving_target_leaves_is_named() {
     let mut rig = Rig::new(Kind::ArduCopter);
@@ -362,7 +361,7 @@ fn a_fence_that_a_moving_target_leaves_is_named() {
     assert_eq!(rig.says("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks a drone given back at full speed: it overshoots by its stopping distance and is led on from there.
+/// Checks a drone given back at full speed: it overshoots and is led on from there.
 #[test]
 fn a_drone_that_is_given_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

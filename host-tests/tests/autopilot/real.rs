@@ -1,9 +1,9 @@
-//! Models of a PX4 and an ArduCopter after observations of the real ones, with a body that follows targets like theirs.
+//! Models of a PX4 and an ArduCopter after the real ones, with bodies that follow targets like theirs.
 //!
 //! PX4: refuses OFFBOARD without a stream; enters its failsafe (`system_status` 5) a second after the last target or when GPS is
 //! lost; resumes OFFBOARD on its own once a stream has lasted for 1.2 s; ends a failsafe only when a pilot chooses a mode.
-//! ArduCopter: always accepts GUIDED, keeps a velocity for 3 s after the last target, silently ignores targets outside its fence,
-//! returns at a fence breach, flies for 8 s without GPS and then lands. Both answer TIMESYNC and message requests.
+//! ArduCopter: always accepts GUIDED, keeps a velocity for 3 s after the last target, silently ignores targets outside its
+//! fence, returns at a fence breach, flies for 8 s without GPS and then lands. Both answer TIMESYNC and message requests.
 
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
@@ -36,7 +36,7 @@ pub(crate) enum Mode {
     Land,
 }
 
-/// Controller gains (PX4's defaults of MPC_XY_P, MPC_XY_VEL_P_ACC, _I_ACC, _D_ACC) and air drag of a vehicle.
+/// Controller gains (PX4's MPC_XY_P, MPC_XY_VEL_P_ACC, _I_ACC, _D_ACC) and air drag of a vehicle.
 struct Gains {
     place: f64,
     speed: f64,
@@ -59,7 +59,7 @@ const PX4: Gains = Gains {
     most_m_s2: 5.0,
 };
 
-/// Gains fitted to measurements: with a target of up to 5 m/s and 1 m/s² it reached 6.2 m/s and overshot by 1.1 m.
+/// Gains fitted to a flight behind a target of 5 m/s and 1 m/s²: 6.2 m/s and 1.1 m of overshoot.
 const ARDUCOPTER: Gains = Gains {
     place: 1.0,
     speed: 0.7,
@@ -154,7 +154,7 @@ pub(crate) struct Real {
     /// Start of the failsafe, and sending time of the stream's newest target.
     fell_at: Instant,
     sent_at: Instant,
-    /// Resumptions of OFFBOARD without a pilot: after targets sent when the companion could know of the failsafe, and earlier.
+    /// Resumptions of OFFBOARD without a pilot, by targets sent after the failsafe was known, and before.
     pub(crate) resumed: u32,
     pub(crate) resumed_late: u32,
     pub(crate) requests: Vec<u32>,

@@ -1,4 +1,4 @@
-//! Companion on the asynchronous runner, with a single relay; each step polls it as long as it can make progress.
+//! Companion on the asynchronous runner with a single relay, polled as long as it makes progress.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;

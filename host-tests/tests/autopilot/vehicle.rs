@@ -1,4 +1,4 @@
-//! Simulated vehicle with a PX4 or ArduCopter: it hovers, or in its companion mode flies to the last target.
+//! Simulated vehicle with a PX4 or ArduCopter: it hovers, or flies to the companion's last target.
 
 use mavlink::dialects::common::{
     COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState,

@@ -1,7 +1,4 @@
-//! Programs under test.
-//!
-//! `cargo test -p host-tests` does not build them, and Cargo sets path variables only for a package's own binaries, so Cargo is
-//! called to build what is missing.
+//! Programs under test, which Cargo is called to build because `cargo test -p host-tests` does not.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

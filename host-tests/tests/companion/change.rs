@@ -175,7 +175,7 @@ fn what_leaves_the_geofence_is_refused_before_it_is_sent() {
     assert!(!bench.relays[0].has_said("uploaded: "));
 }
 
-/// Runs the ground station at a terminal and answers its question. Returns the exit status and the terminal's text.
+/// Runs the ground station at a terminal and answers its question. Returns exit status and terminal text.
 fn at_a_terminal(options: &[String], answer: &str) -> (Option<i32>, String) {
     let terminal = Pty::new();
     let tty = || {

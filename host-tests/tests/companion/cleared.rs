@@ -122,7 +122,7 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
     assert_eq!(asked(&socket)["relay"]["lost"], serde_json::json!([]));
 }
 
-/// Checks clients that send nothing, like `nc -U`, or only part of a command: they are answered without a wait.
+/// Checks clients that send nothing, like `nc -U`, or half a command: they are answered at once.
 #[test]
 fn a_client_that_sends_a_part_of_a_command_is_answered() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Restarted companion with an autopilot over UDP that answers only the first address and port from which it receives.
+//! Restarts of the companion with an autopilot over UDP that answers only the first peer address.
 
 use std::net::UdpSocket;
 
@@ -67,7 +67,7 @@ fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
     drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == serde_json::json!([7, 191]));
 }
 
-/// Starts a companion three times with the same autopilot; the first is killed, the second terminates normally.
+/// Starts a companion three times with one autopilot; the first is killed, the second terminates.
 fn is_heard_again(address: &str, ports: Ports) {
     let mut drone = ports.drone(ports.local);
     let mut first = relay(address, &[]);

@@ -1,4 +1,4 @@
-//! One scenario file for all programs: `cargo plan`, the companion and the ground station, with sections of their own.
+//! One scenario file for `cargo plan`, the companion and the ground station, with sections of their own.
 
 use std::path::{Path, PathBuf};
 

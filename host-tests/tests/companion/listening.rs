@@ -60,7 +60,7 @@ fn one_finds_the_interferer_by_its_fifo() {
     assert!(!believed.ends_with("0.000e0 W"), "{believed}");
 }
 
-/// Checks that measurements of a radio count in the air, and that the relay moves to measure at further positions.
+/// Checks that a radio's measurements count in the air, and that the relay moves to measure elsewhere.
 #[test]
 fn a_radio_on_the_autopilots_link_is_heard() {
     let mut flight = Flight::listening("arducopter", &LISTENING);

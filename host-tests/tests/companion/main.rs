@@ -1,4 +1,4 @@
-//! `examples/linux_companion` and `examples/linux_ground` as processes on pseudo-terminals, against the simulated chain.
+//! Linux companion and ground station as processes on pseudo-terminals, compared with the simulated chain.
 #![cfg(target_os = "linux")]
 
 mod astray;

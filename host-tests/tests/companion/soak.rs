@@ -1,6 +1,4 @@
-//! Soak test of three companions on one channel with all kinds of repeated faults: every relay keeps running.
-//!
-//! It takes a minute, or `COMPANION_SECONDS`.
+//! Soak test of three companions on one channel with repeated faults, for a minute or `COMPANION_SECONDS`.
 
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Ground stations that stay on duty with three relays in the air: measurements on the ground reach the relays.
+//! Ground stations on duty with three relays in the air, which receive their measurements.
 
 use std::fmt::Write as _;
 use std::net::UdpSocket;

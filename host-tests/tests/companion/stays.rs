@@ -1,4 +1,4 @@
-//! Faults that neither end nor delay a relay: a vanished port, a reader that stops or exits, a full disk, a hang-up.
+//! Faults that neither end nor delay a relay: vanished ports, stopped readers, full disks, hang-ups.
 
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;

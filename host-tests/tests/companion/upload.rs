@@ -229,7 +229,7 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
     assert!(stderr[0].ends_with("; 0 frames refused"), "{stderr:?}");
 }
 
-/// Checks relays with a guard, at 20 m: an altitude outside their geofence is refused by name, one inside is flown.
+/// Checks guarded relays at 20 m: an altitude outside their geofence is refused by name.
 #[test]
 fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
     for (band, altitude, range) in [

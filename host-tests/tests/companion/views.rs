@@ -70,7 +70,7 @@ fn stored(file: &Path) -> ViewRecord {
 
 const STANDS_BY: &str = "stands by: what it has said in votes before this start; before another flight remove its --view-file";
 
-/// Kills all relays in a view of two of them; after the restart three fly, and no view number is used twice.
+/// Kills all relays in a view of two; restarted, three fly, and no view number is used twice.
 #[test]
 fn three_that_are_started_again_stand_by_what_they_said() {
     let expected = simulated(&Scenario::default(), 3);

@@ -147,8 +147,7 @@ fn signed(files: &Files, epoch: &str, place: &[&str]) -> Relay {
     Relay::start(&all)
 }
 
-/// Checks the reasons on a wire: relays do not answer unknown senders, so most mistakes are silence, and the relay's log has
-/// the reason.
+/// Checks reasons on a wire, where relays do not answer strangers and only their logs have the reason.
 #[test]
 fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     let files = Files::new();

@@ -1,5 +1,4 @@
-//! Checks of the f64 reference for chains in stochastic interference, by values of a separate program and by independent
-//! methods.
+//! Checks of the f64 reference for chains in stochastic interference by independent values and methods.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

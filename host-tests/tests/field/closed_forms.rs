@@ -5,7 +5,7 @@ use uav_relay_oracle::reference::stochastic::upsilon_by_mgf;
 
 use super::off;
 
-/// Returns E[exp(-y u)] of a Beta distribution, by the trapezoidal rule in the logit of u, where the integrand is analytic.
+/// Returns E[exp(-y u)] of a Beta distribution, by the trapezoidal rule in the logit of u.
 fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     const STEP: f64 = 0.125;
     // The peak is at most 4 wide where both shapes are large.
@@ -29,7 +29,7 @@ fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     with / without
 }
 
-/// Returns the same by the power series of e^-y 1F1(beta; alpha + beta; y), with positive terms, good for y up to about 500.
+/// Returns the same by the power series of e^-y 1F1(beta; alpha + beta; y), good for y up to about 500.
 fn beta_mgf_series(alpha: f64, beta: f64, y: f64) -> f64 {
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 0..3_000 {

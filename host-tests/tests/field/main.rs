@@ -1,4 +1,4 @@
-//! Stochastic interference: table and closed form of Upsilon, its estimation, and the f64 reference of whole chains.
+//! Stochastic interference: Upsilon's table and closed form, its estimation, and reference chains.
 //!
 //! Random tests use the environment variable `SEED` (1 if unset), which each prints.
 

@@ -47,7 +47,7 @@ fn records_fill_both_sectors_and_the_newest_counts() {
     assert_eq!(newest(&mut flash), Some(entry(12)));
 }
 
-/// Checks that the newest record's sector is never erased, and that each erase makes room for a full sector.
+/// Checks that the newest record's sector is never erased, and that each erase frees a full sector.
 #[test]
 fn a_full_log_goes_on_in_the_sector_with_the_older_records() {
     let mut flash = Ram::blank(4 * RECORD, 1);

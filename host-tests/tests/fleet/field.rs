@@ -47,9 +47,7 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
     link
 }
 
-/// Returns the fewest relays on a grid of positions, by backward reachability from Rx; 0 if `most` are not enough.
-///
-/// Hops may be `longer` grid steps longer than the target permits.
+/// Returns the fewest relays on a grid, with hops up to `longer` grid steps too long; 0 if more than `most`.
 fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> usize {
     const STEPS: usize = 4000;
     let (d, relay) = (link.distance_m, link.relays[0]);
@@ -159,7 +157,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
     assert!(same > 300 && none > 20 && fewer > 10 && largest > 30);
 }
 
-/// Checks the best target of N identical relays: the closed form in an even field, and at least Algorithm 4's target.
+/// Checks the best target of N identical relays against the closed form and Algorithm 4.
 #[test]
 fn the_best_of_equals_in_a_field() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));

@@ -1,14 +1,10 @@
-//! Number of relays for a target, compared with independent counts.
-//!
-//! The environment variables `COUNT` and `SEED` select other scenarios.
+//! Number of relays for a target, compared with independent counts; `COUNT` and `SEED` select scenarios.
 
 mod field;
 mod interferer;
 mod known;
 
-/// Relative loss of a target by f32 rounding.
-///
-/// Half a step of x next to Rx is 6e-8 D, over the lowest altitude of 0.002 D; each position is rounded toward its sender.
+/// Relative loss of a target by f32 rounding: half a step of x is 6e-8 D, over an altitude of 0.002 D.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 pub(crate) fn count(default: usize) -> usize {

@@ -15,10 +15,7 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Flies 200 random scenes with room beside the line.
-///
-/// Counts scenes with neighbours closer along x than the separation, and those where drones fail to arrive; checks the
-/// distances.
+/// Flies 200 random scenes with lateral room and counts those with neighbours closer along x, and failures.
 #[test]
 fn drones_get_to_places_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));

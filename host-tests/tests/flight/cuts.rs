@@ -8,7 +8,7 @@ use super::*;
 /// Time limit from the last repair until all relays are in one view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of cuts: relays 1 to `.0` are cut off, then relays 1 to `.1`; the first cut heals first.
+/// Returns all pairs of cuts, of relays 1 to `.0` and then 1 to `.1`; the first heals first.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
     (1..8)
         .flat_map(|first| (1..8).map(move |second| (first, second)))

@@ -19,8 +19,6 @@ const GUST_MPS: f64 = 0.3;
 const HOVER_M: f64 = 1.5;
 
 /// Permitted shortfall of the separation, m: bias and hovering error of both drones.
-///
-/// The guard's rules permit as much again after each restart, which has not been observed.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
 /// End of the events, s.

@@ -11,8 +11,7 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
     up_m: 25.0,
 };
 
-/// Returns each relay's lateral offset and altitude while relays 1 to 3 are cut off, with or without room, and after their
-/// return.
+/// Returns lateral offsets and altitudes while relays 1 to 3 are cut off, and after their return.
 fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
     [seconds(110), seconds(300)].map(|end| {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));

@@ -1,6 +1,4 @@
-//! Guarded drones with realistic dynamics and position errors.
-//!
-//! The environment variables `COUNT` and `SEED` select other faults; a failure names its seed.
+//! Guarded drones with realistic dynamics; `COUNT` and `SEED` select other faults, a failure names its seed.
 
 mod anywhere;
 mod between;
@@ -44,7 +42,7 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
     setup
 }
 
-/// Returns the smallest permitted distance of two drones that were each started at most `starts` times, m.
+/// Returns the smallest permitted distance of drones that were each started at most `starts` times, m.
 ///
 /// The guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
 fn floor_m(starts: usize) -> f64 {

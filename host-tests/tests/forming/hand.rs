@@ -126,7 +126,7 @@ impl Chain {
         self.relays.iter().all(holds)
     }
 
-    /// Returns the relative margin of the chain's SIR over the agreed target, and the smallest distance of two relays, m.
+    /// Returns the relative margin of the chain's SIR over its target, and the smallest distance, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self

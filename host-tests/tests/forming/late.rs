@@ -92,8 +92,7 @@ fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
     chain.flying.clear();
     chain.reboot(0, 8);
     chain.reboot(1, 9);
-    // The tail rejects passes of view 0 and reports its view, so that the next view has a higher number. It counts as a member
-    // elsewhere until its lease expires.
+    // The tail rejects passes of view 0 and reports its view. It is a member elsewhere until its lease expires.
     let took = chain.until(10_000 + 16_000, |chain| {
         chain.holds() && chain.relays[0].view().number() == 2
     });

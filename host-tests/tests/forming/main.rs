@@ -1,5 +1,4 @@
-//! Chains of two to six relays with reboots and late frames, passed by hand: the relays agree again, on the old result if
-//! possible.
+//! Chains of two to six relays with reboots and late frames, passed by hand: they agree again.
 
 mod hand;
 mod late;

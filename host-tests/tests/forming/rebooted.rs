@@ -4,8 +4,7 @@ use uav_relay::{Method, Phase, Settings};
 
 use crate::hand::{Chain, LOW, WIDE};
 
-/// Checks that a rebooted leader with any pass number, even just behind the chain's, agrees within a second at a `hop_time` of
-/// 30 ms.
+/// Checks that a rebooted leader with any pass number agrees within a second at a `hop_time` of 30 ms.
 #[test]
 fn a_rebooted_leader_is_answered_whatever_its_seed() {
     // With prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
@@ -32,7 +31,7 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
     }
 }
 
-/// Reboots a relay during the second pass of the leader's life: it missed the first and gets its position by a new view.
+/// Reboots a relay during the leader's second pass: it gets its position by a new view.
 #[test]
 fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
     let settings = Settings {
@@ -73,7 +72,7 @@ fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
     }
 }
 
-/// Reboots a relay during the agreement on altitudes: it must not join with another altitude than the agreed one.
+/// Reboots a relay during the agreement on altitudes: it must not join with another altitude.
 #[test]
 fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
     let settings = Settings {

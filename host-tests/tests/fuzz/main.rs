@@ -1,7 +1,6 @@
 //! Fuzz targets without a fuzzer: every input of the corpora, and thousands of random ones.
 //!
-//! `host-tests/fuzz` runs the same functions under libFuzzer. Random tests use the environment variable `SEED` (1 if unset),
-//! which each prints.
+//! `host-tests/fuzz` runs the same functions under libFuzzer. Random tests print their `SEED` (1 if unset).
 
 use std::fs;
 use std::path::PathBuf;

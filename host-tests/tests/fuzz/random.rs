@@ -1,4 +1,4 @@
-//! Targets on random bytes and on mutated inputs of the corpus, so that a plain test run explores a little too.
+//! Targets on random bytes and on mutated inputs of the corpus.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -164,14 +164,12 @@ fn offer(side: u8) -> Vec<u8> {
     [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// Returns the second of four relays with a key: it is queried and offered a mission, its neighbour holds it too, and a view
-/// adopts it.
+/// Returns the second of four relays with a key, which receives a mission that a view adopts.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
     let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
     let hello = [9, 1, 10, 0, 2, 1, 0, 0, 0, 1, 0, 0];
-    // The next view with the held mission: proposed by the leader, with a vote from view 0 of four, and decided by the third
-    // relay.
+    // The next view with the held mission: proposed by the leader, decided by the third relay.
     let proposal = [9, 0, 11, 0, 33, 1, 240, 4, 1, 0, 0, 1, 0, 0];
     let decision = [9, 1, 12, 0, 33, 3, 240, 4, 1, 33, 4, 4, 0, 0];
     let wake = [3, 3];
@@ -189,7 +187,7 @@ fn uploaded(how: u8) -> Vec<u8> {
     parts.concat()
 }
 
-/// Returns the first or last of four relays with a key that receives a query and an offer twice from Tx or Rx.
+/// Returns the first or last of four relays with a key, with two queries and offers from Tx or Rx.
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
@@ -198,7 +196,7 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns the last of four guarded relays: it receives its position, two views, a fence, a pass of another view and far nodes.
+/// Returns the last of four guarded relays: it receives its position, two views, a fence and late frames.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];
@@ -269,9 +267,7 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     seed
 }
 
-/// Exchanges the pending frames of all relays.
-///
-/// Returns the number of frames that relay `own` (from 0) received, which are appended to `seed`.
+/// Exchanges all frames; appends those of relay `own` (from 0) to `seed` and returns their number.
 fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) -> usize {
     let (mut heard, mut said) = (0, true);
     let mut buffer = [0; MAX_FRAME];

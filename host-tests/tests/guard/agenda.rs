@@ -204,8 +204,7 @@ pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize
 
 /// Moves half of the neighbours closer along x, with the separation kept in space.
 ///
-/// Relays that are not neighbours stay the separation apart along x unless `wild`, where some alternate between two positions
-/// across the line.
+/// Relays that are not neighbours stay the separation apart along x, unless `wild`.
 pub(crate) fn closer(
     rng: &mut ChaCha8Rng,
     confines: &GuardConfig,

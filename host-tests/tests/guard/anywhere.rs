@@ -127,8 +127,7 @@ impl Drone {
             } else {
                 0.0
             };
-            // The target turns no faster than its acceleration allows, because the guard assumes positions between the
-            // setpoints.
+            // The target turns no faster than its acceleration allows: the guard assumes straight flight.
             let change = way(self.target_velocity, to.map(|part| part * share / STEP_S));
             let part = (1.5 * TARGET_ACCELERATION * STEP_S / length(change).max(1e-9)).min(1.0);
             let velocity = plus(self.target_velocity, change, part);
@@ -177,7 +176,7 @@ struct World {
     least_m: Vec<f64>,
     /// Time since which each drone hovers under its pilot's control; infinite otherwise.
     hovers_s: Vec<f64>,
-    /// Time when a drone first received the position of its neighbour that hovers under a pilot's control; infinite before.
+    /// Time when a drone first received its hovering neighbour's position; infinite before.
     known_s: Vec<f64>,
     /// Required distance of such a pair, from `BRAKES_S` after that time, m.
     hovering_m: Vec<f64>,
@@ -297,7 +296,7 @@ impl World {
         }
     }
 
-    /// Updates which drones hover under a pilot's control, and the required distances of neighbours that know it.
+    /// Updates which drones hover under a pilot's control, and the distances required of their neighbours.
     fn watch_pilots(&mut self) {
         for k in 0..self.drones.len() {
             let drone = &self.drones[k];

@@ -80,9 +80,7 @@ fn a_tight_row_shifts_either_way() {
     }
 }
 
-/// Checks three agreed positions 4 m apart along x, the middle one 12 m aside.
-///
-/// The outer two are not neighbours and know nothing of each other: they stay 10 m apart along x, and the guard reports it.
+/// Checks agreed positions 4 m apart along x: the outer two of three stay 10 m apart, as they do not know each other.
 #[test]
 fn places_too_close_are_approached() {
     let mut world = world(5, 100.0, 100.0);
@@ -127,8 +125,7 @@ fn places_too_close_are_approached() {
     assert_eq!(before, after, "they stay");
 }
 
-/// Checks positions above and beside one another, and an exchange of sides where a relay descends to another's former
-/// position.
+/// Checks positions above and beside one another, and an exchange of sides.
 #[test]
 fn places_above_each_other_are_flown_to_and_left() {
     let mut world = world(4, 300.0, 20.0);

@@ -1,6 +1,6 @@
-//! Motion guard in a line of simulated drones on a faulty medium, with agreements at random times that some relays miss.
+//! Motion guard of simulated drones on a faulty medium with random agreements.
 //!
-//! The environment variables `COUNT` and `SEED` select other schedules; a failure names its seed.
+//! `COUNT` and `SEED` select other schedules; a failure names its seed.
 
 mod agenda;
 mod anywhere;

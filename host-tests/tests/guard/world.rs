@@ -72,9 +72,7 @@ impl World {
         }
     }
 
-    /// Returns the permitted shortfall of the separation, m.
-    ///
-    /// It is twice the error of each of the two reports, and four roundings of a coordinate on each side.
+    /// Returns the permitted shortfall of the separation, m: four times the report error, and rounding.
     pub(crate) fn allowed_m(&self) -> f64 {
         let rounding = f64::from(self.confines.fence.most_x_m) * f64::from(f32::EPSILON);
         4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
@@ -153,7 +151,7 @@ impl World {
         }
     }
 
-    /// Moves drone `k` up to `most_m` across the line along one axis, away from nearby drones, if such a direction exists.
+    /// Moves drone `k` up to `most_m` along an axis across the line, away from nearby drones if possible.
     pub(crate) fn aside(&mut self, k: usize, (part, up, most_m): (usize, bool, f64)) {
         let (low, high) = self.drones[k].stretch()[part];
         let near = k.saturating_sub(3)..(k + 4).min(self.drones.len());
@@ -168,8 +166,7 @@ impl World {
         }
     }
 
-    /// Moves drone `k` along the line, the separation clear of its neighbours' ranges, once both know that its pilot flies
-    /// it.
+    /// Moves drone `k` along the line, clear of its neighbours, once both know that its pilot flies it.
     pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;

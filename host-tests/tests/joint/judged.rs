@@ -52,7 +52,7 @@ fn the_stored_optima_are_found_again() {
     }
 }
 
-/// Checks that the scenarios are diverse (few and many relays, with and without lateral room) and valid missions.
+/// Checks that the scenarios are diverse and valid missions.
 #[test]
 fn the_numbered_scenarios_are_of_many_kinds() {
     let (mut narrow, mut one_sided, mut level, mut apart, mut few, mut right) = (0, 0, 0, 0, 0, 0);

@@ -1,4 +1,4 @@
-//! Reference optimiser of the joint problem, compared with known optima, the exact reference, brute force, and other seeds.
+//! Reference optimiser of the joint problem, compared with known optima, brute force and other seeds.
 
 use std::iter::successors;
 

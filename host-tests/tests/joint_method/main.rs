@@ -1,4 +1,4 @@
-//! Joint choice of positions, sides and altitudes: distance from the optimum, cost, and independence from faults.
+//! Joint choice of positions, sides and altitudes: quality, cost, and independence from faults.
 
 use host_tests::flights::with_room;
 use rand::SeedableRng;

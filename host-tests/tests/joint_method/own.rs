@@ -166,7 +166,7 @@ fn a_relay_may_hold_its_altitude() {
     );
 }
 
-/// Checks the round trips: a sweep that reveals unlike relays, one collection per eight of them, a sweep of the result.
+/// Checks the round trips: a sweep, one collection per eight unlike relays, a sweep of the result.
 ///
 /// An unlike leader starts with the collection.
 #[test]

@@ -90,7 +90,7 @@ fn an_unknown_message_costs_nothing_but_its_bytes() {
     assert_eq!(parser.counters().broken, 0);
 }
 
-/// Checks the worst known input: three long false starts in sixteen bytes, each costing a checksum of 260 bytes.
+/// Checks the worst known input: three false starts in sixteen bytes, each a checksum of 260 bytes.
 #[test]
 fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
     let made = [

@@ -171,7 +171,7 @@ fn a_stamp_is_judged_by_its_sender_and_link_and_the_first_by_the_time() {
     );
 }
 
-/// Checks that a signer without a clock adopts the time of its first accepted frame, and then uses its own clock.
+/// Checks that a signer without a clock adopts the time of its first accepted frame.
 #[test]
 fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
     let mut ours = Signing::new(KEY, 0, Stamp::UNKNOWN, at(500));

@@ -1,6 +1,4 @@
-//! Two drones with the same index, as from a cloned image: number, key and epoch are equal.
-//!
-//! The environment variable `COUNT` sets the number of chains for each kind of medium.
+//! Two drones with the same index, number, key and epoch, as from a cloned image; `COUNT` sets the number of chains.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,12 +13,10 @@ const STEP_MS: u64 = 10;
 /// Time limit for one duplicate to give up its setpoint after it has received the other, ms.
 const LIMIT_MS: u64 = 2_000;
 
-/// Time limit for both to have setpoints although they receive each other, ms: first frames may be lost, and a settled chain
-/// sends few.
+/// Time limit for two setpoints at duplicates that receive each other, ms: a settled chain sends few frames.
 const HEARD_MS: u64 = 10_000;
 
-/// Time limit for duplicates that do not receive each other, ms: at a loss of 30 % several claims and echoes in a row may be
-/// lost.
+/// Time limit for duplicates that do not receive each other, ms: several claims in a row may be lost.
 const HIDDEN_MS: u64 = 40_000;
 
 /// Time limit until the whole chain has setpoints for good, with one of the duplicates, ms.
@@ -41,7 +37,7 @@ enum Medium {
 }
 
 impl Medium {
-    /// Returns the port at which a drone with index `receiver` receives a frame that `sender` sends through `port`, if any.
+    /// Returns the port at which drone `receiver` receives a frame that `sender` sends through `port`, if any.
     fn carries(self, sender: u16, port: Port, receiver: u16) -> Option<Port> {
         match port {
             Port::Shared => Some(Port::Shared),
@@ -71,7 +67,7 @@ struct Found {
     both_at_all: u64,
     /// Total time without a setpoint at either duplicate, from the start of the second.
     neither: u64,
-    /// Time from the start of the second duplicate until the whole chain, with one of the two, has setpoints for good.
+    /// Time from the second start until the whole chain, with one duplicate, has setpoints for good.
     flies: u64,
     /// True if the duplicate that started first has the setpoint in the end.
     first_stays: bool,
@@ -249,10 +245,7 @@ fn kinds() -> impl Iterator<Item = (bool, f64, bool)> {
     })
 }
 
-/// Checks the time limits, that one of the duplicates reports the other, and that the chain flies for good within `FLIES_MS`.
-///
-/// Two setpoints are permitted until `LIMIT_MS` after the first frame between the duplicates, and until `most_ms` after the
-/// second start.
+/// Checks the time limits, the report of a duplicate, and that the chain flies within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
     for (signed, loss, at_once) in kinds() {

@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Returns the time from the last loss until the chain has settled, and the sweeps since, the view request included.
+/// Returns the time from the last loss to the settled chain, and the sweeps since.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, Turning::Lost(_));
     let last = outcome
@@ -57,8 +57,7 @@ fn any_one_two_or_three_of_eight_may_be_lost_at_once() {
         "settled within {} ms of the last detection, by at most {most} sweeps",
         ms(slowest)
     );
-    // The search at an end of the chain takes as long as a silent neighbour is asked: `lost` less `quiet`. Requests, counting
-    // and sweeps take the rest.
+    // The search at an end of the chain takes `lost` less `quiet`; requests, counting and sweeps the rest.
     assert!(ms(slowest) < 10_000 + 2_000);
     assert!(most <= 6);
 }

@@ -1,6 +1,4 @@
-//! Chains that lose relays and accept them again: the rest ends in the positions of an undisturbed chain of the same relays.
-//!
-//! The environment variables `COUNT` and `SEED` select other schedules.
+//! Loss and return of relays: the rest ends in an undisturbed chain's positions. `COUNT` and `SEED` select other schedules.
 
 mod duplicates;
 mod flights;
@@ -46,7 +44,7 @@ fn alone(setup: &Setup, left: &[u16]) -> (Vec<Option<[u32; 3]>>, u32) {
     (outcome.bits(), outcome.relays[0].target.unwrap().to_bits())
 }
 
-/// Compares the relays `left` of a run with an undisturbed chain of them. Returns the first difference as an error.
+/// Compares the relays `left` with an undisturbed chain. Returns the first difference as an error.
 fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     let (bits, target) = alone(setup, left);
     let relays: Vec<_> = left

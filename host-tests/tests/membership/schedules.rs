@@ -9,14 +9,10 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Time limit from the last loss or start to a settled chain, while frames are still lost and corrupted: twenty times
-/// `Settings::dead_after`.
+/// Time limit to a settled chain, while frames are lost and corrupted: twenty times `dead_after`.
 const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// Draws a fault schedule for eight relays, alike or not.
-///
-/// Loss is up to 50 %, corruption up to 20 %, with duplicates and reordering; up to three relays are lost in the first minute,
-/// half of which return after up to another minute.
+/// Draws a fault schedule for eight relays: loss up to 50 %, corruption up to 20 %, up to three relays lost.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = paper(8);
     setup.profiles = own_profiles(rng);

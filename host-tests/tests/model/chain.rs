@@ -122,8 +122,7 @@ impl<'a> World<'a> {
         (0..self.relays.len()).try_for_each(|at| self.turn(at))
     }
 
-    /// Checks that neighbours holding positions for the same target keep the separation, and that the hop between them meets
-    /// it.
+    /// Checks neighbours that hold positions for the same target: separation, and SIR of the hop.
     fn neighbours_agree(&mut self) -> Checked {
         let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
         let hops = self.scenario.judge.hops(&places);
@@ -237,9 +236,7 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Processes the next frame or timer in order.
-    ///
-    /// Returns true if there was one by `until`.
+    /// Processes the next frame or timer in order. Returns true if there was one by `until`.
     pub(crate) fn flow(&mut self, until: Instant) -> Checked<bool> {
         let timer = self.next_timer();
         match self.wires.next() {

@@ -152,7 +152,7 @@ impl World<'_> {
         self.turn(leader)
     }
 
-    /// Hands a relay as many samples as it wants, with some spread, at about `part` per cent of the agreed interference.
+    /// Hands a relay the samples that it wants, at about `part` per cent of the agreed interference.
     fn measure(&mut self, relay: u8, part: u8) -> Checked {
         let at = usize::from(relay) % self.relays.len();
         let field = self.scenario.mission.field();

@@ -44,7 +44,7 @@ impl Judge {
         }
     }
 
-    /// Returns the ratio of the SIR at `x_m` to the SIR with the measured Upsilon, 1/W; 1 for a known interferer.
+    /// Returns the SIR at `x_m` over that with the measured Upsilon, 1/W; 1 for a known interferer.
     pub(crate) fn louder(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,

@@ -14,8 +14,7 @@ use super::seal::{Taken, refused, taken};
 use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
-/// Most frames of one drain: a pass or its result, "busy", a proposal's result, a renewal and its completion, and per side a
-/// heartbeat and a hello.
+/// Most frames of one drain: a pass, busy, decision, two for a renewal, and per side a heartbeat and a hello.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
 /// Observed state of one relay since it was switched on.
@@ -48,10 +47,7 @@ pub(crate) struct Ledger {
     taken: Taken,
 }
 
-/// Returns the shortest interval of questions to a neighbour.
-///
-/// The channel can carry that rate for the whole chain, but there are between 16 and 64 questions in the span from
-/// `probe_after` to `dead_after`.
+/// Returns the shortest interval of questions to a neighbour, limited by the channel's capacity.
 fn tick(settings: &Settings, relays: usize) -> Duration {
     let span = settings.dead_after.as_micros() - settings.probe_after.as_micros();
     let round = 2 * relays as u64 * settings.hop_time.as_micros();
@@ -162,9 +158,7 @@ impl Ledger {
         self.refused += samples;
     }
 
-    /// Checks a turn of relay `at`, counted from 0.
-    ///
-    /// Returns true if its setpoint, target or phase has changed.
+    /// Checks a turn of relay `at`, from 0. Returns true if setpoint, target or phase has changed.
     pub(crate) fn audit(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked<bool> {
         let before = (self.place, self.target, self.holding);
         self.sent += turn.sent;
@@ -178,7 +172,7 @@ impl Ledger {
         Ok(before != (self.place, self.target, self.holding))
     }
 
-    /// Checks that the chain has the same relays in every view, each with its own index, and that new views are reported.
+    /// Checks that the chain has the same relays in every view, and that new views are reported.
     fn form(&self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let own = at as u16 + 1;
@@ -246,7 +240,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks that a relay holds its position for a target that the chain can meet, and reports agreement only then.
+    /// Checks that a relay holds its position only for a target that the chain can meet.
     fn aim(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let target = relay.target();
@@ -336,10 +330,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks questions and losses.
-    ///
-    /// A neighbour is asked again and again after `probe_after` of silence. It is lost, until it answers, after enough
-    /// unanswered questions and `dead_after`, or after the longest lease.
+    /// Checks questions after `probe_after` of silence, and losses after enough of them or the longest lease.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {

@@ -1,7 +1,7 @@
 //! Operations on a chain and their random distribution.
 //!
-//! A byte that selects a line, a relay or a frame is taken modulo their number, so that every operation has an effect after any
-//! others and while proptest shortens the sequence.
+//! Bytes that select a line, a relay or a frame are taken modulo their number, so that every operation has an effect, also while
+//! proptest shortens the sequence.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ pub(crate) enum Operation {
     Tick,
     /// The clock advances by so many ms: every timer is served in time, and no frames arrive.
     Wait(u16),
-    /// The clock advances by so many ms while every main loop stands still: timers are served late, after the next arrival.
+    /// The clock advances by so many ms while all main loops stand still: timers are served late.
     Sleep(u16),
     /// The clock advances by so many ms without faults: frames arrive in order.
     Flow(u16),
@@ -45,7 +45,7 @@ pub(crate) enum Operation {
     Measure(u8, u8),
 }
 
-/// Seed increment that raises the number of a leader's first pass by 64, the smallest distance of two first passes.
+/// Seed increment that raises the number of a leader's first pass by 64, the smallest distance.
 const NEXT_LIFE: u32 = 54_336;
 
 /// Draws a relay's seed: any, or one that makes a leader's pass numbers close to those of an earlier life.

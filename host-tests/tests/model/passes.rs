@@ -1,9 +1,9 @@
 //! Passes in which a relay may take part: each once, in order, starting with the first one of its view.
 //!
-//! One weakness of closed-loop chains is excused. A relay that reboots during the first pass of a view takes part in it again.
-//! If it has measured other interference since, it forwards other content than before. The next relay requests a new view when
-//! it receives that, but may already have returned the result of the earlier content, or may still do so: until the new view,
-//! the hop between the two misses the target. Frames with tags are not accepted that late.
+//! One weakness of closed-loop chains is excused: a relay that reboots during the first pass of a view takes part in it again,
+//! and forwards other content if it has measured other interference since. The next relay then requests a new view, but may
+//! return the result of the earlier content: until then the hop between the two misses the target. Frames with tags are not
+//! accepted that late.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::digest::digest;
@@ -55,10 +55,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks the counters of a relay that received a pass.
-    ///
-    /// `stands`: it has a position. `suspended`: a view change may be in progress. `before` and `after`: its counters around
-    /// the reception.
+    /// Checks the counters of a relay that received a pass, with a position if `stands`, in a view change if `suspended`.
     pub(crate) fn meets(
         &mut self,
         scenario: &Scenario,
@@ -104,7 +101,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay's pass is the first one of its view and the relay took part in it in an earlier life.
+    /// Returns true if the relay takes part in the first pass of its view for a second time, after a reboot.
     pub(crate) fn begins_anew(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))
@@ -125,8 +122,6 @@ impl Ledger {
     }
 
     /// Checks a pass that the relay sends: the accepted one, or at the leader a new one.
-    ///
-    /// The leader's first pass may never have been sent, because another one replaced it or the neighbour could not decode it.
     pub(crate) fn says(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         prop_assert_eq!(pass.digest, view, "a pass of another view is said");

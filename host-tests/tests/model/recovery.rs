@@ -1,4 +1,4 @@
-//! Recovery from any state to one agreement: faults stop, links are restored, and the leader is restarted once.
+//! Recovery from any state to one agreement after the end of all faults and a restart of the leader.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::{Duration, Relay, ViewId};
@@ -52,9 +52,8 @@ impl World<'_> {
 
     /// Returns the longest time that this mission's chain may take after a restart in any state.
     ///
-    /// That is the time of an undisturbed chain and one retransmission per line, where the first frame may be lost to the
-    /// remains of a broken one. A relay that waits for the result over `h` hops retransmits after (2 h + 2) `hop_time` and an
-    /// eighth.
+    /// It adds one retransmission per line to an undisturbed chain's time: a relay that waits for the result over `h` hops
+    /// retransmits after (2 h + 2) `hop_time` and an eighth.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;
@@ -68,9 +67,7 @@ impl World<'_> {
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
-    /// Returns the longest time until a view request reaches the leader without losses.
-    ///
-    /// Each relay on its route may just have sent a request in vain, and repeats it within `quiet`.
+    /// Returns the longest time of a view request to the leader: each relay may wait for `quiet` first.
     fn a_call(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();

@@ -20,7 +20,7 @@ use super::judge::Judge;
 /// Number of samples that a relay averages at a position.
 pub(crate) const SAMPLES: u32 = 100;
 
-/// Range of the separation in half of the chains with free altitudes, as a fraction of D / (N + 1): it often binds.
+/// Range of the separation, as a fraction of D / (N + 1), in half of the chains with free altitudes.
 const TIGHT: (f64, f64) = (0.05, 0.95);
 
 /// Optimisation method of the leader.

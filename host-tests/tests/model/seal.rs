@@ -1,6 +1,4 @@
 //! Acceptance of signed frames: each once, in the lives of both ends in which it was sent.
-//!
-//! An attacker replays recorded frames (`Operation::Replay`): none may be accepted twice.
 
 use std::collections::BTreeSet;
 
@@ -49,9 +47,7 @@ fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
 }
 
 impl Taken {
-    /// Checks that a relay of this epoch may accept a frame from the neighbour at `side`.
-    ///
-    /// Returns true if the frame is a sign of life.
+    /// Checks that a relay may accept a frame from `side`. Returns true if it is a sign of life.
     pub(crate) fn take(
         &mut self,
         side: usize,

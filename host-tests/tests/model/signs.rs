@@ -7,7 +7,7 @@ use uav_relay::{Duration, Instant};
 pub(crate) const QUESTIONS: usize = 16;
 const OPEN: u32 = 4;
 
-/// Multiples of the questions that were open before an answer, and of `dead_after`, that suffice in any case.
+/// Multiples of the questions open before an answer, and of `dead_after`, that always suffice.
 const MARGIN: usize = 3;
 pub(crate) const LONGEST: u32 = 8;
 
@@ -21,7 +21,7 @@ pub(crate) struct Signs {
     pub(crate) perhaps: Instant,
     /// Reception time of the last possible sign of life.
     pub(crate) last: Instant,
-    /// Questions since the last certain sign, since the last possible one, and the most that preceded a certain one.
+    /// Questions since the last certain sign, since the last possible one, and the most before a certain one.
     pub(crate) open: usize,
     pub(crate) perhaps_open: usize,
     pub(crate) most_open: usize,
@@ -52,10 +52,7 @@ impl Signs {
         }
     }
 
-    /// Records signs of life.
-    ///
-    /// An answer proves life at the time of its question; the completion of a renewal or pass, at the time of forwarding; the
-    /// next one, at the time of the previous completion.
+    /// Records signs of life. An answer proves life at the time of its question, a completion at that of forwarding.
     pub(crate) fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { answer, .. } => {
@@ -87,7 +84,7 @@ impl Signs {
         }
     }
 
-    /// Returns true if the neighbour was lost by the last question, after `most` of silence and enough questions, or `longest`.
+    /// Returns true if the neighbour was lost after `most` of silence and enough questions, or `longest`.
     pub(crate) fn is_to_be_missed(&self, most: Duration, longest: Duration) -> bool {
         let Some((_, asked)) = self.asked.last() else {
             return false;

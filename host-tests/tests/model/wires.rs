@@ -45,7 +45,7 @@ pub(crate) struct Ended {
     pub(crate) broken: u32,
 }
 
-/// Links of a chain: link `k` connects relays `k` and `k + 1`, counted from 0; its line `2 k` goes downstream.
+/// Links of a chain: link `k` connects relays `k` and `k + 1`, from 0; its line `2 k` goes downstream.
 #[derive(Debug)]
 pub(crate) struct Wires {
     lines: Vec<Line>,

@@ -1,6 +1,4 @@
-//! Best chain by dynamic programming over grids of positions, which are then refined around good chains.
-//!
-//! It shares no formula with the code under test. Its chains are real, so the result never exceeds the optimum.
+//! Best chain by dynamic programming over successively refined grids, without the crate's formulas.
 
 use uav_relay_scenario::scene::Scene;
 
@@ -28,7 +26,7 @@ const SHRINK: f64 = 0.6;
 /// SIR and positions of a chain.
 type Found = (f64, Vec<f64>);
 
-/// Returns the SIR of the best chain at altitude `h`; 0 where the separation leaves no chain on the first grid.
+/// Returns the SIR of the best chain at altitude `h`; 0 if the separation leaves no chain on the grid.
 pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     let d = scene.distance_m;
     let mut grid: Vec<f64> = (0..=CELLS)
@@ -62,7 +60,7 @@ pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     refined.fold(0.0, f64::max)
 }
 
-/// Returns the best chains with relay k on `grids[k - 1]`, one for each of `parts` segments for relay 1, best first.
+/// Returns the best chains with relay k on `grids[k - 1]`, one for each of `parts` segments for relay 1.
 fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
     let d = scene.distance_m;
     let (mut worth, mut ways) = (at_last(scene, h, &grids[grids.len() - 1]), Vec::new());

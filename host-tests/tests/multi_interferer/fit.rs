@@ -1,4 +1,4 @@
-//! Hypothetical interferer in known cases: a separate program's values, one source, sources at one position.
+//! Hypothetical interferer in known cases: published values, one source, sources at one position.
 
 use std::time::Instant;
 

@@ -1,6 +1,4 @@
-//! SIR lost by placing a chain with the hypothetical interferer instead of the true sum.
-//!
-//! The relays' own algorithms place `COUNT` scenes of each kind (30 if unset); a table is printed.
+//! SIR lost by placing a chain with the hypothetical interferer; `COUNT` scenes of each kind (30 if unset).
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,4 @@
-//! Several interferers: true sum, hypothetical interferer, best chain and polishing, compared with the reference, a separate
-//! program, random positions and brute force.
+//! Several interferers: sum, hypothetical interferer, best chain and polishing, compared with references.
 //!
 //! Random tests use the environment variable `SEED`, which each prints.
 

@@ -48,7 +48,7 @@ fn checked(scene: &Scene, start: &[impl Copy + Into<Place>], band: Corridor) -> 
     found
 }
 
-/// Compares with the known optimum at one altitude: it is never exceeded, and nearly reached from three of four even starts.
+/// Compares with the optimum at one altitude, which three of four even starts nearly reach.
 #[test]
 fn at_one_altitude_it_stays_below_the_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(79));
@@ -73,7 +73,7 @@ fn at_one_altitude_it_stays_below_the_optimum() {
     assert!(4 * reached > 3 * count && start_reached < reached / 2);
 }
 
-/// Checks that from the best common altitude the chain approaches the joint optimum of one source, without exceeding it.
+/// Checks that the chain approaches the joint optimum of one source without exceeding it.
 #[test]
 fn in_a_band_it_comes_near_the_joint_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(80));

@@ -67,7 +67,7 @@ fn hop_sinrs_agree_with_the_reference() {
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// Compares chains of 1 to 50 identical relays, at any noise, with the optimum: within 1e-4 and never above.
+/// Compares chains of 1 to 50 identical relays in noise with the optimum: within 1e-4, never above.
 #[test]
 fn the_optimum_is_found_in_noise() {
     let count = count(1_000);

@@ -7,7 +7,7 @@ use uav_relay::optimiser::plan;
 use uav_relay::{Field, FieldPoint, Interference, Mission, MissionConfig, Schedule, sir};
 use uav_relay_oracle::random::{self, log_uniform};
 
-/// Returns E[f(u)] for u = I / I_max of a Beta distribution, by its density on a grid that is fine at both ends.
+/// Returns E[f(u)] for u = I / I_max of a Beta distribution, by its density on a grid.
 fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     // u = 1 / (1 + e^-z): the density in z is proportional to u^alpha (1 - u)^beta.
     let (mut sum, mut weight) = (0.0, 0.0);
@@ -22,7 +22,7 @@ fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     sum / weight
 }
 
-/// Compares the upper bound with the mean, and with the lower bound 1 / (E[I] + N), for a scenario's shapes.
+/// Compares the mean with the upper bound and with the lower bound 1 / (E[I] + N).
 #[test]
 fn noise_in_a_field_is_bounded_from_above() {
     let mut worst = Vec::new();

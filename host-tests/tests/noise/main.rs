@@ -1,6 +1,4 @@
-//! Receiver noise: SINR in place of SIR, compared with f64 references that use received powers alone.
-//!
-//! The environment variable `COUNT` sets the number of random chains or scenes, `SEED` selects others.
+//! Receiver noise: SINR in place of SIR, compared with references; `COUNT` and `SEED` select chains or scenes.
 
 mod chains;
 mod field;

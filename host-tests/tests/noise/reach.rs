@@ -82,9 +82,7 @@ fn target(rng: &mut impl Rng, of: &Drawn) -> f32 {
     (sir * (1.0 + log_uniform(rng, 1e-6, 1e-2))).min(1e30) as f32
 }
 
-/// Checks that a reach is between the exact reaches for targets a millionth higher and lower.
-///
-/// Two f32 steps of a position at D are tolerated.
+/// Checks that a reach is within the exact reaches of targets a millionth apart, and two f32 steps.
 #[test]
 fn reaches_in_noise_agree_with_the_reference() {
     const NEAR: f64 = 1e-6;

@@ -84,9 +84,7 @@ fn hop_sirs_agree_with_the_reference() {
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// Checks that a reach is between the exact reaches for targets a millionth higher and lower.
-///
-/// Two f32 steps of a position at D are tolerated.
+/// Checks that a reach is within the exact reaches of targets a millionth apart, and two f32 steps.
 #[test]
 fn reaches_agree_with_the_reference() {
     const NEAR: f64 = 1e-6;
@@ -216,9 +214,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
     assert!(met > 5_000, "{met}");
 }
 
-/// Compares identical relays with the optimum, which is reached to the tolerance and never exceeded.
-///
-/// N 1 to 50, D 10 m to 100 km, the interferer anywhere, also on the line.
+/// Compares 1 to 50 identical relays with the optimum, D 10 m to 100 km, the interferer anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let (mut solved, mut hopeless, mut most_sweeps, mut worst) = (0, 0, 0, 0.0_f64);
@@ -251,9 +247,7 @@ fn the_optimum_is_found_on_random_links() {
     assert!(most_sweeps <= 7, "{most_sweeps} sweeps");
 }
 
-/// Checks that unlike relays meet their agreed target, which is never above the optimum.
-///
-/// With different altitudes the farthest chain is not always the best one, so the optimum itself is not promised.
+/// Checks that unlike relays meet their agreed target, which is not always the optimum but never above.
 #[test]
 fn mixed_chains_meet_what_they_agree_on() {
     let (mut solved, mut best_of, mut most_sweeps) = (0, 0, 0);
@@ -302,7 +296,7 @@ fn mixed_chains_meet_what_they_agree_on() {
     );
 }
 
-/// Checks a chain with own altitudes that meets 37 743 but misses 31 292, between which the bracket once oscillated for ever.
+/// Checks a chain that meets 37 743 but misses 31 292, where the search once oscillated for ever.
 #[test]
 fn a_target_that_is_met_counts_though_a_lower_one_is_missed() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);

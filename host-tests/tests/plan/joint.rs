@@ -1,4 +1,4 @@
-//! Plans with altitudes and sides, compared with the relays' agreement and with the reference of the joint problem.
+//! Plans with altitudes and sides, compared with the relays' agreement and the reference optimiser.
 
 use std::collections::BTreeMap;
 
@@ -97,7 +97,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// Returns the relative shortfall of a plan's SIR from the relays' agreement; minus infinity without an agreement.
+/// Returns the relative shortfall of a plan's SIR from the relays' agreement; -inf without one.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
     1.0 - free(scenario, Number::Of(relays)).sir() / agreed(scenario, relays)
 }

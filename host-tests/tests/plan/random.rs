@@ -16,8 +16,7 @@ fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// Draws a scenario: one interferer, several or a field; a band; lateral room or a separation in half; own relay profiles in a
-/// third.
+/// Draws a scenario: interferers or a field, a band, lateral room, a separation, own relay profiles.
 fn scenario(rng: &mut impl Rng) -> Scenario {
     let style = Style {
         relays: 1..=1,

@@ -100,8 +100,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
             after.handle_timeout(lost);
             drain(&mut after, lost);
         }
-        // The neighbour is asked again, and lost after `dead_after` and sixteen questions, or three times as many as it had left
-        // open.
+        // The neighbour is lost after `dead_after` and sixteen questions, or three times as many as were open.
         let due = heard + Duration::from_millis(15_000);
         let longest = heard + Duration::from_millis(8 * 15_000);
         let latest = longest + Duration::from_millis(157 * 9 / 8);

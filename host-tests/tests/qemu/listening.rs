@@ -1,4 +1,4 @@
-//! Emulated drones that find the interferer by their radios, and end where the simulated chain does with the same measurements.
+//! Emulated drones that find the interferer by their radios, compared with the simulated chain.
 
 use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::MavLandedState;
@@ -18,7 +18,7 @@ use crate::fleet::Fleet;
 use crate::log::Line;
 use crate::vehicle::{Vehicle, apart};
 
-/// Settings with a late first query and no fading, so that results do not depend on the clock's difference to the simulation.
+/// Settings with a late first query and no fading, so that the clock's difference has no effect.
 const LISTENING: &str = "[geometry]\naltitude_m = 30\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n\
     [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
     rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n\

@@ -53,7 +53,7 @@ pub(crate) fn table(image: &Path) -> Table {
         .expect("an image with a defmt table")
 }
 
-/// Decodes lines until the drone is switched off; undecodable data becomes a line too, so that tests notice it.
+/// Decodes lines until the drone is switched off; undecodable data becomes a line too.
 pub(crate) fn listen(
     mut port: UnixStream,
     drone: u16,

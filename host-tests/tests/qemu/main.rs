@@ -1,8 +1,7 @@
-//! Firmware image in QEMU: chains of emulated drones end in the positions of the simulated chain, to the bit.
+//! Firmware image in QEMU: emulated drones end in the simulated chain's positions, to the bit.
 //!
-//! Every drone is a process with the same ELF as on an STM32F405, and a configuration block in its flash. The medium between
-//! them paces bytes and may damage them; logs are decoded like `defmt-print` does. Without `qemu-system-arm` these tests fail
-//! with a hint. For a chain of 20: `-- --ignored`.
+//! Every drone is a process with the same ELF as on an STM32F405 and a configuration block in its flash, on a medium that paces
+//! bytes and may damage them. Without `qemu-system-arm` these tests fail with a hint. For a chain of 20: `-- --ignored`.
 #![cfg(unix)]
 
 mod chain;

@@ -1,4 +1,4 @@
-//! Emulated drones that choose altitudes, with long computations, and drones in a field, where passes start at relay N.
+//! Emulated drones that choose altitudes, and drones in a field, where passes start at relay N.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use uav_relay_tools::provision::block::Flight;
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// Returns a flight past an interferer at `y_m`; `aside_m` is the lateral room, `held` one relay's fixed altitude.
+/// Returns a flight past an interferer at `y_m` with lateral room `aside_m` and one `held` altitude.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {

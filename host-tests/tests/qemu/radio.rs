@@ -22,7 +22,7 @@ fn five_on_one_radio_settle_where_the_simulated_chain_does() {
     }
 }
 
-/// Checks that after drone 3 is killed the others form a chain of four in that chain's positions, to the bit.
+/// Checks that after drone 3 is killed the others take the positions of a chain of four, to the bit.
 #[test]
 fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     let flight = paper(5);

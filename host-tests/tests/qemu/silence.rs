@@ -12,15 +12,12 @@ use crate::fleet::{Fleet, Image, OF_THE_CHIP};
 use crate::log::Line;
 use crate::methods::field;
 
-/// Tolerance for delays of this machine, in microseconds of the drones' clock.
+/// Tolerance for delays of this machine, in microseconds of the drones' clock, which runs 10.5 times too fast.
 ///
-/// That clock runs 10.5 times as fast as the wall clock even while an emulator waits for a processor, so 50 ms of waiting are
-/// half a second. `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
+/// `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
 const SLACK: u64 = 525_000;
 
-/// Checks that both neighbours report a loss in the time given by the settings.
-///
-/// The times are those of the drones' fast clocks, read just before the drone is killed; the wall time between is tolerated.
+/// Checks the time of detection by the drones' clocks, read just before the drone is killed.
 #[test]
 fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let flight = paper(5);

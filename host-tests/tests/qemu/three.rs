@@ -19,7 +19,7 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of late-link releases in OFFBOARD that MAVSDK's pilot has handled, and whether OFFBOARD is due again.
+    /// Number of late-link releases handled by MAVSDK's pilot, and whether OFFBOARD is due again.
     found: usize,
     chooses: bool,
 }
@@ -47,8 +47,7 @@ impl Three {
         }
     }
 
-    /// Chooses another mode after a late link released the first drone, as on a busy computer, and OFFBOARD once the relay is
-    /// ready.
+    /// Chooses another mode after a late link released the first drone, and then OFFBOARD again.
     fn choose_again(&mut self) {
         let count = |text: &str| {
             self.fleet

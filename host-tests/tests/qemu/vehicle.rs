@@ -27,9 +27,7 @@ const FASTEST_M_S: f32 = 8.0;
 /// Time for which the pilot chooses another mode, ms: six heartbeats.
 const ELSEWHERE: u64 = 1_500;
 
-/// Messages sent on their own or on request, and their intervals, ms.
-///
-/// Heartbeats are frequent because this process may be delayed while the drones' clock goes on.
+/// Messages and their intervals, ms; heartbeats are frequent because this process may be delayed.
 const HEARTBEAT: u32 = 0;
 const POSITION: u32 = 33;
 const TARGET: u32 = 87;
@@ -62,7 +60,7 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// True if the pilot wants OFFBOARD or GUIDED, chosen again when the relay asks for it; else the sticks are in control.
+    /// True if the pilot wants OFFBOARD or GUIDED, and chooses it again on request; else the sticks fly.
     pub(crate) granted: bool,
     /// Time until which the pilot chooses another mode, ms.
     elsewhere_until: u64,

@@ -1,4 +1,4 @@
-//! Watchdog registers written by the image, from QEMU's trace. QEMU has no watchdog, so a watchdog reset is untested.
+//! Watchdog registers written by the image, from QEMU's trace; QEMU has no watchdog to reset the chip.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

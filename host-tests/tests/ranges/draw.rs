@@ -52,7 +52,7 @@ const FIELDS: [Field; 6] = [
     ]),
 ];
 
-/// Draws a mission of at most `most` relays; `None` where the numbers contradict each other, which is refused by name.
+/// Draws a mission of at most `most` relays; `None` where the numbers contradict each other.
 pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
     let distance_m = scaled(rng, 1_000.0, 1.0, 1e6);
     let relays = rng.random_range(1..=most);

@@ -8,7 +8,7 @@ use uav_relay::{
     Duration, Event, Identity, Instant, Mission, Phase, Placement, Port, Relay, Settings, Wiring,
 };
 
-/// Turns of the loop at one time after which a chain counts as stuck: far more than the longest computation takes.
+/// Turns of the loop at one time after which a chain counts as stuck.
 const MOST_TURNS: u32 = 400_000;
 
 pub(crate) struct Line {

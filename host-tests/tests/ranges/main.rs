@@ -1,6 +1,4 @@
-//! Every input of the public API over its whole range: the chain agrees, numbers are finite, and there is no panic.
-//!
-//! The environment variable `COUNT` sets the number of chains of each test, `SEED` the first seed.
+//! Every input of the public API over its whole range; `COUNT` sets the number of chains, `SEED` the first seed.
 
 use std::panic::catch_unwind;
 

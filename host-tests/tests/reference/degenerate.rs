@@ -120,7 +120,7 @@ fn going_farthest_is_not_best_at_different_altitudes() {
     assert!(link.chain_sir(&link.placement(best).unwrap()) >= best * (1.0 - 1e-14));
 }
 
-/// Checks an interferer behind Tx: hop 1 is better away from Tx, so the fixed step has to start at a higher target.
+/// Checks an interferer behind Tx, where the fixed step has to start at a higher target.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Station {

@@ -1,4 +1,4 @@
-//! f64 reference, compared with a separate program, with brute force, and with itself where two methods must agree.
+//! f64 reference, compared with a separate program, with brute force, and between its methods.
 
 use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::reference::{Link, Station};

@@ -82,9 +82,7 @@ fn reaches_agree_with_a_scan() {
     assert!(inside > 500 && hills > 100 && blocked > 100);
 }
 
-/// Compares with brute force over the positions.
-///
-/// Returns the number of links where the farthest chain is below the optimum.
+/// Compares with brute force. Returns the number of links whose farthest chain is below the optimum.
 fn search_agrees(seed: u64, count: u32, n: u32, chain: Chain, points: u32) -> u32 {
     let (mut mixed_gains, mut dead) = (0, 0);
     for_links(
@@ -131,7 +129,7 @@ fn two_relays_agree_with_brute_force() {
     search_agrees(22, 200, 2, Chain::Any, 32);
 }
 
-/// Checks different altitudes, where the farthest chain is not always optimal and the optimum needs sets of positions.
+/// Checks different altitudes, where the optimum needs sets of positions.
 #[test]
 fn two_relays_at_different_altitudes_agree_with_brute_force() {
     assert!(search_agrees(23, 300, 2, Chain::Own, 32) > 0);

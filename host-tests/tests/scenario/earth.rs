@@ -103,7 +103,7 @@ fn what_is_no_place_on_the_line_is_refused() {
     refused(&nowhere, Problem::NoSite, &parts);
 }
 
-/// Checks towers by the change of interference that they cause: (d^2 + h^2) / (d^2 + (h - t)^2) in decibels.
+/// Checks towers by the change of interference, (d^2 + h^2) / (d^2 + (h - t)^2) in decibels.
 #[test]
 fn an_interferer_on_a_tower_is_refused_where_that_matters() {
     let azimuth = "lat_deg = 47.404\nlon_deg = 8.548";

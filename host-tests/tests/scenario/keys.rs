@@ -2,8 +2,7 @@
 
 use super::*;
 
-/// Scalar key: its path, the file around it with `@` for the value, a value below the range, both limits, one above, and the
-/// stated range.
+/// Scalar key: path, file with `@` for the value, a value below, both limits, one above, the stated range.
 struct Row {
     key: &'static str,
     file: String,

@@ -119,10 +119,7 @@ fn milliwatts(dbm: f64) -> f64 {
     10_f64.powf(dbm / 10.0)
 }
 
-/// Compares the SINRs of random links with two relays with the link budget.
-///
-/// They are equal with one receiving gain; with two, those of the relays or the receiver are equal and the others are
-/// underestimated.
+/// Compares SINRs with the link budget: equal, or for unequal receiving gains lower bounds.
 #[test]
 fn the_chain_has_the_sinrs_of_a_link_budget() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);

@@ -18,9 +18,7 @@ const RELAYS: u16 = 5;
 /// Additional loss of the ground path, which the mission does not know: the receiver is behind a hill.
 const HILL: f64 = 8.0;
 
-/// Runs chains whose ends have a key and a radio.
-///
-/// Returns the relative error of the first relay's estimate at the receiver, if any, and the fraction of the optimum.
+/// Returns the error of the first relay's estimate at the receiver, if any, and the fraction of the optimum.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
         let wild = Wild::new(seed, RELAYS, 1);
@@ -78,7 +76,7 @@ fn what_the_receiver_says_on_the_air_is_believed_by_all() {
     }
 }
 
-/// Checks that measurements help: otherwise the last hop uses the mission's ground path, which the hill falsifies.
+/// Checks that measurements help: without them the last hop uses the mission's wrong ground path.
 #[test]
 fn it_is_worth_something() {
     let told = flown(|_| {});

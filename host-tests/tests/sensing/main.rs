@@ -1,6 +1,4 @@
-//! Chains that find an unknown interferer in random scenes, compared with chains that know it.
-//!
-//! The environment variable `COUNT` sets the scenes of each row, `SEED` the first one.
+//! Search for an unknown interferer in random scenes; `COUNT` sets the scenes of each row, `SEED` the first.
 
 mod ends;
 mod following;

@@ -9,7 +9,7 @@ use super::{all, chain, extent, has_text, level, number, tip};
 /// Bottom of the view from the side, without the legend.
 const SIDE: f64 = 282.0;
 
-/// Returns a chain that bends to the left, away from an interferer on its right, over `edge` of half the room.
+/// Returns a chain that bends to the left of its interferer, over `edge` of half the room.
 fn swung(relays: usize, edge: f64) -> Picture {
     let picture = chain(relays, 1000.0, |share| 20.0 + 800.0 * share * (1.0 - share));
     let share = |number: usize| number as f64 / (relays as f64 + 1.0);
@@ -75,7 +75,7 @@ fn without_room_beside_the_line_there_is_one_view() {
     assert!(all(&document, "line", "edge").is_empty());
 }
 
-/// Checks relays on the line with an interferer beside it, which seems to be below the chain from the side alone.
+/// Checks an interferer beside a straight chain, which seems to be below it in a side view.
 #[test]
 fn an_interferer_beside_the_line_is_seen_beside_it() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();

@@ -3,9 +3,7 @@
 use super::scene::Scene;
 
 impl Scene {
-    /// Returns the best SIR over the box `x` by `h`.
-    ///
-    /// It searches lines in both directions, edges included, and then the plane around the three best points.
+    /// Returns the best SIR over the box `x` by `h`, by searches along lines and around the best points.
     pub(crate) fn brute(&mut self, x: (f64, f64), h: (f64, f64)) -> f64 {
         let lines = |(low, high): (f64, f64)| {
             if low < high {
@@ -69,9 +67,7 @@ impl Scene {
     }
 }
 
-/// Returns the maximum of `f` over `range` and its position.
-///
-/// Samples are even, and denser at the ends and at `near`; golden section refines the best three.
+/// Returns the maximum of `f` over `range` and its position, by samples, denser at `near`, and golden section.
 fn along(range: (f64, f64), near: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     let (low, high) = range;
     let mut at = vec![low, high];

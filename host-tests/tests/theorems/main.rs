@@ -1,6 +1,4 @@
-//! Single relay and interferer: Lemmas 1 and 2, Corollary 1, Theorems 1 to 3 and lateral room, compared with brute force.
-//!
-//! The environment variables `COUNT` and `SEED` select other scenarios.
+//! Single relay and interferer: lemmas and theorems compared with brute force; `COUNT` and `SEED` select scenarios.
 
 mod aside;
 mod brute;

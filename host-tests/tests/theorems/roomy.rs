@@ -39,7 +39,7 @@ impl Roomy {
         Self::new(Scene::new(&link, silent.scene.band), silent.lateral)
     }
 
-    /// Draws a scene, some with the interferer on the line or next to Tx or Rx; room on both sides, one, or none.
+    /// Draws a scene, some with the interferer on the line or at an end; room on both sides, one, or none.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let mut scene = Scene::random(rng);
         let d = scene.link.distance_m;
@@ -96,9 +96,7 @@ impl Roomy {
         [(0.0, self.scene.link.distance_m), self.lateral, band]
     }
 
-    /// Returns the best SIR over the box.
-    ///
-    /// It uses a grid that is denser at the ends of hops, and random searches from the best well separated points.
+    /// Returns the best SIR over the box, by a grid and random searches from its best separated points.
     pub(crate) fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
         let of = [
@@ -132,9 +130,7 @@ impl Roomy {
             .fold(0.0, f64::max)
     }
 
-    /// Returns the best SIR of a random search from `at` with shrinking steps.
-    ///
-    /// The best positions are on ridges, which axis-parallel steps would not follow.
+    /// Returns the best SIR of a random search from `at`. Axis-parallel steps would stick to ridges.
     pub(crate) fn about(&self, mut at: [f64; 3], ranges: [(f64, f64); 3]) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut most = self.sir(at);

@@ -36,7 +36,7 @@ impl Scene {
         }
     }
 
-    /// Draws a scene of 10 m to 100 km with the interferer anywhere, also on Tx or Rx; lowest altitude 0.002 to 0.5 of D.
+    /// Draws a scene of 10 m to 100 km with the interferer anywhere; lowest altitude 0.002 to 0.5 of D.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let style = Style {
             relays: 1..=1,

@@ -7,7 +7,7 @@ use super::*;
 /// Start of the upload.
 const AT: Instant = seconds(20);
 
-/// Runs `setup` with an upload of `config`. Returns the time until the last relay has its position, ms, and the bytes.
+/// Runs `setup` with an upload of `config`. Returns the time until all have positions, ms, and the bytes.
 fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     let mut calm = setup.clone();
     calm.partitions.clear();

@@ -1,6 +1,4 @@
-//! Upload of a mission in flight, from the ground station at either end to all relays or none.
-//!
-//! The environment variables `COUNT` and `SEED` select other schedules.
+//! Upload of a mission in flight to all relays or none; `COUNT` and `SEED` select other schedules.
 
 mod chain;
 mod flights;

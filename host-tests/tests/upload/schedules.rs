@@ -24,9 +24,7 @@ fn drawn(base: &Mission, rng: &mut ChaCha8Rng) -> MissionConfig {
     config
 }
 
-/// Draws a schedule of one to three uploads and up to three losses.
-///
-/// Frame loss is up to 50 %, other faults up to 20 %. Losses are temporary on wires; any of the relays may forget the upload.
+/// Draws one to three uploads, up to three losses, frame loss up to 50 %, and relays that forget the upload.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let shared = rng.random_bool(0.8);
     let base = mission(8);

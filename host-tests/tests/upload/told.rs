@@ -1,4 +1,4 @@
-//! Reports to the ground station: number of relays that fly a mission, refusals, and competing ground stations.
+//! Reports to the ground station: number of relays with a mission, refusals, competing stations.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +20,7 @@ fn seed() -> u64 {
     std::env::var("SEED").map_or(1, |seed| seed.parse().unwrap())
 }
 
-/// Checks chains with losses and two ground stations: completion is reported once all relays fly the mission, and not before.
+/// Checks with losses and two ground stations that completion is reported once all fly, and not before.
 #[test]
 fn the_ground_says_flown_only_once_every_relay_flies_it() {
     let told: Vec<bool> = (0..count())
@@ -309,9 +309,7 @@ fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
     });
 }
 
-/// Checks two ground stations at once, with the same or different versions.
-///
-/// All relays fly the newer one, by version or digest; the other ground station learns that its own is outdated.
+/// Checks two ground stations at once: all fly the newer upload, and the other station learns of it.
 #[test]
 fn of_two_ground_stations_at_once_the_newer_upload_is_flown_by_all() {
     let settled: Vec<u64> = (0..count())
@@ -371,7 +369,7 @@ fn of_two_ground_stations_at_once_the_newer_upload_is_flown_by_all() {
     );
 }
 
-/// Checks a ground station that requests the mission in flight, from either end, with losses, with and without an upload.
+/// Checks that a ground station learns the mission in flight, from either end, with losses and uploads.
 #[test]
 fn the_ground_learns_which_mission_is_flown() {
     for round in 0..40 {

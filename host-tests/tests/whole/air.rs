@@ -1,5 +1,4 @@
-//! Medium that uses the public interface of `Relay` alone: event-driven clock, links that can be cut one way, reboots with
-//! stored votes.
+//! Event-driven medium on the public interface of `Relay`, with one-way links and reboots with stored votes.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -33,7 +32,7 @@ pub(crate) struct Kind {
     pub(crate) stranger: Option<(usize, Mission)>,
     /// Relay whose epoch goes back at its second start.
     pub(crate) goes_back: Option<usize>,
-    /// Relay of which a second drone exists, with the same number and key; the copy's index follows those of all relays.
+    /// Relay of which a second drone exists; the copy's index follows those of all relays.
     pub(crate) copied: Option<usize>,
 }
 
@@ -127,7 +126,7 @@ pub(crate) struct Air {
     pub(crate) groups_us: u64,
     /// Time since which the chain has been whole; `None` while it is not.
     pub(crate) whole_since_us: Option<u64>,
-    /// Time in which all relays but `spare` have flown one agreement, and the longest interruption since the first, µs.
+    /// Time in which all relays but `spare` flew one agreement, and the longest interruption, µs.
     pub(crate) spare: usize,
     pub(crate) flown_us: u64,
     pub(crate) first_us: Option<u64>,
@@ -136,7 +135,7 @@ pub(crate) struct Air {
     changed_us: u64,
     /// Frames sent, and events by relay and name.
     pub(crate) frames: u64,
-    /// Last reception between a relay and its copy, start of their both having setpoints, and its longest duration, µs.
+    /// Last reception between a relay and its copy, start of two setpoints, and longest duration, µs.
     received_us: [Option<u64>; 2],
     both_us: Option<u64>,
     pub(crate) longest_both_us: u64,
@@ -427,7 +426,7 @@ impl Air {
         drones.map(|at| self.seen[at]).collect()
     }
 
-    /// Measures how long a relay and its copy both have setpoints although both received each other within five seconds.
+    /// Measures how long a relay and its copy both have setpoints although they receive each other.
     fn compare_copies(&mut self) {
         let Some(copied) = self.kind.copied else {
             return;

@@ -1,6 +1,6 @@
-//! Recovery of the whole chain after the last of any faults, with never two chains in flight at once.
+//! Recovery of the whole chain after any faults, with never two chains in flight at once.
 //!
-//! The environment variables `COUNT` and `SEED` select other schedules; `STORY=1` prints their events.
+//! `COUNT` and `SEED` select other schedules; `STORY=1` prints their events.
 
 mod air;
 mod faults;
@@ -123,7 +123,7 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks a relay and its copy: one loses its setpoint within 2 s, and the chain is whole once one of the two is removed.
+/// Checks a relay and its copy: one loses its setpoint within 2 s; the chain is whole once one is removed.
 ///
 /// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
 #[test]
@@ -153,9 +153,9 @@ fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// Checks schedules that once never recovered, each for its own reason.
+/// Checks schedules that once never recovered.
 ///
-/// The reasons: view numbers that ran away, an idle neighbour that was switched on elsewhere, two interleaved chains, and two
+/// The reasons were view numbers that ran away, an idle neighbour switched on elsewhere, two interleaved chains, and two
 /// candidates for one position received in turn.
 #[test]
 fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
@@ -221,7 +221,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Flies chains in which some clocks step by up to ten hours; in half of them one relay is isolated for three minutes.
+/// Flies chains with clock steps of up to ten hours, half of them with a relay isolated for three minutes.
 ///
 /// Returns the number of schedules, those that recovered late, and those with two chains at once.
 fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {
@@ -262,7 +262,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks clocks that step forward. They end the wait for other relays' leases early, so two chains may fly until these expire.
+/// Checks forward clock steps, which end waits for leases early: two chains may fly until these expire.
 #[test]
 fn clocks_that_step_forward_leave_a_whole_chain_and_seldom_two_for_a_while() {
     let (count, late, two) = with_steps(true);

@@ -117,10 +117,7 @@ fn span(rng: &mut ChaCha8Rng) -> u64 {
     (seconds * 1e6) as u64
 }
 
-/// Draws a schedule of all faults.
-///
-/// They are cuts of seconds to minutes (5 %: hours), one-way and flapping links, losses, reboots, early and late starts,
-/// uploads, and in one of six schedules clocks that step back.
+/// Draws a schedule of all faults, in one of six schedules with clocks that step back.
 pub(crate) fn random(seed: u64) -> Schedule {
     let mut schedule = without_steps(seed);
     // A separate random generator leaves the rest of the schedule unchanged.
@@ -240,7 +237,7 @@ fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
     Box::new(Upload::new(base, 1, config).unwrap())
 }
 
-/// Draws a schedule on a shared channel with a copied relay, one of which is removed after all other faults.
+/// Draws a schedule with a copied relay, one of which is removed after all other faults.
 ///
 /// In half of the schedules the other copy is informed of that. Copies that do not receive each other, and cut chains, are
 /// included.

@@ -180,8 +180,8 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
 
 /// Checks the numbers that link offers to hellos.
 ///
-/// A hello's number changes `dead_after` after its first use. An offer is valid if it has one of the last two numbers, sent at
-/// most twice `dead_after` ago; a relay's offer repeats the number that it received.
+/// A number changes `dead_after` after its first use. An offer must have one of the last two, sent at most twice `dead_after`
+/// ago; a relay's offer repeats the number that it received.
 #[test]
 fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
     let (relay, peers, base) = relay_4();

@@ -141,10 +141,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     vec(step, 1..40)
 }
 
-/// Sends a relay of 8 any messages, from a position or none, and checks its bounds.
-///
-/// It must accept being drained, wake up later, keep its setpoint between Tx and Rx within the band, and keep a valid place in
-/// the chain. `expected` lists causes of setpoint changes and views that must occur.
+/// Sends a relay of 8 any messages and checks its bounds; all causes in `expected` must occur.
 #[expect(clippy::too_many_lines, reason = "all that is looked at in one flight")]
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());

@@ -24,7 +24,7 @@ pub(crate) const STRANGE: [f32; 5] = [
     f32::NEG_INFINITY,
 ];
 
-/// Returns a receiver's verdict on a body in an intact frame; an accepted body must be encoded to the same bytes.
+/// Returns a receiver's verdict on a body; an accepted body must be encoded to the same bytes.
 pub(crate) fn verdict_on(body: &[u8]) -> Result<(), MessageError> {
     match frame::decode(&plain(HEADER, body)) {
         Ok((_, message)) => {

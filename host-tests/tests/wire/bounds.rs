@@ -40,7 +40,7 @@ fn a_turn_is_written_in_one_way() {
     }
 }
 
-/// Returns the values 0 to 65535 that a message accepts at offset `at` of its body; others must be out of range.
+/// Returns the values that a message accepts at offset `at` of its body; others must be out of range.
 fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
     let fits = |number: &u16| {
         body[at..at + 2].copy_from_slice(&number.to_le_bytes());

@@ -46,8 +46,7 @@ fn a_part_that_is_cut_off_stops_calling() {
     assert!(now > Instant::from_millis(60_000));
 }
 
-/// Checks the leader of a part without a quorum: it proposes again after `probe_after` and up to an eighth more, doubled with
-/// each refusal up to eight times.
+/// Checks a leader without a quorum: it proposes again after `probe_after`, doubled with each refusal.
 #[test]
 fn a_leader_whose_part_is_cut_off_holds_and_proposes_again_and_again() {
     let mut head = relay(1, 8, Wiring::Pair);
@@ -146,7 +145,7 @@ fn a_view_far_ahead_is_reached_step_by_step() {
     }
 }
 
-/// Checks that a chain never has more relays than its mission, and no relay sends a message that others refuse.
+/// Checks that a chain never has more relays than its mission.
 #[test]
 fn more_relays_than_the_mission_has_are_stale() {
     let now = Instant::ZERO;

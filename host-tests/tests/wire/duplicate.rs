@@ -55,9 +55,7 @@ fn a_claim_of_a_neighbour_is_repeated_to_its_number() {
     }
 }
 
-/// Checks claims received directly or as a neighbour's echo.
-///
-/// A claim that does not name the relay's own may be from before its start: it is answered, without further effect.
+/// Checks claims. One that does not name the relay's own may be from before its start: it is only answered.
 #[test]
 fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
     for (wiring, port) in [
@@ -148,9 +146,7 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     (relay, frames)
 }
 
-/// Checks that with a key valid handshakes are claims: the relay becomes passive or answers once.
-///
-/// Its own handshakes, and those of another key, have no effect.
+/// Checks handshakes as claims: the relay becomes passive or answers once; its own have no effect.
 #[test]
 fn with_a_key_handshakes_are_the_claims() {
     let mut passive = 0;

@@ -129,7 +129,7 @@ fn decided_by(last: &mut Relay, proposal: Proposed) -> Decided {
     }
 }
 
-/// Checks the quorum: more than half of the earlier view's members, or half with its proposer; other relays do not count.
+/// Checks the quorum: more than half of the earlier view's members, or half with its proposer.
 #[test]
 fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
     for quorum in [true, false] {
@@ -205,8 +205,7 @@ fn a_member_adds_its_voice() {
     }
 }
 
-/// Checks that an accepted view is decided again, because it may have been agreed on; no relay enters another before the next
-/// proposal.
+/// Checks that an accepted view, which may have been agreed on, is decided again.
 #[test]
 fn what_may_have_been_agreed_on_is_decided_on_again() {
     let (mut last, mission) = last_of_20(true);
@@ -297,8 +296,7 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
     );
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(counted(head.stats()), ["received"]);
-    // All have accepted it, so it is agreed on: its members decide on the next one, and this relay, absent from it, does not
-    // vote.
+    // All have accepted the view, so its members decide on the next one; this relay does not vote.
     let next = Proposed {
         agreed: before,
         votes: 0,

@@ -1,4 +1,4 @@
-//! Messages of the joint method: sweeps with a lateral offset and collections, their ranges, counts and refusals.
+//! Messages of the joint method (lateral sweeps, profile collections): ranges, counts and refusals.
 
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::Ladder;

@@ -1,4 +1,4 @@
-//! Wire format compared with golden vectors and with a second codec, written from `FORMAT.md`; invalid data is refused.
+//! Wire format compared with golden vectors and a second codec written from `FORMAT.md`.
 //!
 //! Random tests use the environment variable `SEED` (1 if unset), which each prints.
 
@@ -42,7 +42,7 @@ mod view_strategies;
 mod views;
 mod votes;
 
-/// Returns a configuration for `cases` cases from `SEED`; a failure prints its shrunk input and leaves no file.
+/// Returns a configuration for `cases` cases from `SEED`; failures leave no file behind.
 fn config(cases: u32) -> Config {
     Config {
         cases,

@@ -188,9 +188,7 @@ impl Offer {
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// Returns the mission's digest: CRC-32C without version, base, sites and answer, and without zero noise.
-    ///
-    /// With sites, another CRC covers the digest and the sites.
+    /// Returns the mission's digest: CRC-32C of the mission, and of that with the sites, if any.
     pub(crate) fn digest(&self) -> u16 {
         // Zero noise is left out.
         let end = if self.noise_w > 0.0 { SITES } else { NOISE };

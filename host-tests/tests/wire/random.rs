@@ -149,8 +149,7 @@ fn the_draws_reach_messages_and_both_refusals() {
     const NONE: usize = 20;
 
     let mut runner = TestRunner::new(config(1));
-    // Counts for each tag: valid, wrongly encoded, out of range. Busy, Heartbeat and Pulsed are always in range, Pulse unless
-    // its lease is zero.
+    // Counts for each tag: valid, wrongly encoded, out of range.
     let mut seen = [[0; 3]; 21];
     for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();

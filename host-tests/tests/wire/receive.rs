@@ -1,4 +1,4 @@
-//! Relay that receives random data: each frame is counted once as documented, without panics or setpoints from noise.
+//! Relay that receives random data: each frame is counted once, without panics or setpoints.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -87,7 +87,7 @@ pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
     names
 }
 
-/// Returns the documented counter for the bytes between two delimiters, at relay `own` of 8 with these neighbours.
+/// Returns the documented counter for the bytes between two delimiters, at relay `own` of 8.
 fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port) -> &'static str {
     let plain = match unstuffed(chunk) {
         Ok(plain) => plain,
@@ -171,7 +171,7 @@ fn near_relay_4() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Feeds relay `index` of 8 with random pieces at random ports, and compares every counter; all of `expected` must occur.
+/// Feeds relay `index` of 8 with random pieces; all counters of `expected` must occur.
 fn fed_with_anything(
     interference: Interference,
     index: u16,

@@ -1,6 +1,4 @@
-//! Refusals in spite of a valid CRC, with their reasons: versions, malformed bodies, numbers out of range.
-//!
-//! `document.rs` tests the rows of the document.
+//! Refusals in spite of a valid CRC: versions, bodies, ranges; `document.rs` tests the document's rows.
 
 use uav_relay::wire::frame::{self, FrameError};
 use uav_relay::wire::message::MessageError;

@@ -8,8 +8,7 @@ use super::kinds::{FIRST, one_of_each, sent};
 use super::receive::{counted, relay};
 use super::votes::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
 
-/// Checks that hellos are accepted from up to four nodes away; other frames of strangers count as misaddressed and cause a
-/// hello.
+/// Checks hellos from up to four nodes away; other frames of strangers count as misaddressed.
 #[test]
 fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
     let now = Instant::ZERO;
@@ -63,8 +62,6 @@ fn relay_of_12(own: u16) -> Relay {
 }
 
 /// Checks a neighbour that reports no neighbour: messages wait until it chooses this relay again.
-///
-/// If it reports a newer view by then, one of the two has missed something.
 #[test]
 fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
     let now = Instant::ZERO;

@@ -1,4 +1,4 @@
-//! Peer with the key, by the rules of `FORMAT.md`: a neighbour of the relay under test, or a ground station.
+//! Peer with the key, by the rules of `FORMAT.md`: a neighbour or a ground station.
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;

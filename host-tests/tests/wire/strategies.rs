@@ -1,4 +1,4 @@
-//! Random valid messages with all extremes, nearly valid bodies, headers and streams.
+//! Random messages, nearly valid bodies, headers and streams.
 //!
 //! Nested strategies are boxed: by value their trees overflow the stack of a test's thread.
 

@@ -1,4 +1,4 @@
-//! Deframer: independent of how the stream is cut, no frame from an oversized one, and comparison with another COBS.
+//! Deframer: independence of cuts, oversized frames, and comparison with another COBS implementation.
 
 use proptest::collection::vec;
 use proptest::prelude::*;

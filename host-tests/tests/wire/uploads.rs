@@ -1,4 +1,4 @@
-//! Uploads message by message as documented: offers, proposals of another mission, reboots. `ground` tests ground stations.
+//! Uploads message by message: offers, proposals of another mission, reboots.
 
 use host_tests::fixtures::paper;
 use uav_relay::UploadError;
@@ -319,8 +319,7 @@ fn the_node_after_is_offered_the_mission_before_the_proposal() {
     both(&mut relay);
     let proposal = |place| forming(11, 1, mission_id(&newer), place);
     peers[0].says(&mut relay, NOW, &proposal(3));
-    // The neighbour has sent no hello that an offer could answer, so it is asked for one. The relay takes part in a proposal and
-    // is no longer fresh.
+    // The neighbour has sent no hello that an offer could answer, so it is asked for one.
     let asks = Greeting {
         newest: id(1, 1),
         behind: 4,

@@ -195,9 +195,7 @@ fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() 
     }
 }
 
-/// Checks that an accepted view counts only after a pass or renewal in it, which proves that all have accepted it.
-///
-/// Until then the relay is a member of the earlier view and reports its acceptance.
+/// Checks that an accepted view counts only after a pass or renewal in it: all have then accepted it.
 #[test]
 fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
     let now = Instant::ZERO;
@@ -236,7 +234,7 @@ fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
     }
 }
 
-/// Checks renewals and completions: the next renewal grants the lease, and its expiry causes a view request.
+/// Checks lease renewals: the next one grants the lease, and its expiry causes a view request.
 #[test]
 fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
     let view = id(3, 2);

@@ -41,8 +41,7 @@ pub(crate) fn mark(view: u32) -> u16 {
 /// Time for which a booted relay may be relied on, in tenths of a second: `dead_after`.
 pub(crate) const RELIED: u16 = 150;
 
-/// Returns the proposal of `view` that the relay at `place` forwards, where all up to there are booted members of the loaded
-/// chain.
+/// Returns the proposal of `view` forwarded at `place`, with votes of all booted relays up to there.
 pub(crate) fn proposed(view: u32, of: (u16, u16), place: u16, relays: u16) -> Proposed {
     Proposed {
         call: Call { of, view, place },

@@ -57,7 +57,7 @@ impl Swept {
         })
     }
 
-    /// Returns true if the ladder is valid, has at least as many targets as reaches, and all numbers are in range.
+    /// Returns true if the ladder is valid with enough targets, and all numbers are in range.
     pub(super) fn in_range(&self) -> bool {
         let targets = targets(self.anchor.abs(), self.gap, self.growth);
         (self.gap > 0 || self.growth == 0)
@@ -87,9 +87,7 @@ impl Swept {
     }
 }
 
-/// Returns a ladder's targets.
-///
-/// Each step is computed in f64 and rounded, which equals one f32 operation because f64 has more than twice the digits.
+/// Returns a ladder's targets; each step is rounded from f64, which equals one f32 operation.
 pub(crate) fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];
