@@ -7,7 +7,6 @@ use std::time::Instant;
 
 use micromath::F32;
 
-/// Measure of an error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Error {
     /// Fraction of the exact value.

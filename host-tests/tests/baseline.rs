@@ -14,7 +14,6 @@ fn scene(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// Returns the relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }
@@ -131,7 +130,7 @@ fn a_chain_with_more_relays_than_the_signal_needs_keeps_its_proportions() {
     assert!(off(places[1] - places[0], step * 1000.0 / whole) < 1e-9);
 }
 
-/// Checks the same with a weaker Tx, whose relay is above it.
+/// Checks a weaker Tx, which gets a relay right above it.
 #[test]
 fn the_weaker_ground_station_has_its_relay_above_it() {
     let mut link = Link::paper(60);
@@ -189,7 +188,6 @@ fn the_same_seed_draws_the_same_chains_and_another_others() {
     assert_ne!(mean(&scene(&link), 100, 1), mean(&scene(&link), 100, 2));
 }
 
-/// Compares the standard error with the scatter of the means of many seeds.
 #[test]
 fn the_standard_error_is_the_scatter_of_means() {
     let link = Link::paper(8);

@@ -110,7 +110,7 @@ fn random_links_settle_at_their_optimum_with_and_without_prediction() {
     assert!(hopeless > 0);
 }
 
-/// Compares the paper's step of 0.1: the same number of targets and the same last one.
+/// Compares the paper's step of 0.1: number of targets, and last target.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [

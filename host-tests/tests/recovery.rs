@@ -111,7 +111,6 @@ fn the_chain_that_is_left_is_as_good_as_a_new_one() {
     }
 }
 
-/// Checks that without a quorum the last of two relays continues alone.
 #[test]
 fn without_a_quorum_the_last_relay_goes_on() {
     let mut setup = losing(2, 1);

@@ -85,7 +85,6 @@ fn the_worked_handshake_is_taken_and_the_crate_makes_the_same_tags() {
     assert_eq!(Key::new(key()).tag(nonce(5, 1), nonce(9, 2), signed), tag);
 }
 
-/// Checks the lengths in the document.
 #[test]
 fn the_lengths_of_the_document_are_those_of_the_crate() {
     let (table, wire) = worked("a handshake");

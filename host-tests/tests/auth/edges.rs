@@ -46,7 +46,7 @@ impl Link {
         self.give(&handshake.signed(&KEY, nonces))
     }
 
-    /// Sends a heartbeat with this counter.
+    /// Sends a heartbeat with the given counter.
     fn say(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);

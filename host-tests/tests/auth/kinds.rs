@@ -9,7 +9,6 @@ use uav_relay_oracle::random::seed;
 use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, handshake, nonce, plain};
 use super::net::{Heard, NETWORK, Net};
 
-/// Kind of an attack.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
     /// Frame recorded since both ends started.

@@ -47,7 +47,7 @@ pub(crate) enum Deed {
     Reboot(u16),
     /// The relay reboots with its stored upload.
     Resume(u16),
-    /// The ground station at that end uploads this version.
+    /// The ground station at the given end uploads a mission of the given version.
     Upload(Side, u16),
     /// The leader restarts the agreement.
     Restart,
@@ -58,7 +58,6 @@ pub(crate) struct Net {
     pub(crate) relays: Vec<Relay>,
     /// Ground stations at the transmitter and the receiver.
     pub(crate) grounds: [Ground; 2],
-    /// Stored upload of each relay.
     stored: Vec<Option<Upload>>,
     /// Number of starts of each relay, its epoch.
     pub(crate) lives: Vec<u32>,
@@ -66,7 +65,6 @@ pub(crate) struct Net {
     pub(crate) heard: Vec<Heard>,
     /// Indices of offers of a newer mission.
     pub(crate) offers: Vec<usize>,
-    /// Indices of handshakes.
     pub(crate) handshakes: Vec<usize>,
     /// Genuine messages received by each relay since its start.
     pub(crate) genuine: Vec<u32>,
@@ -157,7 +155,6 @@ impl Net {
         self.proven.get(&(from, to)) == Some(&(self.life(from), self.life(to)))
     }
 
-    /// Returns true if a frame has arrived.
     pub(crate) fn has_arrived(&self, heard: &Heard) -> bool {
         self.under_way
             .front()
@@ -372,7 +369,7 @@ pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, start: (u32, Instant)) 
     started(of, index, wiring, start, None)
 }
 
-/// Creates such a relay with its stored upload, if any.
+/// Creates relay `index` of `of` with its stored upload, if any.
 fn started(
     of: u16,
     index: u16,

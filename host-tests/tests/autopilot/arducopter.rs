@@ -70,7 +70,6 @@ fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
     assert_eq!(vehicle.targets_since(from), [], "told often enough");
 }
 
-/// Checks that a refused moving target raises the event at once.
 #[test]
 fn a_moving_target_that_is_not_taken_is_an_event() {
     let mut vehicle = flying();

@@ -22,7 +22,6 @@ const FLIGHT_S: u64 = 240;
 /// Time in which the link learns of a mode: a second, with at most 2 s of delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 
-/// Faults of a cable.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Fault {
     None,

@@ -20,7 +20,6 @@ pub(crate) struct Rig {
     pub(crate) targets: u32,
     pub(crate) fastest_m_s: f64,
     pub(crate) farthest_x_m: f64,
-    /// True while the cable is cut.
     pub(crate) is_cut: bool,
 }
 
@@ -50,7 +49,6 @@ impl Rig {
         self.real.choose(self.now, mode)
     }
 
-    /// Restarts the companion.
     pub(crate) fn restart(&mut self) {
         self.link = Autopilot::new(axis(), Pace::default(), self.now);
     }

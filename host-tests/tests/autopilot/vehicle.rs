@@ -112,7 +112,6 @@ pub(crate) struct Vehicle {
     goal: Option<Target>,
     pub(crate) mute: bool,
     pub(crate) takes_targets: bool,
-    /// True if the autopilot reports its target.
     pub(crate) says_targets: bool,
     /// True if the autopilot answers TIMESYNC.
     pub(crate) echoes: bool,
@@ -328,7 +327,6 @@ impl Vehicle {
         }
     }
 
-    /// Returns the own position as a target.
     fn own_goal(&self) -> Option<Target> {
         let Geodetic {
             lat_e7,
@@ -437,7 +435,6 @@ impl Vehicle {
         target
     }
 
-    /// Returns all targets so far.
     pub(crate) fn targets(&self) -> Vec<(Instant, Target)> {
         let all = self.said.iter();
         all.filter_map(|(at, said)| match said {

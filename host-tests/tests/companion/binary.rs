@@ -10,7 +10,6 @@ pub(crate) fn companion() -> &'static Path {
     PATH.get_or_init(|| build("linux_companion"))
 }
 
-/// Returns the path of the ground station.
 pub(crate) fn ground() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| build("linux_ground"))

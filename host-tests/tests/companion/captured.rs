@@ -130,7 +130,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     }
 }
 
-/// Checks the same at a station, which a booted relay queries: it reports the failure and still answers.
+/// Checks a full disk at a ground station, which reports the end of its capture and still answers relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     let files = Files::new();

@@ -11,7 +11,6 @@ use crate::process::{Ended, Relay};
 /// Free UDP ports of this computer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ports {
-    /// Port of the autopilot.
     pub(crate) port: u16,
     /// Port of the companion.
     pub(crate) local: u16,
@@ -173,7 +172,6 @@ fn a_local_port_that_cannot_be_had_is_named() {
     drop(taken);
 }
 
-/// Checks the local port in the file of all drones.
 #[test]
 fn the_file_states_a_local_port() {
     let ports = Ports::apart(11);

@@ -30,7 +30,7 @@ impl Flight {
         Self::found_by(kind, x_m, None)
     }
 
-    /// Starts the same with additional options of the relay.
+    /// Starts a drone on the ground and a relay with additional options, which finds it.
     pub(crate) fn listening(kind: &str, more: &[&str]) -> Self {
         let mut flight = Self::started_with(kind, START_M, [None; 2], more);
         flight.relay.line("autopilot: found a");
@@ -38,7 +38,7 @@ impl Flight {
         flight
     }
 
-    /// Starts the same with frames signed by `key`, if any.
+    /// Starts a drone and a relay that sign with `key`, if any, and find each other.
     fn found_by(kind: &str, x_m: f64, key: Option<&str>) -> Self {
         let mut flight = Self::started(kind, x_m, [key; 2]);
         if key.is_some() {
@@ -55,7 +55,7 @@ impl Flight {
         Self::started_with(kind, x_m, keys, &[])
     }
 
-    /// Starts the same with additional `options` of the relay.
+    /// Starts a drone and a relay with additional `options`, the drone with the first key and the relay with the second.
     pub(crate) fn started_with(
         kind: &str,
         x_m: f64,

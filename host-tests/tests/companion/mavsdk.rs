@@ -7,7 +7,6 @@ use rustix::process::Signal;
 use crate::flying::ASKED;
 use crate::peer::{Heard, Peer, agreed, apart_m, on_earth, relay};
 
-/// Returns a free port.
 fn free_port() -> u16 {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.local_addr().unwrap().port()

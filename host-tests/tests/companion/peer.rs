@@ -137,7 +137,6 @@ impl Heard {
         asks.then(|| (number("param1"), number("param2")))
     }
 
-    /// Returns true if a target has a velocity.
     pub(crate) fn has_velocity(&self) -> bool {
         self.0["type_mask"].as_u64().unwrap() & 0b11_1000 == 0
     }
@@ -237,7 +236,7 @@ impl Peer {
         drop(self.so_far());
     }
 
-    /// Waits until the companion has requested these messages, in any order.
+    /// Waits until the companion has requested the messages `wanted`, in any order.
     pub(crate) fn is_asked_for(&self, wanted: &[(u64, u64)]) {
         let mut left = wanted.to_vec();
         while !left.is_empty() {

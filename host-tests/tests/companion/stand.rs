@@ -89,7 +89,6 @@ fn is_about(said: &Value, expected: f64) -> bool {
         .is_some_and(|said| (said / expected - 1.0).abs() < 1e-3)
 }
 
-/// Returns a free port.
 fn port() -> u16 {
     let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     socket.local_addr().unwrap().port()

@@ -170,7 +170,6 @@ fn nobody_who_reads_is_no_reason_to_leave_the_post() {
     goes_on_where_nobody_reads(ground(), &options);
 }
 
-/// Checks that a closed standard error causes no panic.
 #[test]
 fn a_closed_standard_error_is_no_panic() {
     for options in [&["--index", "0"][..], &["--help"], &["--version"]] {

@@ -14,7 +14,6 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Checks the unit with systemd, where it is installed.
 #[test]
 fn the_unit_is_one_that_systemd_takes() {
     let unit = root().join("examples/linux_companion/uav-relay@.service");

@@ -30,7 +30,6 @@ impl Channel {
         self.folder.path().join(format!("views{index}"))
     }
 
-    /// Starts relay `index` of three.
     fn start(&self, index: usize) -> Relay {
         let file = self.file(index);
         Relay::start(&[

@@ -125,7 +125,6 @@ fn frames_that_are_refused_say_why() {
     }
 }
 
-/// Checks that an upload with these options fails with the reason `why`.
 fn upload_fails(files: &Files, tty: &str, key: &str, more: &[&str], why: &str) {
     let options = files.options(key, "ground");
     let mut all = vec!["--tty", tty, "--version", "3", "--yes", "--timeout", "8"];

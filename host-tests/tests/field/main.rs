@@ -8,7 +8,6 @@ mod estimation;
 mod samples;
 mod table;
 
-/// Returns the relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }

@@ -72,7 +72,6 @@ fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
     }
 }
 
-/// Reboots a relay during the agreement on altitudes: it must not join with another altitude.
 #[test]
 fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
     let settings = Settings {

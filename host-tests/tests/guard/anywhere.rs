@@ -178,7 +178,7 @@ struct World {
     hovers_s: Vec<f64>,
     /// Time when a drone first received its hovering neighbour's position; infinite before.
     known_s: Vec<f64>,
-    /// Required distance of such a pair, from `BRAKES_S` after that time, m.
+    /// Required distance of a drone and its hovering neighbour, from `BRAKES_S` after `known_s`, m.
     hovering_m: Vec<f64>,
     /// Drones that their pilots give back once no other drone is passing them.
     later: Vec<usize>,

@@ -48,7 +48,6 @@ pub(crate) struct Drone {
     begun: Option<Placement>,
     /// Indices of the neighbours toward Tx and Rx.
     pub(crate) links: [Option<usize>; 2],
-    /// True while the drone is in the air.
     pub(crate) flies: bool,
     /// True while the radio works.
     pub(crate) speaks: bool,

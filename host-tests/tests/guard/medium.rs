@@ -11,7 +11,6 @@ pub(crate) struct Faults {
     pub(crate) loss: f64,
     /// Fraction of messages that is duplicated, 0 to 1.
     pub(crate) twice: f64,
-    /// Longest delay, s.
     pub(crate) delay_s: f64,
 }
 

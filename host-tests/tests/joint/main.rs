@@ -35,7 +35,6 @@ fn checked(of: &Scenario, effort: Effort) -> JointOptimum {
     found
 }
 
-/// Returns the link with its relays at these altitudes.
 fn flown(link: &Link, altitudes: &[f64]) -> Link {
     let relays = link.relays.iter().zip(altitudes);
     let relays = relays.map(|(relay, &altitude_m)| Station {

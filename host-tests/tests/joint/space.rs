@@ -158,7 +158,6 @@ fn one_relay_agrees_with_brute_force() {
     });
 }
 
-/// Checks that mirrored scenarios have the same optimum.
 #[test]
 fn mirrored_scenarios_have_the_same_optimum() {
     for_scenarios(54, 20, 30, |of, _| {

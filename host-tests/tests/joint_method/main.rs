@@ -124,7 +124,7 @@ fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// Returns the same scenario with lateral room `lateral_m` and altitudes of 20 m to `most_m`.
+/// Returns the scenario of the figures with lateral room `lateral_m` and altitudes of 20 m to `most_m`.
 fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Link, Corridor) {
     let link = Link {
         x_i: x_m,
@@ -186,7 +186,7 @@ fn the_joint_optima_are_reached_in_one_round_trip() {
     }
 }
 
-/// Checks that a long computation causes no question to a neighbour, which computes the same.
+/// Checks that a long computation causes no question to a neighbour, which is computing too.
 #[test]
 fn a_chain_of_any_length_needs_one_round_trip() {
     println!("| N | to the side | sweeps | messages | bytes | virtual time |");

@@ -227,7 +227,6 @@ fn own_powers_are_found_out_about() {
     assert!((0.99..=1.0 + 1e-6).contains(&ratio), "{ratio}");
 }
 
-/// Checks that a band of one altitude reduces to Algorithm 1.
 #[test]
 fn a_band_of_one_altitude_is_algorithm_1() {
     let (link, _) = close_by(5);

@@ -81,7 +81,7 @@ fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
     }
 }
 
-/// Checks that the same flight without a guard fails, so that the test is able to fail.
+/// Checks that without a guard drones come too close, so that the test is able to fail.
 #[test]
 fn without_a_guard_some_come_close() {
     let close = (1..=40).any(|seed| {

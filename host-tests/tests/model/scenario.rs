@@ -66,7 +66,6 @@ pub(crate) struct Calm {
 pub(crate) struct Scenario {
     pub(crate) kind: Kind,
     pub(crate) mission: Mission,
-    /// Settings by relay.
     pub(crate) settings: Vec<Settings>,
     pub(crate) judge: Judge,
     pub(crate) calm: Calm,
@@ -91,7 +90,7 @@ impl Scenario {
         self.settings.iter().all(|one| one.auth.is_some())
     }
 
-    /// Returns the same mission with signed frames; its undisturbed chain reaches the same agreement.
+    /// Returns the mission with signed frames, whose undisturbed chain must reach the unsigned agreement.
     fn signed(mut self) -> Self {
         for one in &mut self.settings {
             one.auth = Some(Auth {

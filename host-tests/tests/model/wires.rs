@@ -52,7 +52,6 @@ pub(crate) struct Wires {
     cut: Vec<bool>,
 }
 
-/// Pass of a view.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
@@ -75,7 +74,6 @@ pub(crate) fn message(frame: &[u8]) -> Option<Message> {
     None
 }
 
-/// Returns the pass that a frame forwards, if any.
 pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
     let message = message(frame)?;
     let number = match &message {
@@ -96,7 +94,6 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
     })
 }
 
-/// Returns the relay and port at the end of a line.
 pub(crate) fn end(line: usize) -> (usize, Port) {
     if line.is_multiple_of(2) {
         (line / 2 + 1, Port::Upstream)

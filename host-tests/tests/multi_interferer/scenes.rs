@@ -29,7 +29,6 @@ use uav_relay_scenario::{
     AirGround, ChannelSpec, Interference, Noise, RelayOverride, Scenario, Source,
 };
 
-/// Positions of the sources.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sources {
     /// Sources at any position, also on the line.
@@ -38,7 +37,6 @@ pub(crate) enum Sources {
     Aloof,
 }
 
-/// Draws a scenario and a number of relays.
 pub(crate) fn scenario(
     rng: &mut ChaCha8Rng,
     relays: RangeInclusive<u16>,
@@ -95,7 +93,6 @@ pub(crate) fn scenario(
     (scenario, n)
 }
 
-/// Draws a scene with sources at any position.
 pub(crate) fn scene(
     rng: &mut ChaCha8Rng,
     relays: RangeInclusive<u16>,

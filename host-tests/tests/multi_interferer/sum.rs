@@ -43,7 +43,6 @@ fn the_inverse_sirs_of_the_sources_add_up() {
     }
 }
 
-/// Returns the link with this source alone.
 fn alone(scene: &Scene, source: &Source) -> Link {
     let station = |relay: &Relay| Station {
         altitude_m: relay.altitude_m,

@@ -7,7 +7,6 @@ use uav_relay::{Duration, Instant, Phase, Port, Relay};
 
 use crate::{drain, encode, first_sweep, mission, relay};
 
-/// Decodes a sweep.
 fn sweep_in(bytes: &[u8]) -> Sweep {
     let mut deframer = Deframer::new();
     let plain = bytes.iter().find_map(|&byte| {

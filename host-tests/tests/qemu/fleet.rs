@@ -99,7 +99,7 @@ impl Fleet {
         Self::begin(which, blocks, &[], None, faults, seed, Life::Fast)
     }
 
-    /// Starts the same with given flash contents.
+    /// Starts drones with given flash contents, besides their blocks.
     pub(crate) fn with_flash(
         which: Image,
         blocks: &[Vec<u8>],
@@ -110,7 +110,7 @@ impl Fleet {
         Self::begin(which, blocks, kept, None, faults, seed, Life::Fast)
     }
 
-    /// Starts the same with a transmitter at the other end of `socket`.
+    /// Starts drones with a transmitter at the other end of `socket`.
     pub(crate) fn with_transmitter(
         which: Image,
         blocks: &[Vec<u8>],
@@ -189,7 +189,7 @@ impl Fleet {
         Self::start(which, &blocks(flight), faults, seed)
     }
 
-    /// Starts the same on perfect wires in real time.
+    /// Starts every drone of `flight` on perfect wires in real time.
     pub(crate) fn in_real_time(flight: &Flight) -> Self {
         let blocks = blocks(flight);
         let (which, faults) = (Image::Wires, Faults::default());

@@ -32,7 +32,6 @@ fn flight() -> Flight {
     Flight::new(&scenario(), 1, 1e-4, 7).unwrap()
 }
 
-/// Returns the agreed position.
 fn agreed() -> Placement {
     let [x_m, y_m, altitude_m] = simulated(&flight())[0].map(f32::from_bits);
     Placement {
@@ -171,7 +170,6 @@ fn a_drone_without_sites_tells_nobody() {
     assert_eq!(error.kind(), ErrorKind::WouldBlock);
 }
 
-/// Checks that an image without an autopilot link refuses sites.
 #[test]
 fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);

@@ -7,7 +7,6 @@ use std::sync::mpsc::Sender;
 
 use defmt_decoder::{DecodeError, Table};
 
-/// Line of a log.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Line {
     /// Number of the drone, 1 to N.
@@ -38,7 +37,6 @@ impl Line {
             .then(|| [" x ", " y ", " altitude "].map(|label| self.bits(label).unwrap()))
     }
 
-    /// Returns the value of counter `name`.
     pub(crate) fn counter(&self, name: &str) -> Option<u64> {
         let rest = self.after(&format!(" {name}: "))?;
         let end = rest.find(|c: char| !c.is_ascii_digit())?;

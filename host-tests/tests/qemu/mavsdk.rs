@@ -81,7 +81,6 @@ impl Mavsdk {
         asked.any(|heard| heard["param1"].as_f64() == Some(id.into()))
     }
 
-    /// Returns the last target.
     pub(crate) fn target(&self) -> Option<Geodetic> {
         let is_target = |heard: &&Value| heard["mavpackettype"] == "SET_POSITION_TARGET_GLOBAL_INT";
         let last = self.heard.iter().rev().find(is_target)?;

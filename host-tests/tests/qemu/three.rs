@@ -25,7 +25,6 @@ struct Three {
 }
 
 impl Three {
-    /// Runs all until `done`.
     fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
         let end = Instant::now() + PATIENCE;
         while !done(self) {

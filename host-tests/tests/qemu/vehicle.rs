@@ -21,7 +21,6 @@ use crate::fleet::PATIENCE;
 
 const SYSTEM: u8 = 7;
 
-/// Speed, m/s.
 const FASTEST_M_S: f32 = 8.0;
 
 /// Time for which the pilot chooses another mode, ms: six heartbeats.
@@ -117,7 +116,6 @@ impl Vehicle {
         u64::try_from(ms).unwrap()
     }
 
-    /// Runs for `ms`.
     pub(crate) fn run(&mut self, ms: u64) {
         let end = self.now() + ms;
         while self.now() < end {
@@ -157,7 +155,6 @@ impl Vehicle {
         self.send(radio, &MavMessage::RADIO_STATUS(said));
     }
 
-    /// Returns true if a target was received since `at`.
     pub(crate) fn was_told_since(&self, at: u64) -> bool {
         self.told.last().is_some_and(|told| told.at > at)
     }

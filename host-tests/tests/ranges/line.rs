@@ -15,7 +15,6 @@ pub(crate) struct Line {
     pub(crate) relays: Vec<Relay>,
     under_way: VecDeque<(usize, Port, Vec<u8>)>,
     pub(crate) now: Instant,
-    /// Events of the relays.
     pub(crate) events: Vec<(u16, Event)>,
     turns: u32,
     wiring: Wiring,

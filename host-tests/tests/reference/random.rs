@@ -220,7 +220,6 @@ fn no_perturbation_beats_the_optimum() {
     assert!(compared > 10_000);
 }
 
-/// Checks that the generator draws every class of scenarios.
 #[test]
 fn the_generator_draws_every_class() {
     let mut seen = [0_u32; 10];

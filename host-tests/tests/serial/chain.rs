@@ -151,7 +151,7 @@ pub(crate) fn setpoints(nodes: &[Node]) -> Vec<Option<Placement>> {
     nodes.iter().map(|node| node.relay.setpoint()).collect()
 }
 
-/// Returns the positions of the same relays with frames passed directly.
+/// Returns the positions of the relays when frames are passed directly, without ports.
 pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
     let mut chain: Vec<Relay> = (1..=relays)
         .map(|index| relay(relays, index, Wiring::Pair))
@@ -178,7 +178,6 @@ pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
     chain.iter().map(Relay::setpoint).collect()
 }
 
-/// Returns true if the neighbour on `side` has been lost.
 pub(crate) fn has_lost(node: &Node, side: Side) -> bool {
     node.events
         .iter()

@@ -17,7 +17,6 @@ struct Medium {
     carried: usize,
 }
 
-/// End of a medium.
 #[derive(Clone)]
 pub(crate) struct End {
     medium: Rc<RefCell<Medium>>,

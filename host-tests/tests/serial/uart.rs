@@ -13,7 +13,6 @@ pub(crate) struct Bench {
     pub(crate) clock: u64,
     /// Start and end of each byte.
     pub(crate) bytes: Vec<(u64, u64)>,
-    /// Edges of the pin.
     pub(crate) edges: Vec<(u64, bool)>,
     /// Remaining failures to set the pin low, and high.
     pub(crate) refusals: [u32; 2],
@@ -58,7 +57,6 @@ impl Uart {
     }
 }
 
-/// UART behind `embedded_io`.
 pub(crate) struct IoUart(pub Uart);
 
 mod as_nb {

@@ -4,7 +4,6 @@ use uav_relay::{Adjust, Band, Local, Method, Profile, Schedule};
 
 use super::*;
 
-/// Start of the upload.
 const AT: Instant = seconds(20);
 
 /// Runs `setup` with an upload of `config`. Returns the time until all have positions, ms, and the bytes.

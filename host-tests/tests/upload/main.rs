@@ -41,7 +41,6 @@ fn signed(base: Mission, shared: bool) -> Setup {
     setup
 }
 
-/// Returns an upload of `version` from the ground station at `end` at `at`.
 fn upload(
     base: &Mission,
     end: Side,

@@ -85,7 +85,6 @@ fn the_ground_says_flown_only_once_every_relay_flies_it() {
     assert!(partial > 0, "the model has to see it");
 }
 
-/// Returns the settings of a guarded relay.
 fn guarded(base: &Mission) -> Settings {
     Settings {
         guard: Some(GuardConfig::of(base, base.config().common)),

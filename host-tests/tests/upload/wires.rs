@@ -45,7 +45,6 @@ pub(crate) struct Wires {
     pub(crate) now: Instant,
     /// Positions of guarded relays' drones.
     places: Vec<Placement>,
-    /// Events of each relay.
     pub(crate) events: Vec<Vec<Event>>,
 }
 

@@ -204,7 +204,6 @@ impl Air {
         self.order += 1;
     }
 
-    /// Schedules `deed` for `at_us`.
     pub(crate) fn plan(&mut self, at_us: u64, deed: Deed) {
         self.put(at_us, Happening::Deed(deed));
     }

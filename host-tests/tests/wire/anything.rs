@@ -103,7 +103,6 @@ fn tamed(said: Said) -> Said {
 #[expect(clippy::struct_excessive_bools, reason = "each is drawn by itself")]
 struct Step {
     said: Said,
-    /// True if the message comes from the right side.
     right_side: bool,
     right_mission: bool,
     /// Offset of its number from that of the next pass, or of the last one that it answers.

@@ -145,7 +145,6 @@ fn a_view_far_ahead_is_reached_step_by_step() {
     }
 }
 
-/// Checks that a chain never has more relays than its mission.
 #[test]
 fn more_relays_than_the_mission_has_are_stale() {
     let now = Instant::ZERO;

@@ -149,7 +149,6 @@ impl Fenced {
 }
 
 impl Said {
-    /// Encodes the body.
     pub(crate) fn body(&self) -> Vec<u8> {
         match self {
             Self::Sweep(sweep) => sweep.body(0, &[]),

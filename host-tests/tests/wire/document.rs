@@ -10,7 +10,6 @@ use super::receive::{FIELD, counted, relay};
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
 
-/// Returns the cells of a table row.
 fn cells(row: &str) -> Vec<&str> {
     let row = row.trim().trim_matches('|');
     row.split('|').map(str::trim).collect()
@@ -93,7 +92,7 @@ fn every_row_of_the_rejection_table_is_counted_as_it_says() {
     assert!(found > 120, "{found}");
 }
 
-/// Returns the digest of a mission with these f32 of interference, by the document.
+/// Returns the digest of a mission with the f32 numbers of its interference, by the document.
 fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
     let config = mission.config();
     let mut bytes = config.relays.to_le_bytes().to_vec();

@@ -102,7 +102,6 @@ fn a_decision_that_is_not_awaited_is_stale() {
     assert_eq!(waiting.stats().stale, 1);
 }
 
-/// Returns relay 20 of 20, the last.
 fn last_of_20(quorum: bool) -> (Relay, u16) {
     let mission = Mission::try_new(paper(20)).unwrap();
     let identity = Identity {

@@ -10,7 +10,7 @@ use super::codec::{Said, Seats};
 use super::kinds::{FIRST, SECOND, framed, one_of_each, sent, settle, source};
 use super::receive::{FIELD, counted, relay_of};
 
-/// Returns the counters that a message of the due pass increments at relay 4 of 8, from this side.
+/// Returns the counters that a message of the due pass, received at `port`, increments at relay 4 of 8.
 fn counted_of(interference: Interference, port: Port, tag: usize) -> Vec<&'static str> {
     let mission = MissionConfig {
         interference,
@@ -58,7 +58,7 @@ fn fourth(differs: bool) -> Relay {
     fixtures::relay(mission, 4, settings)
 }
 
-/// Returns a collection, or its result, with the profiles of these relays.
+/// Returns a collection, or its result, with profiles of the relays `indices`.
 fn of(relay: &Relay, number: u16, after: u16, indices: &[u16]) -> Seats {
     Seats {
         number,

@@ -88,7 +88,6 @@ pub(crate) fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the only frame in `wire`, complete at its last byte.
 pub(crate) fn only_frame(wire: &[u8]) -> Vec<u8> {
     let mut deframer = Deframer::new();
     let (end, before) = wire.split_last().unwrap();

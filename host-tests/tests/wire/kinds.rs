@@ -26,7 +26,7 @@ pub(crate) const WEAK: Field = Field::new(&[FieldPoint {
 pub(crate) const FIRST: u16 = 64;
 pub(crate) const SECOND: u16 = 65;
 
-/// Returns the paper's scenario with this interference, a band of 20 m to 300 m, and lateral room.
+/// Returns the paper's scenario with another interference, a band of 20 m to 300 m, and lateral room.
 pub(crate) fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
         interference,
@@ -42,7 +42,7 @@ pub(crate) fn mission(interference: Interference) -> MissionConfig {
     }
 }
 
-/// Returns the same with the paper's interferer.
+/// Returns the paper's scenario with its interferer, a band of 20 m to 300 m, and lateral room.
 pub(crate) fn source() -> MissionConfig {
     mission(paper(8).interference)
 }
@@ -128,7 +128,7 @@ pub(crate) fn heard(number: u16, mission: u16) -> Heard {
     }
 }
 
-/// Returns a message of each tag for this pass.
+/// Returns a message of each tag for the pass `number`.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
     let altitude_m = 20.0;

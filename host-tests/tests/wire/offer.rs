@@ -65,7 +65,6 @@ pub(crate) const BYTES: usize = 113;
 pub(crate) const KEPT: usize = 111;
 
 impl Offer {
-    /// Encodes the body.
     pub(crate) fn body(&self) -> Vec<u8> {
         let mut out = vec![14];
         for word in [self.version, self.base, self.relays] {
@@ -170,7 +169,6 @@ impl Offer {
                 .all(|at| self.sites[*at].unsigned_abs() <= 1_800_000_000)
     }
 
-    /// Returns true if the interferer is unknown.
     fn is_unknown(&self) -> bool {
         [self.interferer_w, self.x_m, self.y_m].map(f32::to_bits) == [0; 3]
     }

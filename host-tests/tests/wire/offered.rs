@@ -117,7 +117,6 @@ fn sites() -> BoxedStrategy<[i32; 6]> {
     prop_oneof![2 => Just([0; 6]), 2 => anywhere, 1 => Just(A_KILOMETRE)].boxed()
 }
 
-/// Draws a valid offer.
 pub(crate) fn offers() -> BoxedStrategy<Said> {
     let versions = prop_oneof![4 => 1..9_u16, 1 => 1..=u16::MAX];
     let powers = (scaled(1e-6, 1e6), scaled(1e-6, 1e6), scaled(1e-6, 1e9));

@@ -26,7 +26,6 @@ fn taken(body: &[u8]) -> bool {
     }
 }
 
-/// Returns the body of `offer` with other bytes at `at`.
 fn with(offer: &Offer, at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut body = offer.body();
     body[at..at + bytes.len()].copy_from_slice(bytes);

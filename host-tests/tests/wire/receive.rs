@@ -42,7 +42,6 @@ pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
     relay_of(paper(relays), index, wiring)
 }
 
-/// Returns relay `index` of this mission, on network 7.
 pub(crate) fn relay_of(mission: MissionConfig, index: u16, wiring: Wiring) -> Relay {
     let mission = Mission::try_new(mission).unwrap();
     let settings = Settings {

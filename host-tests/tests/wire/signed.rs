@@ -27,7 +27,7 @@ pub(crate) fn with_key(index: u16, wiring: Wiring) -> Relay {
     Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
 }
 
-/// Returns the identity and settings of such a relay.
+/// Returns the identity and settings of relay `index` with the key.
 pub(crate) fn set(index: u16, wiring: Wiring) -> (Identity, Settings) {
     let identity = Identity {
         network: NETWORK,
@@ -93,7 +93,6 @@ impl Peer {
         relay.handle_bytes(Instant::ZERO, self.port, &frame);
     }
 
-    /// Encodes the next frame with this body.
     fn frame(&mut self, flags: u8, body: &[u8]) -> Vec<u8> {
         let mut bytes = header(Header {
             network: NETWORK,

@@ -38,7 +38,7 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// Returns an upload between those.
+/// Returns an upload with the sites of `A_KILOMETRE`.
 fn sited(version: u16, base: u16) -> Offer {
     Offer {
         sites: A_KILOMETRE,
@@ -46,7 +46,7 @@ fn sited(version: u16, base: u16) -> Offer {
     }
 }
 
-/// Returns the same with the receiver farther east by `east`, 1e-7 degrees.
+/// Moves the receiver of an offer east by `east`, 1e-7 degrees.
 fn farther(offer: Offer, east: i32) -> Offer {
     let mut sites = offer.sites;
     sites[4] += east;

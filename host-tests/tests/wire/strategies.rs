@@ -50,7 +50,6 @@ pub(crate) fn ladders() -> BoxedStrategy<(f32, u8, u8)> {
         .boxed()
 }
 
-/// Draws a valid sweep of at least `least` reaches.
 pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
     let ladders = prop_oneof![
         4 => ladders(),
@@ -252,7 +251,6 @@ fn questions() -> impl Strategy<Value = u16> {
     prop_oneof![2 => Just(0), 3 => 0..9_u16, 1 => any::<u16>()]
 }
 
-/// Draws a valid message.
 pub(crate) fn messages() -> BoxedStrategy<Said> {
     let verdicts = (
         any::<u16>(),

@@ -35,7 +35,7 @@ pub(crate) fn relay_4() -> (Relay, [Peer; 2], u16) {
     (relay, peers, base)
 }
 
-/// Returns a mission of this version for relays loaded with `base`.
+/// Returns a mission of `version` for relays loaded with `base`.
 pub(crate) fn upload(version: u16, base: u16) -> Offer {
     Offer {
         version,
@@ -44,7 +44,7 @@ pub(crate) fn upload(version: u16, base: u16) -> Offer {
     }
 }
 
-/// Returns the hello of a node that knows only view 0 and holds this mission (digest, version).
+/// Returns the hello of a node that knows only view 0 and holds the mission `holds` (digest, version).
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
     Said::Hello(greeting(mission, neighbour, holds, flags))
 }

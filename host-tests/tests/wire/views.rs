@@ -25,7 +25,7 @@ fn in_view(own: u16, view: u32) -> (Relay, u16) {
     (relay, mission)
 }
 
-/// Returns the same after the agreement on positions in the view.
+/// Returns relay `own` of 8 in `view`, idle after the agreement on positions in it.
 fn agreed_in_view(own: u16, view: u32) -> (Relay, u16) {
     let (mut relay, mission) = in_view(own, view);
     let digest = mission.wrapping_add(mark(view));
@@ -95,7 +95,7 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
     }
 }
 
-/// Checks passes of another view from a neighbour with this mission: the relay requests a new view.
+/// Checks passes of another view from a neighbour with equal mission: the relay requests a new view.
 #[test]
 fn a_pass_of_another_view_has_the_relay_ask_for_one() {
     let now = Instant::ZERO;

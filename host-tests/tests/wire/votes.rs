@@ -90,7 +90,7 @@ pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> S
     })
 }
 
-/// Changes a hello to one of a node that receives these nodes, bit 0 for the nearest.
+/// Sets the nodes that a hello's sender receives, bit 0 for the nearest.
 pub(crate) fn hearing(hears: u8, said: Said) -> Said {
     match said {
         Said::Hello(greeting) => Said::Hello(Greeting { hears, ..greeting }),
@@ -128,7 +128,6 @@ pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
     std::iter::from_fn(|| relay.poll_event()).collect()
 }
 
-/// Returns the only message that `relay` sends at `now`.
 pub(crate) fn only(relay: &mut Relay, now: Instant) -> (Port, Said) {
     let mut out = sent(relay, now);
     let said = out.pop().unwrap();

@@ -4,7 +4,7 @@ pub(super) fn is_count(relays: u16) -> bool {
     (1..=1000).contains(&relays)
 }
 
-/// Returns true if a node may propose this view: node number in the low ten bits, view number above.
+/// Returns true if a node may propose `view`: node number in the low ten bits, view number above.
 pub(super) fn is_proposed(view: u32) -> bool {
     (1..=1000).contains(&(view % 1024)) && view >= 1024
 }

@@ -82,7 +82,6 @@ impl Call {
     }
 }
 
-/// Content of a proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Proposed {
     pub(crate) call: Call,
