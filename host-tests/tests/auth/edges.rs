@@ -135,7 +135,7 @@ fn what_is_signed_for_other_nonces_is_forged() {
     assert_eq!(link.say(5), Some("received"));
 }
 
-/// Checks the warning at `Auth::epoch`: with a reused epoch a relay is ignored, and old frames are accepted again.
+/// Checks the warning at `Auth::epoch`: a relay with a reused epoch is ignored, and accepts old frames.
 #[test]
 fn an_epoch_used_twice_is_no_fresh_start() {
     let mut link = Link::new();

@@ -55,7 +55,7 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
 }
 
-/// Checks that an autopilot that does not report its target is not taken as refusing.
+/// Checks that an autopilot that does not report its target does not count as refusing.
 #[test]
 fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
     let mut vehicle = flying();

@@ -168,7 +168,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     assert_eq!(station.end().status, Some(0));
 }
 
-/// Checks a restart after a crash: the capture of the time before the crash is kept.
+/// Checks that a restart after a crash does not overwrite the earlier capture.
 #[test]
 fn a_restart_keeps_the_capture_of_the_start_before() {
     let folder = tempfile::tempdir().unwrap();

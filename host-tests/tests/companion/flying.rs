@@ -55,7 +55,7 @@ impl Flight {
         Self::started_with(kind, x_m, keys, &[])
     }
 
-    /// Starts a drone and a relay with additional `options`, the drone with the first key and the relay with the second.
+    /// Starts a drone with the first key, and a relay with the second key and additional `options`.
     pub(crate) fn started_with(
         kind: &str,
         x_m: f64,

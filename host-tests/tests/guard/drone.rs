@@ -135,7 +135,9 @@ impl Drone {
         self.goal = self.body.stops_at(self.acceleration);
     }
 
-    /// Records that the neighbour on `side` knows of the takeover, by a message sent at `sent_s`; it stays within `(low, high)`.
+    /// Records that by a message of `sent_s` the neighbour on `side` knows of the takeover.
+    ///
+    /// From then on the neighbour stays within `(low, high)` along x.
     pub(crate) fn is_known(&mut self, side: usize, sent_s: f64, (low, high): (f64, f64)) {
         if sent_s >= self.taken_s && !self.told[side] {
             self.told[side] = true;

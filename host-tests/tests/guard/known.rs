@@ -80,7 +80,7 @@ fn a_tight_row_shifts_either_way() {
     }
 }
 
-/// Checks agreed positions 4 m apart along x: the outer two of three stay 10 m apart, as they do not know each other.
+/// Checks three agreed positions 4 m apart along x, of which the outer two stay 10 m apart.
 #[test]
 fn places_too_close_are_approached() {
     let mut world = world(5, 100.0, 100.0);

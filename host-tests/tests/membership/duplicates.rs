@@ -1,4 +1,4 @@
-//! Two drones with the same index, number, key and epoch, as from a cloned image; `COUNT` sets the number of chains.
+//! Two drones with equal index, number, key and epoch, as from a cloned image; `COUNT` sets the chains.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

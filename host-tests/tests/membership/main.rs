@@ -1,4 +1,4 @@
-//! Loss and return of relays: the rest ends in an undisturbed chain's positions. `COUNT` and `SEED` select other schedules.
+//! Loss and return of relays: the rest ends in an undisturbed chain's positions (`COUNT`, `SEED`).
 
 mod duplicates;
 mod flights;

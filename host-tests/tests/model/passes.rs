@@ -55,7 +55,9 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks the counters of a relay that received a pass, with a position if `stands`, in a view change if `suspended`.
+    /// Checks the counters of a relay that received a pass.
+    ///
+    /// `stands`: the relay has a position. `suspended`: it may be in a view change.
     pub(crate) fn meets(
         &mut self,
         scenario: &Scenario,

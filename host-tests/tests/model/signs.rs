@@ -52,7 +52,7 @@ impl Signs {
         }
     }
 
-    /// Records signs of life. An answer proves life at the time of its question, a completion at that of forwarding.
+    /// Records signs of life: an answer counts from its question, a completion from the forwarding.
     pub(crate) fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { answer, .. } => {

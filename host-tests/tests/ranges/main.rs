@@ -1,4 +1,4 @@
-//! Every input of the public API over its whole range; `COUNT` sets the number of chains, `SEED` the first seed.
+//! Every input of the public API over its whole range; `COUNT` chains from seed `SEED`.
 
 use std::panic::catch_unwind;
 

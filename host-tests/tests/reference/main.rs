@@ -43,19 +43,19 @@ fn every_case_of_the_file_is_used() {
         "algorithm1_schedule",
         "psi",
         "feasibility_bound_printed",
-        // Cases used by tests/theorems.rs and tests/plan.rs.
+        // Cases used by the tests `theorems` and `plan`.
         "locus",
         "quartic_coeffs",
         "quartic_roots_in_0_D",
         "theorem1",
         "theorem2",
         "theorem3",
-        // Cases used by tests/fleet.rs and tests/plan.rs.
+        // Cases used by the tests `fleet` and `plan`.
         "min_uavs",
         "problem1",
-        // Cases used by tests/several.rs.
+        // Cases used by the tests `multi_interferer` and `plan`.
         "hyp_msi",
-        // Cases used by tests/baseline.rs and tests/figures.rs.
+        // Cases used by the tests `baseline` and `figures`.
         "baseline_single",
         "baseline_multi",
         "algorithm4",

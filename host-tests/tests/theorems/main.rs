@@ -1,4 +1,4 @@
-//! Single relay and interferer: lemmas and theorems compared with brute force; `COUNT` and `SEED` select scenarios.
+//! Single relay and interferer: theorems compared with brute force in `COUNT` scenes from `SEED`.
 
 mod aside;
 mod brute;

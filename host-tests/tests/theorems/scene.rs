@@ -52,7 +52,7 @@ impl Scene {
         Self::new(&link, (low, high))
     }
 
-    /// Draws a scene with noise, from almost none to more than the interference.
+    /// Draws a scene with noise, from almost none to far above the interference.
     pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
         let scene = Self::random(rng);
         let link = random::in_noise(rng, &scene.link);

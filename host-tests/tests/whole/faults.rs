@@ -47,7 +47,10 @@ fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Returns eight relays after two hours with a flapping link behind relay `link + 1`, and the fraction of time flown.
+/// Returns eight relays after two hours with a flapping link, and the fraction of time flown.
+///
+/// The link is between relays `link + 1` and `link + 2`. The time counts from the first agreement, while at least seven relays
+/// fly it.
 fn flown_with_flaps(link: usize, (up_us, down_us): (u64, u64), seed: u64) -> (Air, f64) {
     let mut schedule = Schedule::of(8, seed);
     schedule.kind.reach = 3;

@@ -42,7 +42,7 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
         (&gather, 24, 1e-6, 1e6, "power of a second seat"),
         (&gathered, 14, 1e-6, 1e6, "power of a seat"),
     ]);
-    // Zero stands for relays that choose.
+    // Zero is the altitude of relays that choose one.
     for said in [gather, gathered] {
         for (altitude_m, expected) in [
             (0.0, Ok(())),

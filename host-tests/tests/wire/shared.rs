@@ -107,7 +107,7 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     );
 }
 
-/// Checks that a one-way link is no link, but that losses do not break an established one.
+/// Checks that a one-way link is ignored, and that losses do not break an established one.
 #[test]
 fn a_neighbour_that_does_not_hear_the_relay_is_not_linked_but_stays_so() {
     let now = Instant::ZERO;
