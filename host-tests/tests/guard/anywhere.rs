@@ -1,7 +1,6 @@
 //! Guards of drones that are engaged anywhere in the air, given back anywhere, and fly along a line that turns.
 //!
-//! Drones move like those behind the autopilot link: at most 5 m/s toward the setpoint, slower close to it, with the overshoot of a
-//! flight controller that lags.
+//! Drones move as behind the autopilot link: at most 5 m/s, slower close to the setpoint, with a lagging controller's overshoot.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
