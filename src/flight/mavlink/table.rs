@@ -60,8 +60,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that are read or written, and then messages with foreign payload, which may contain frames and must be skipped as a
-/// whole.
+/// Messages that are read or written, and then messages whose payload may contain frames, which are skipped as a whole.
 const TABLE: [Known; 26] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::GLOBAL_POSITION_INT, 104, 28),

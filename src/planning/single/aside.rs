@@ -95,9 +95,9 @@ pub enum AsideCase {
     Edge(EdgeCoordinate),
     /// Above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level,
-    /// With noise: touching position on a vertical face of the corridor.
+    /// Touching position on a vertical face of the corridor, with noise.
     Wall,
-    /// With noise: position inside the corridor at its lowest or highest altitude, by a search without a proof of optimality.
+    /// Position inside the corridor at its lowest or highest altitude, with noise; by a search without a proof of optimality.
     Inside,
     /// Above Rx: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned,

@@ -26,7 +26,7 @@ pub enum FreeCase {
     Highest(given_altitude::PlaceCase),
     /// Above Rx, by Theorem 2.
     AboveRx(given_x::AltitudeCase),
-    /// With noise: inside the box, where the level lines of both SIRs touch.
+    /// Touching position of the level lines of both SIRs inside the box, with noise.
     Touching,
 }
 

@@ -41,7 +41,7 @@ pub enum PlaceCase {
     Level = 9,
     /// x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned = 10,
-    /// With noise: beyond the minimum of SIR_1, at the maximum that follows it or at the crossing beyond that.
+    /// Maximum that follows the minimum of SIR_1, or the crossing beyond it; with noise.
     SecondHill = 11,
 }
 
