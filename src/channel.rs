@@ -131,9 +131,8 @@ impl Channel {
         )
     }
 
-    /// Creates a channel from its path-loss factors.
-    ///
-    /// `None` unless `mu_los` is within 1e-3 to 1e30, `mu_nlos` within 1 to 1e20 times `mu_los`, and `eta` between the two.
+    /// Creates a channel from its path-loss factors. `None` unless `mu_los` is within 1e-3 to 1e30, `mu_nlos` within 1 to 1e20
+    /// times `mu_los`, and `eta` between the two.
     #[cfg(feature = "upload")]
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
@@ -146,9 +145,8 @@ impl Channel {
         })
     }
 
-    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`].
-    ///
-    /// With equal losses the weighted sum may be rounded out of that range, which [`Channel::from_factors`] would reject.
+    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`]. With equal losses the weighted sum may be rounded out of
+    /// that range, which [`Channel::from_factors`] would reject.
     #[cfg(feature = "upload")]
     pub(crate) fn ordered(self) -> Self {
         Self {

@@ -14,8 +14,8 @@
 //! | `overhead` | cost of a frame beyond its bytes (preamble, turnaround), in bytes |
 //! | `probe_after` | s, as [`Settings::probe_after`](crate::Settings::probe_after) |
 //!
-//! The figures come from simulated chains with carrier sense: up to a hundred relays in one range without losses, up to twenty
-//! with 30 % frame loss.
+//! The figures come from chains simulated with carrier sense: up to a hundred relays in one range without losses, twenty with 30
+//! % loss.
 
 use crate::time::Duration;
 use crate::wire::frame::MAX_SWEEP;
@@ -110,7 +110,6 @@ impl ChannelLoad {
         })
     }
 
-    /// Returns the maximum number of relays in one range.
     const fn most_in_range(self, baud: u32, probe_after: Duration) -> u16 {
         let pair = Self {
             in_range: 2,

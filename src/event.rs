@@ -35,8 +35,7 @@ pub enum Event {
         node: u16,
     },
     /// A node has reported eight times in a row that it does not receive this relay, so it cannot be a neighbour. Raised once
-    /// until the node receives this relay. An operator checks this relay's transmitter and the node's receiver: antenna, power,
-    /// channel.
+    /// until the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node.
         node: u16,
@@ -58,7 +57,7 @@ pub enum Event {
     /// epoch is older, or the same with the same seed, and none between them is newer: the node did not increase its epoch at its
     /// last start, and its frames are rejected. An operator increases that node's epoch and restarts it, or restarts this relay
     /// and its other neighbours. A replay of one recorded frame does not raise it, but a replay in order of five handshakes of
-    /// one start does. If `node` is this relay, its neighbours know a newer epoch of it than its own, and it becomes passive
+    /// one start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive
     /// ([`Event::IndexTaken`]).
     EpochWentBack {
         /// Index of the node.
@@ -103,8 +102,8 @@ pub enum Event {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,
     },
-    /// The chain has agreed to fly the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and
-    /// new positions follow.
+    /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
+    /// positions follow.
     Adopted,
 }
 
@@ -207,7 +206,6 @@ impl Pending {
             .map_or(0, |(_, bit)| 1 << bit)
     }
 
-    /// Raises an event without a node.
     pub(crate) fn raise(&mut self, event: Event) {
         self.plain |= Self::bit(event);
     }

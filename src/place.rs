@@ -77,7 +77,6 @@ impl CrossSection {
         }
     }
 
-    /// Returns the squared distance from `other`, m^2.
     pub(crate) fn apart_squared(self, other: Self) -> f32 {
         let (y, h) = (self.y_m - other.y_m, self.altitude_m - other.altitude_m);
         y * y + h * h

@@ -40,7 +40,6 @@ impl PowerRatio {
         self.hi
     }
 
-    /// Returns the gain as f64.
     pub(crate) fn wide(self) -> f64 {
         f64::from(self.hi) + f64::from(self.lo)
     }

@@ -283,7 +283,6 @@ impl core::fmt::Display for SetupError {
 
 impl core::error::Error for SetupError {}
 
-/// Checks identity and settings against the mission.
 pub(crate) fn check(
     mission: &Mission,
     identity: Identity,

@@ -29,7 +29,6 @@ impl Side {
         }
     }
 
-    /// Returns the opposite side.
     pub(crate) const fn other(self) -> Self {
         match self {
             Self::Upstream => Self::Downstream,

@@ -31,8 +31,8 @@ use crate::power_ratio::PowerRatio;
 /// Returns the inverse interference at `at`, the one term of a hop's SIR that depends on the kind of interference.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an interferer
-/// it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) / `Upsilon_max`, 0 to 1,
-/// both with the noise.
+/// it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) / `Upsilon_max`, with
+/// noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {

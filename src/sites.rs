@@ -48,7 +48,6 @@ impl Sites {
         }
     }
 
-    /// Returns true if both positions are valid.
     #[cfg(feature = "upload")]
     pub(crate) const fn are_valid(self) -> bool {
         self.tx.is_valid() && self.rx.is_valid()

@@ -10,8 +10,7 @@ pub struct Stats {
     pub repeats: u32,
     /// Passes of any kind, and proposals, that this relay has started as the leader.
     pub sweeps: u32,
-    /// Messages received from a neighbour with values in range; some are also counted below as misdirected, of another mission or
-    /// stale.
+    /// Messages received from a neighbour with values in range; some are also counted below, for example as stale.
     pub received: u32,
     /// Duplicate passes and proposals, to which the reply is sent again.
     pub repeated: u32,

@@ -96,8 +96,7 @@ impl Add<Duration> for Instant {
 /// Maximum backward step of the caller's time that is taken for out-of-order calls, not for a clock step.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum forward step, some 140 years: a single wrong reading does not take internal time to its end, where no timer would
-/// expire.
+/// Maximum forward step, some 140 years: a wrong reading does not take internal time to its end, where no timer expires.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Converts the caller's time, which may step in either direction, to internal time, which never runs backward.

@@ -59,9 +59,8 @@ impl ViewId {
         }
     }
 
-    /// Value added to a mission's digest in the passes of a view.
-    ///
-    /// It differs for views of one number, and for thousands of consecutive numbers.
+    /// Value added to a mission's digest in the passes of a view. Views of one number, and of thousands of consecutive ones, have
+    /// different marks.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

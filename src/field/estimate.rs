@@ -1,7 +1,7 @@
 //! Estimator of Upsilon at one position from measured interference powers.
 //!
-//! u = I / `I_max` is assumed to have a Beta distribution, as in the paper, and its two shapes follow from the mean m and the
-//! variance v of the samples:
+//! u = I / `I_max` has a Beta distribution, as in the paper, whose shapes follow from the mean m and the variance v of the
+//! samples:
 //!
 //! ```text
 //! w = m (1 - m) / v - 1,    alpha = m w,    beta = (1 - m) w,    Upsilon = (1 + beta / (alpha - 1)) / I_max

@@ -63,12 +63,10 @@ impl InNoise<'_> {
         self.of(self.field.largest)
     }
 
-    /// Returns true if the effective Upsilon is the same everywhere.
     pub(crate) const fn is_constant(&self) -> bool {
         !(self.of(self.field.smallest) < self.largest())
     }
 
-    /// Returns the points of the table, without noise.
     pub(crate) const fn points(&self) -> &'static [FieldPoint] {
         self.field.points
     }

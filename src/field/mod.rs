@@ -107,9 +107,8 @@ impl Field {
 
     /// Creates a field that is a constant of the firmware; otherwise as [`Field::try_new`].
     ///
-    /// # Panics
-    /// Panics on an invalid table: in a `const` this is a failed build, as intended. For numbers that are only known at run time
-    /// use [`Field::try_new`].
+    /// # Panics Panics on an invalid table: in a `const` this is a failed build, as intended. For values known at run time use
+    /// [`Field::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
@@ -197,7 +196,6 @@ impl Field {
     }
 }
 
-/// Interpolates between `left` and `right` at `x_m`.
 const fn between(left: FieldPoint, right: FieldPoint, x_m: f32) -> f32 {
     let (a, b) = (left.upsilon_per_w, right.upsilon_per_w);
     let step = right.x_m - left.x_m;
@@ -206,7 +204,6 @@ const fn between(left: FieldPoint, right: FieldPoint, x_m: f32) -> f32 {
     upsilon.max(a.min(b)).min(a.max(b))
 }
 
-/// Returns true if the value is an allowed Upsilon, 1/W.
 pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
     upsilon_per_w >= UPSILON.0 && upsilon_per_w <= UPSILON.1
 }

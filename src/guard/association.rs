@@ -93,8 +93,7 @@ impl Association {
         (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m; NaN if either is
-    /// unknown.
+    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m, or NaN.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -123,7 +122,6 @@ impl Association {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
-    /// Returns true if the neighbour is not flown.
     pub(super) const fn is_absent(&self) -> bool {
         self.absent != 0
     }
@@ -139,9 +137,8 @@ impl Association {
         self.absent = 0;
     }
 
-    /// Returns true if a message states that the neighbour has left this association.
-    ///
-    /// The echoed number is not used again, so a repetition of the message belongs to an earlier association.
+    /// Returns true if a message states that the neighbour has left this association. The echoed number is not used again, so a
+    /// repetition of the message belongs to an earlier association.
     pub(super) const fn is_left(&self, fence: &Fence) -> bool {
         fence.says(Fence::RELEASED) && fence.echo == self.own
     }
@@ -171,9 +168,8 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association that this relay, or the neighbour, has left.
-    ///
-    /// The notice is repeated until the neighbour starts a new association.
+    /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. The notice is repeated
+    /// until the neighbour starts a new association.
     pub(super) fn is_over(&mut self, fence: &Fence) -> bool {
         if let Some(parting) = &mut self.parting {
             let left = fence.association == parting.heard;
@@ -209,7 +205,6 @@ impl Association {
         })
     }
 
-    /// Returns true if a message belongs to this association.
     pub(super) const fn knows(&mut self, association: u16, echo: u16) -> bool {
         let known = association == self.heard && echo == self.own;
         if known {
@@ -235,9 +230,8 @@ impl Association {
         }
     }
 
-    /// Takes the open request from a message of this association.
-    ///
-    /// A reply is due if the neighbour has not received the last request of this relay.
+    /// Takes the open request from a message of this association. A reply is due if the neighbour has not received the last
+    /// request of this relay.
     pub(super) const fn hear_open(&mut self, fence: &Fence) {
         self.opens = fence.says(Fence::OPENS);
         self.due |= fence.says(Fence::ECHO_OPENS) != self.told_open;
@@ -249,10 +243,8 @@ impl Association {
         self.told_open = opens;
     }
 
-    /// Takes the halt request from any message of the neighbour.
-    ///
-    /// A request is only withdrawn by a relay that is in order on its other side (`is_placed`), because a rebooted one does not
-    /// know its earlier request.
+    /// Takes the halt request from any message of the neighbour. A request is only withdrawn by a relay that is in order on its
+    /// other side (`is_placed`), because a rebooted one does not know its earlier request.
     pub(super) const fn hear_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.says(Fence::HALTS) {
             self.halt_left = HALT_REMINDERS;
@@ -261,7 +253,6 @@ impl Association {
         }
     }
 
-    /// Returns true while the neighbour requests a halt.
     pub(super) const fn requests_halt(&self) -> bool {
         self.halt_left > 0
     }
@@ -272,7 +263,6 @@ impl Association {
         self.told_halt = halts;
     }
 
-    /// Returns true while a halt request is sent to the neighbour.
     pub(super) const fn tells_halt(&self) -> bool {
         self.told_halt
     }
@@ -319,7 +309,6 @@ pub(super) struct KeepOut {
 }
 
 impl KeepOut {
-    /// Returns a keep-out without a limit.
     pub(super) const fn none() -> Self {
         Self {
             lost: None,
@@ -329,14 +318,11 @@ impl KeepOut {
         }
     }
 
-    /// Returns the limit, m.
     pub(super) fn limit_m(&self) -> Option<f32> {
         self.lost.map(|(_, limit_m)| limit_m)
     }
 
-    /// Adds a lost relay, `node`, with the limit `limit_m`.
-    ///
-    /// The side determines the nearer node and the tighter limit.
+    /// Adds a lost relay, `node`, with the limit `limit_m`. The side determines the nearer node and the tighter limit.
     #[inline(never)] // called from both sides
     pub(super) fn raise(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
@@ -360,9 +346,8 @@ impl KeepOut {
         }
     }
 
-    /// Takes a message that the neighbour is not flown, with its reported position.
-    ///
-    /// A message with the number of the current association is late, and ignored.
+    /// Takes a message that the neighbour is not flown, with its reported position. One of the current association is late, and
+    /// ignored.
     pub(super) fn see(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.heard;
         if fence.says(Fence::RELEASED) && fence.says(Fence::UNPLACED) && !is_late {
@@ -396,10 +381,9 @@ impl KeepOut {
         ways.is_some_and(|(from, to)| self.way(from, to, &own.config) != to)
     }
 
-    /// Returns the part of the path from `from` to `to` that keeps the separation from a drone that is not flown.
-    ///
-    /// If `from` is closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are
-    /// the separation apart across the line. Within the separation along x only moves across the line away from the drone remain.
+    /// Returns the part of the path from `from` to `to` that keeps the separation from a drone that is not flown. If `from` is
+    /// closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the separation
+    /// apart across the line. Within the separation along x only moves across the line away from the drone remain.
     pub(super) fn way(&self, from: Placement, to: Placement, config: &GuardConfig) -> Placement {
         let Some((_, drone)) = self.unflown else {
             return to;
@@ -423,9 +407,8 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits relays lost before the first setpoint `x_m`: never heard, they may hover anywhere beyond.
-    ///
-    /// Their separation is certain from `near_m` on.
+    /// Limits relays lost before the first setpoint `x_m`: never heard, they may hover anywhere beyond, at the separation from
+    /// `near_m` on.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;

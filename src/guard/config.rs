@@ -163,9 +163,8 @@ impl GuardConfig {
             && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
-    /// Returns the x of node `node` while the chain is open, for the agreed `x_m`.
-    ///
-    /// The order is kept, and the positions are the separation apart if the mission's relays fit into the geofence so.
+    /// Returns the x of node `node` while the chain is open, for the agreed `x_m`. The order is kept, and the positions are the
+    /// separation apart if the mission's relays fit into the geofence so.
     #[inline(never)] // called from several places
     pub(super) fn open_place(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.fence.least_x_m;

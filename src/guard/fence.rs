@@ -21,7 +21,7 @@ pub struct Fence {
     /// Position of the sender across the line, or the one it flies to, m: both -1e7 to 1e7.
     pub across: CrossSection,
     /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
-    /// stays where it is across the line.
+    /// must not move across the line.
     pub apart_m: f32,
     /// Sum of the flags [`STILL`](Self::STILL) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -49,7 +49,6 @@ impl Fence {
     /// downstream. With [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
-    /// Returns a message without positions and flags.
     pub(super) const fn without_place(association: u16, echo: u16) -> Self {
         Self {
             association,

@@ -54,9 +54,8 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`.
-    ///
-    /// If that neighbour was never heard, the limit is this relay's position.
+    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`. If that neighbour was never
+    /// heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.is_none() {
@@ -80,9 +79,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown.
-    ///
-    /// Its limits do not apply to where it is flown to by hand.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. Its limits do not apply to
+    /// manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -100,9 +98,8 @@ impl FenceFollower {
         };
     }
 
-    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it.
-    ///
-    /// It is otherwise free if the two were known to be in order.
+    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it. If the two were in order, it is otherwise
+    /// free.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -230,9 +227,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest x of the neighbour upstream and relays beyond it that are not yet the separation below it, m.
-    ///
-    /// It applies until this relay has cleared the first fence: then all of them are below this relay.
+    /// Returns the highest x of the neighbour upstream and relays beyond it that are not yet the separation below it, m. It
+    /// applies until this relay has cleared the first fence: then all of them are below this relay.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)
@@ -241,9 +237,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message, with `low_m` as the valid x.
-    ///
-    /// A relay that is not `placed`, that is in order with its neighbour downstream, only sends a halt request.
+    /// Returns the pending message, with `low_m` as the valid x. A relay that is not `placed`, that is in order with its
+    /// neighbour downstream, only sends a halt request.
     pub(super) fn tell(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.tells_halt());
         if self.association.node == 0 || !is_due {

@@ -65,8 +65,7 @@
 //! a few messages per relay at worst.
 //!
 //! If neighbours are to be closer along x, the same is true for the positions in an open chain, so each relay can move across the
-//! line, and none needs that again before the next agreement. Then the steps take their final values, and the same is true for
-//! the agreed positions.
+//! line, and none needs that again before the next agreement. Then the steps take their final values, and all arrive.
 //!
 //! # Limitations
 //!
@@ -378,9 +377,8 @@ impl Guard {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and a neighbour, or its two neighbours, are known to be out of order.
-    ///
-    /// Each neighbour may be in order with this relay by the error of the reports only, although the two are not with each other.
+    /// Returns true if this relay and a neighbour, or its two neighbours, are known to be out of order. Each neighbour may be in
+    /// order with this relay by the error of the reports only, although the two are not with each other.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)

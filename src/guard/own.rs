@@ -13,7 +13,6 @@ const MOST_STANDS: u8 = 5;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
     pub(super) config: GuardConfig,
-    /// Node number.
     node: u16,
     /// Agreed position, inside the geofence.
     pub(super) target: Option<Placement>,
@@ -27,14 +26,12 @@ pub(super) struct Own {
     pub(super) open: bool,
     /// True while this relay holds its position, because it or another one is not in order with its neighbours.
     pub(super) halted: bool,
-    /// Last reported position.
     pub(super) reported: Option<Placement>,
     /// Last position sent while not flown.
     pub(super) told: Placement,
     /// Reminders since the last change of the setpoint.
     stands: u8,
-    /// Last setpoint at which this relay arrived, or its first one. It is on its way from there, so it stops no farther outside
-    /// of the geofence than that.
+    /// Last setpoint at which this relay arrived, or its first one. It is on its way from there, so it stops no farther outside.
     left: Placement,
 }
 
@@ -57,7 +54,6 @@ impl Own {
         }
     }
 
-    /// Sets the next setpoint.
     pub(super) fn go(&mut self, setpoint: Placement, now: Instant) {
         if self.across() != setpoint.cross_section() {
             self.turned = now;
@@ -82,7 +78,6 @@ impl Own {
         setpoint.cross_section().at(x_m)
     }
 
-    /// Counts a reminder.
     pub(super) const fn age(&mut self) {
         self.stands = self.stands.saturating_add(1);
     }
@@ -117,9 +112,7 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Starts or ends a halt.
-    ///
-    /// A relay that halts on its way stops where it was last reported, which is in its reachable interval.
+    /// Starts or ends a halt. A relay that halts on its way stops where it was last reported, which is in its reachable interval.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;
@@ -160,7 +153,6 @@ impl Own {
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
     }
 
-    /// Returns the setpoint across the line.
     pub(super) fn across(&self) -> CrossSection {
         self.setpoint.unwrap_or_default().cross_section()
     }
@@ -171,12 +163,10 @@ impl Own {
             .is_none_or(|target| target.cross_section() == self.across())
     }
 
-    /// Returns the agreed x, m.
     pub(super) fn target_m(&self) -> f32 {
         self.target.unwrap_or_default().x_m
     }
 
-    /// Returns the current goal along x, m.
     pub(super) fn goal_m(&self) -> f32 {
         self.goal_of(self.node, self.target_m())
     }

@@ -60,9 +60,8 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`.
-    ///
-    /// If that neighbour was never heard, the limit is this relay's position.
+    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`. If that neighbour was never
+    /// heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.is_none() {
@@ -80,9 +79,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown.
-    ///
-    /// Its limits do not apply to where it is flown to by hand.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. Its limits do not apply to
+    /// manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -100,9 +98,8 @@ impl FenceOwner {
         };
     }
 
-    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it.
-    ///
-    /// It is otherwise free if the two were known to be in order.
+    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it. If the two were in order, it is otherwise
+    /// free.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -136,11 +133,10 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the neighbour is known to be beyond this relay along x.
-    ///
-    /// Each report has an error of up to `hover_m`. Before the first fence is cleared, two relays whose reports are closer than
-    /// that along x are in order only if they may pass each other, that is the separation apart across the line. A pair that was
-    /// in order may since have moved by that error once more at each relay, each time that one halts or is rebooted.
+    /// Returns true if the neighbour is known to be beyond this relay along x. Each report has an error of up to `hover_m`.
+    /// Before the first fence is cleared, two relays whose reports are closer than that along x are in order only if they may
+    /// pass each other, that is the separation apart across the line. A pair that was in order may since have moved by that error
+    /// once more at each relay, each time that one halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.across(), self.across) <= 0.0;
@@ -152,8 +148,7 @@ impl FenceOwner {
         self.counted_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x of this relay, or of any relay beyond it that is in order with it only by the error of the reports,
-    /// m.
+    /// Returns the lowest x, m, of this relay and relays beyond it that are in order only by the error of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
@@ -170,8 +165,7 @@ impl FenceOwner {
         self.granted_m.max(separation_m - taken_m).min(separation_m)
     }
 
-    /// Returns the minimum distance to the relay downstream, m; 0 while a lost one may be closer than the separation, and before
-    /// the first fence is cleared.
+    /// Returns the minimum distance to the relay downstream, m; 0 near a lost one, and before the first fence is cleared.
     pub(super) fn kept(&self, own: &Own, taken_m: f32) -> f32 {
         let is_open = self.association.is_none() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -265,9 +259,8 @@ impl FenceOwner {
         self.clear && self.answered && self.counted_m >= self.fence_m
     }
 
-    /// Returns the best step, m.
-    ///
-    /// It is less than the separation only if both have arrived across the line and their agreed positions are that close.
+    /// Returns the best step, m. Below the separation only if both have arrived across the line and the agreed positions are that
+    /// close.
     fn best_apart(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();

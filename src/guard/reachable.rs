@@ -35,9 +35,7 @@ impl Span {
 pub(super) struct ReachableInterval {
     /// Setpoint.
     pub(super) at_m: f32,
-    /// Low end.
     pub(super) low_m: f32,
-    /// High end.
     pub(super) high_m: f32,
     /// Time of the last change of the setpoint.
     changed: Instant,
@@ -58,9 +56,7 @@ impl ReachableInterval {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval for the first setpoint.
-    ///
-    /// Until it takes effect, the relay may be on its way to an earlier one of before the start.
+    /// Returns the interval for the first setpoint. Until it takes effect, the relay may be on its way to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             at_m: x_m,
@@ -117,7 +113,6 @@ impl ReachableInterval {
         }
     }
 
-    /// Returns true if the interval is known.
     pub(super) const fn is_known(&self) -> bool {
         self.known
     }

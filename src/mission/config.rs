@@ -135,12 +135,10 @@ pub struct Interferer {
 }
 
 impl Interferer {
-    /// Returns true if the power is within its range.
     pub(super) const fn is_powered(&self) -> bool {
         within(self.power_w, 1e-6, 1e9)
     }
 
-    /// Returns true if the position is within its range.
     pub(super) const fn is_placed(&self) -> bool {
         within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
     }
@@ -159,8 +157,7 @@ pub enum Interference {
     Source(Interferer),
     /// Interference that is known as a distribution along x only.
     Field(Field),
-    /// Single transmitter at an unknown position. Until the relays have found it ([`crate::Settings::listen`]) they spread
-    /// evenly.
+    /// Single transmitter at an unknown position. Relays spread evenly until they find it ([`crate::Settings::listen`]).
     Unknown,
 }
 
@@ -261,7 +258,6 @@ impl Profile {
     }
 }
 
-/// Returns true if `value` is a number in [`least`, `most`].
 pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
     value >= least && value <= most
 }

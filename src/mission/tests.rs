@@ -12,7 +12,6 @@ pub(crate) const fn interferer() -> Interferer {
     }
 }
 
-/// The paper's multi-hop scenario with `relays` relays.
 pub(crate) fn paper(relays: u16) -> MissionConfig {
     MissionConfig {
         relays,

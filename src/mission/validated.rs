@@ -1,7 +1,6 @@
 //! Mission with checked parameters, and quantities derived from them.
 //!
-//! Derived are the power ratios of the hops, the minimum steps between relays, and missions with an estimated or unknown
-//! interferer.
+//! Derived are the power ratios of the hops, the minimum steps between relays, and missions for an estimated interferer.
 
 use super::config::{
     FINEST_STEP, Heading, Interference, Interferer, MissionConfig, MissionError, ROUNDING, within,
@@ -197,9 +196,8 @@ impl Mission {
     /// # assert_eq!(MISSION.relays(), 0);
     /// ```
     ///
-    /// # Panics
-    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values that are only known
-    /// at run time use [`Mission::try_new`].
+    /// # Panics Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at
+    /// run time use [`Mission::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
@@ -314,7 +312,6 @@ impl Mission {
         }
     }
 
-    /// Returns the same mission without a minimum separation.
     pub(crate) const fn unseparated(&self) -> Self {
         let config = MissionConfig {
             min_separation_m: 0.0,
@@ -380,10 +377,8 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the last x in pass order that leaves the relays after `index` their minimum separation, m.
-    ///
-    /// `across_squared` is the maximum squared distance across the line between two neighbours among them, m^2; it reduces the
-    /// steps in x.
+    /// Returns the last x in pass order that leaves the relays after `index` their minimum separation, m. `across_squared` is the
+    /// maximum squared distance across the line between two neighbours among them, m^2; it reduces the steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
@@ -491,7 +486,6 @@ pub(super) const FAR: Interferer = Interferer {
     y_m: 1e7,
 };
 
-/// Inverse of its squared distance.
 const FAR_AWAY: f64 = 1e-14;
 
 /// Gains for an unknown interferer with relays of `power_w`: SIR = (D / d)^2 on every hop, so equal hops are best.

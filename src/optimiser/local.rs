@@ -57,7 +57,6 @@ pub struct HopEnd {
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain of the previous node.
     gain_in: PowerRatio,
     /// Gain of the relay: for a hop to a relay, or K in m^2 for the hop to Rx.
     gain_out: f32,
@@ -140,7 +139,6 @@ impl Hops {
 pub struct LocalSearch {
     how: Local,
     hops: Hops,
-    /// Allowed altitudes.
     bottom_m: f32,
     top_m: f32,
     /// Altitudes of the current round.

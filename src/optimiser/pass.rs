@@ -112,9 +112,8 @@ impl Link<'_> {
         }
     }
 
-    /// Appends as many more reaches as one call of a relay may compute; returns true if these are all.
-    ///
-    /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
+    /// Appends as many more reaches as one call of a relay may compute; returns true if these are all. Bounded by 16 reaches; in
+    /// a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -123,7 +122,6 @@ impl Link<'_> {
         reaches.len() < due.min(all) || reaches.len() == all
     }
 
-    /// Returns the reach for one target.
     pub(crate) fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         let mut reaches = PerTarget::new();
         self.extend(&[target], &[from_m], &mut reaches);
@@ -153,9 +151,7 @@ impl Link<'_> {
         }))
     }
 
-    /// Returns the maximum x of the relay before on a pass toward Tx, m.
-    ///
-    /// As many relays as their altitudes allow may be above each other.
+    /// Returns the maximum x of the relay before on a pass toward Tx, m. Relays may be above each other if their altitudes allow.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }

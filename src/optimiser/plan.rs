@@ -34,7 +34,6 @@ pub struct Planner {
     reaches: PerTarget,
     /// Reaches of the current relay, as far as they are computed.
     next: PerTarget,
-    /// Relay whose reaches are computed next, 1 to N.
     index: u16,
     behind: Option<Behind>,
     sweeps: u32,

@@ -41,7 +41,6 @@ pub struct Retreat {
     least_step: f32,
     /// Smallest x of the sender, m.
     end_m: f32,
-    /// True if the receiver is Rx.
     to_rx: bool,
 }
 
@@ -169,10 +168,9 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Returns the minimum of `value` over y in [`low`, `high`], with the smallest y for equal values.
-///
-/// `value` gets y and its quiet. It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the
-/// root is below the second minus the first. Work: at most three values for each field point in between that a hop could reach.
+/// Returns the minimum of `value` over y in [`low`, `high`], with the smallest y for equal values. `value` gets y and its quiet.
+/// It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the root is below the second minus
+/// the first. Work: at most three values for each field point in between that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

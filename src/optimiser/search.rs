@@ -48,7 +48,6 @@ impl core::fmt::Display for Infeasible {
 
 impl core::error::Error for Infeasible {}
 
-/// Highest target that is tried.
 const HIGHEST: f32 = 1e30;
 
 /// Target relative to the ceiling below which the search gives up.
@@ -72,9 +71,7 @@ pub struct Search {
     ceiling: f32,
     /// First target of the fixed-step schedule: the paper's gamma_0.
     start: f32,
-    /// Highest target known to be met.
     feasible: Option<f32>,
-    /// Lowest target known to be missed.
     infeasible: Option<f32>,
     /// infeasible / feasible - 1 before the last sweep.
     width: f32,
@@ -148,9 +145,7 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next ladder by the leader's prediction, for which it expects a commit.
-    ///
-    /// If it is plain, all later ones are.
+    /// Replaces the next ladder by the leader's prediction, for which it expects a commit. If it is plain, all later ones are.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -265,7 +260,6 @@ impl Search {
 }
 
 /// Returns the target with zero slack, by a cubic of log target in the slack through the four points about its sign change.
-///
 /// `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
@@ -304,7 +298,6 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 /// Bisection of targets that are proposed to check that all relays can take their required positions.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
-    /// Lowest refused target.
     high: f32,
     /// Highest accepted target, and its ladder.
     best: Option<(f32, Ladder)>,

@@ -35,8 +35,7 @@
 //!
 //! With receiver noise the reach has no closed form: `noise` searches for it, starting from this one.
 //!
-//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection of the
-//! SIR in f64.
+//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
 
 mod noise;
 mod stretched;
@@ -114,9 +113,7 @@ impl Hop {
         }
     }
 
-    /// Returns the hop from `sender` to a receiver at `at` without a minimum step, at most to `end_m`.
-    ///
-    /// The noise is nu = `noise`, 1/m^2.
+    /// Returns the hop from `sender` to a receiver at `at` without a minimum step, at most to `end_m`. `noise` is nu.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -149,7 +146,6 @@ impl Hop {
         }
     }
 
-    /// Returns the same hop with the maximum x `end_m` of the receiver.
     pub(crate) fn ending(self, end_m: f32) -> Self {
         Self { end_m, ..self }
     }
@@ -211,14 +207,13 @@ impl Hop {
     /// Returns the largest x at which the receiver meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is
     /// none.
     ///
-    /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step before, the
-    /// closest position. Constant work.
+    /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step before.
+    /// Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         self.reach(target, from_m)
             .or_else(|| self.held_back(target, from_m))
     }
 
-    /// Returns the same for a hop without noise.
     pub(super) fn outermost_in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
         self.in_silence(target, from_m)
             .or_else(|| self.held_back(target, from_m))

@@ -14,10 +14,9 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict on a pass of `ladder`, with its `targets`, from the slacks of those that every hop can meet.
-    ///
-    /// A target is committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the
-    /// ladder has no other target: the step of the paper's Algorithm 1.
+    /// Returns the verdict on a pass of `ladder`, with its `targets`, from the slacks of those that every hop can meet. A target
+    /// is committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the ladder has no
+    /// other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -44,10 +43,8 @@ impl Verdict {
     }
 }
 
-/// Returns the index of the highest target that is met, plus one; 0 if none is.
-///
-/// If every relay has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some
-/// may be missed, which does not affect the highest one.
+/// Returns the index of the highest target that is met, plus one; 0 if none is. If every relay has the same altitude, all lower
+/// targets are met too. In a varying field, and with different altitudes, some may be missed, and the highest one still counts.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()

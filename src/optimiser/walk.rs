@@ -4,7 +4,6 @@ use super::pass::{self, Behind, Link};
 use super::spacing::Stand;
 use crate::mission::{Heading, Mission, Profile};
 
-/// Chain with one target.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
     pub(crate) target: f32,
@@ -93,9 +92,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the x of relay `index`, m; `None` if a relay cannot take its required position.
-    ///
-    /// With an `index` of no relay it returns some x if all relays can.
+    /// Returns the x of relay `index`, m; `None` if a relay cannot take its required position. For an `index` of no relay, some
+    /// x.
     pub(crate) fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

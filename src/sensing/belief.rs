@@ -90,9 +90,8 @@ const LOUDER: f64 = 0.025;
 /// Maximum squared deviation of the track from the fit, relative to the expected variance.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of the information for a refinement, and number of refinements until a chain has settled.
-///
-/// So the chain stops sending new estimates of a stationary interferer.
+/// Minimum growth of the information for a refinement, and number of refinements until a chain has settled. So the chain stops
+/// sending new estimates of a stationary interferer.
 const LEARNED: f64 = 1.1;
 const REFINED: u8 = 4;
 
@@ -114,7 +113,6 @@ pub(crate) struct Knowledge {
     chance: f64,
     /// Number of refinements for the same interferer; for a moving one, of those because of more information.
     refined: u8,
-    /// Track of the interferer.
     track: Track,
 }
 
@@ -127,12 +125,9 @@ impl Knowledge {
     };
 }
 
-/// Result of a review of the estimate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Review {
-    /// New estimate to adopt.
     pub(crate) adopt: Option<Belief>,
-    /// Information of the estimate.
     pub(crate) known: Knowledge,
     /// Reason why there is no source.
     pub(crate) unfit: Option<Unfit>,
@@ -140,9 +135,8 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Reviews the estimate `belief`, on which `mission` is based, with the chain's `sums` and the `levels` of its ends.
-///
-/// `before` is the information when `belief` was adopted.
+/// Reviews the estimate `belief`, on which `mission` is based, with the chain's `sums` and the `levels` of its ends. `before` is
+/// the information when `belief` was adopted.
 pub(crate) fn review(
     mission: &Mission,
     belief: &Belief,
@@ -288,9 +282,8 @@ fn followed(
     None
 }
 
-/// Returns the fit with the end at `x_m` as an additional position, if its level fits the others.
-///
-/// Only then does the path loss over the ground agree with the mission's.
+/// Returns the fit with the end at `x_m` as an additional position, if its level fits the others. Only then does the path loss
+/// over the ground agree with the mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -322,9 +315,8 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the receiver, W; 0 without a measurement.
-///
-/// It is the mean of the receiver's level and the source's power over the ground, if the two agree, weighted by their variances.
+/// Returns the interference power at the receiver, W; 0 without a measurement. It is the mean of the receiver's level and the
+/// source's power over the ground, if the two agree, weighted by their variances.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,

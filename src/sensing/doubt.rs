@@ -56,7 +56,6 @@ const ENOUGH: f32 = 3.5;
 /// Maximum ratio of the others' mean weight to that of a position; a smaller weight is lost in the rounding of the sums.
 const LOST: f32 = 3e3;
 
-/// State of the leader's search.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Usual,
@@ -81,7 +80,6 @@ pub(crate) struct Trial {
     second: f32,
 }
 
-/// Action after a pass.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Review the result.
@@ -199,9 +197,8 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor between measurement and estimate above which a relay checks itself.
-///
-/// Its weight is then so small that a trial would not find it, and it does not disturb the others.
+/// Factor between measurement and estimate above which a relay checks itself. Its weight is then so small that a trial would not
+/// find it, and it does not disturb the others.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if the measurement at `place` is absurd compared with the estimate `expected` and with the sums of all `others`.
@@ -224,10 +221,8 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay at `place` still does not fit the sums of all `others`.
-///
-/// `expected` is the estimate there. The difference of v and the others' fit e is (v / e - e / v) / 2, which is symmetric in
-/// both.
+/// Returns true if the measurement of an excluded relay at `place` still does not fit the sums of all `others`. `expected` is the
+/// estimate there. The difference of v and the others' fit e is (v / e - e / v) / 2, which is symmetric in both.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -264,8 +259,7 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of two powers differs from 1 by more than the given squared standard deviations and squared
-/// difference.
+/// Returns true if a ratio of powers differs from 1 by more than these squared standard deviations and difference.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;

@@ -13,9 +13,8 @@ pub(super) struct Factor {
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Factors the products of [`Sums`](super::sums::Sums); `None` if the first three unknowns cannot be separated.
-    ///
-    /// The last unknown is omitted if its pivot is not above `least`.
+    /// Factors the products of [`Sums`](super::sums::Sums); `None` if the first three unknowns cannot be separated. The last
+    /// unknown is omitted if its pivot is not above `least`.
     pub(super) fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
         if !(aa > 0.0) {
@@ -54,7 +53,6 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Returns the unknowns.
     pub(super) fn solve(&self, right: [f64; 4]) -> [f64; 4] {
         let [l1, l2, m2, l3, m3, n3] = self.below;
         let [da, db, dc, dd] = self.diagonal;

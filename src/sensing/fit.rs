@@ -1,8 +1,8 @@
 //! Source estimate: a weighted least-squares fit of the sums, and its uncertainty.
 //!
 //! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is the residual of the
-//! sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four positions, because few
-//! positions leave little residual.
+//! sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four positions, as few of
+//! them leave little residual.
 //!
 //! If no source fits, the closest one is searched on a grid, and on finer ones about its optimum. The coefficients of a source at
 //! (X', Y') are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), with m the products with v, and the
@@ -128,7 +128,6 @@ impl Fit {
         Ok(fit)
     }
 
-    /// Returns v of the fit at these terms.
     pub(crate) fn value(&self, terms: &Terms) -> f64 {
         value(&self.coefficients, terms)
     }
@@ -155,12 +154,10 @@ impl Fit {
         self.variance * self.factor.variance(terms.map(f64::from)) / (heard * heard)
     }
 
-    /// Relative variance of one position.
     pub(crate) const fn variance(&self) -> f64 {
         self.variance
     }
 
-    /// Expected relative variance of one position.
     pub(crate) const fn expected(&self) -> f64 {
         self.expected
     }
@@ -317,9 +314,8 @@ const FINE: i8 = 2;
 /// Number of finer grids, with steps of 0.4 times those of the previous one.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the closest source on one side of the line of positions; `None` if no source fits at all.
-///
-/// `sign` is 1 or -1 for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// Returns X', Y' and k of the closest source on one side of the line of positions; `None` if no source fits at all. `sign` is 1
+/// or -1 for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

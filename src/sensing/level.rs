@@ -13,8 +13,7 @@
 
 /// Measurable range of interference, W, without the receiver's noise.
 ///
-/// The square of a value and of the ratio of any two is finite in the units of [`sensing`](crate::sensing); other values are
-/// rejected.
+/// The square of a value and of the ratio of any two is finite in the units of [`sensing`](crate::sensing); others are rejected.
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
 /// Interference level at an end.
@@ -56,7 +55,6 @@ impl Level {
         is_power(self.power_w) && (0.0..=1e9).contains(&self.count)
     }
 
-    /// Returns true if there is a measurement.
     pub(crate) fn is_heard(self) -> bool {
         self.power_w > 0.0 && self.count > 0.0
     }

@@ -68,7 +68,6 @@ impl Listener {
         self.at.altitude_m += (at.altitude_m - self.at.altitude_m) * share;
     }
 
-    /// Returns the current position and its measurement.
     pub(crate) fn place(&self, distance_m: f32) -> Option<Place> {
         (self.heard.mean > 0.0).then(|| Place {
             terms: terms(distance_m, self.at),
@@ -117,9 +116,7 @@ pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
 pub(crate) struct Average {
     /// Mean; 0 without a measurement.
     pub(crate) mean: f32,
-    /// Number of measurements, after fading.
     pub(crate) weight: f32,
-    /// Time of the last measurement.
     pub(crate) last: Instant,
     /// Mean age of the measurements at `last`, s.
     pub(crate) behind_s: f32,

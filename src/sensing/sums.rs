@@ -41,9 +41,8 @@ impl Sums {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a position with its `terms`, measured v and `expected` v, both above 0.
-    ///
-    /// It counts `share`, with `measured` measurements. At most 60 instructions.
+    /// Adds a position with its `terms`, measured v and `expected` v, both above 0. It counts `share`, with `measured`
+    /// measurements. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -73,7 +72,6 @@ impl Sums {
         *measurements += share * measured;
     }
 
-    /// Adds the sums of others.
     pub(crate) fn merge(&mut self, other: &Self) {
         for (sum, number) in self.numbers.iter_mut().zip(other.numbers) {
             *sum = within(*sum + number);
@@ -101,7 +99,6 @@ impl Sums {
         if count > 0.0 { measured / count } else { 0.0 }
     }
 
-    /// Sum of the weights of all positions.
     pub(crate) fn weight(&self) -> f32 {
         let [weight, ..] = self.numbers;
         weight
@@ -113,7 +110,6 @@ impl Sums {
         if count > 0.0 { age / count } else { 0.0 }
     }
 
-    /// Mean age in microseconds.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

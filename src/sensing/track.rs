@@ -74,7 +74,6 @@ impl Axis {
     }
 }
 
-/// Estimated track of an interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Track {
     axes: [Axis; 2],

@@ -156,7 +156,6 @@ impl<P, D> SerialLink<P, D> {
     }
 }
 
-/// Link with any kind of port and pin.
 pub(super) trait FrameLink {
     /// Passes at most [`READ_LIMIT`] received bytes to `relay`, as bytes of `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
@@ -282,7 +281,6 @@ pub struct SerialStats {
 }
 
 impl SerialStats {
-    /// Counts a failed read.
     pub(crate) fn read_failed(&mut self, fault: Fault) {
         bump(match fault {
             Fault::Overrun => &mut self.overrun,

@@ -185,7 +185,6 @@ macro_rules! polled {
 polled!([U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin] Pair<U, D, UPin, DPin>);
 polled!([P: SerialPort, Pin: OutputPin] Shared<P, Pin>);
 
-/// Polls all links once.
 fn poll(
     now: Instant,
     relay: &mut Relay,

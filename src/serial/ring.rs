@@ -55,7 +55,6 @@ impl Marks {
     }
 }
 
-/// Producer or consumer of a ring.
 #[derive(Debug)]
 struct Side<'q, P> {
     places: &'q [P],
@@ -106,7 +105,6 @@ impl<P: Place> Filler<'_, P> {
         true
     }
 
-    /// Number of items that fit.
     pub(super) fn room(&self) -> usize {
         let Side { places, marks } = &self.0;
         let end = marks.end.load(Ordering::Relaxed);

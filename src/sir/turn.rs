@@ -72,7 +72,6 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
 
 /// Sign of the slope of SIR_1 along x.
 struct Slope {
-    /// X, m.
     x: f32,
     q: f32,
     /// h^2, m^2.
@@ -152,8 +151,8 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
 /// Returns the largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
 ///
 /// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of [`first_hop_turn`] for X
-/// < 0, with noise as well. In a field it is an upper bound: the largest Upsilon right above the transmitter. It grows as the
-/// altitude falls.
+/// < 0, with noise as well. In a field it is an upper bound: the largest Upsilon right above the transmitter. It is larger at
+/// lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

@@ -84,7 +84,6 @@ pub(crate) struct Nonces {
 
 #[cfg(feature = "auth")]
 impl Nonces {
-    /// Swaps sender and receiver.
     pub(crate) const fn turned(self) -> Self {
         Self {
             sender: self.receiver,

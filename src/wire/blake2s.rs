@@ -4,10 +4,8 @@
 //! an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too. With `size_opt` and
 //! `opt-level = 3` it takes 1.6 KB more, and 11 100 instead of 12 800 instructions for the tag of a full sweep; without
 //! `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac` with `sha2` takes several times
-//! the flash. The tests compare this implementation with `blake2`. No branch and no memory address depends on the key or the
-//! message.
+//! the flash. The tests compare this implementation with `blake2`. No branch or address depends on key or message.
 
-/// Length of a block, bytes.
 const BLOCK: usize = 64;
 
 /// Initial state: the square roots of the first eight primes.
@@ -36,9 +34,8 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// Returns an eight-byte digest of `first` followed by `second`, fewer than 2^32 bytes, under `key`.
-///
-/// Work: one block for the key, and one for every 64 bytes begun.
+/// Returns an eight-byte digest of `first` followed by `second`, fewer than 2^32 bytes, under `key`. Work: one block for the key,
+/// and one per 64 bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;

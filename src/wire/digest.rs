@@ -11,7 +11,6 @@ pub fn digest(mission: &Mission) -> u16 {
     of(mission.config())
 }
 
-/// Returns the digest of a mission's parameters.
 pub(super) fn of(c: &MissionConfig) -> u16 {
     let mut crc = CRC_32C.digest();
     crc.update(&c.relays.to_le_bytes());
@@ -54,9 +53,8 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
     low_half(crc.finalize())
 }
 
-/// Returns `digest` combined with the sites of an upload, or `digest` itself without sites.
-///
-/// The same mission between other sites thus counts as another one.
+/// Returns `digest` combined with the sites of an upload, or `digest` itself without sites. Other sites thus make another
+/// mission.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();

@@ -11,7 +11,6 @@ pub const VERSION: u8 = 1;
 /// Length of the header, bytes.
 pub const HEADER: usize = 10;
 
-/// Length of the check sequence, bytes.
 const CHECK: usize = 4;
 
 /// Maximum length of a frame before COBS, bytes.
@@ -82,7 +81,6 @@ pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     close(header, 0, len, None, out)
 }
 
-/// Encodes a message with a tag.
 #[cfg(feature = "auth")]
 pub(crate) fn encode_signed(
     header: Header,
@@ -94,7 +92,6 @@ pub(crate) fn encode_signed(
     close(header, SIGNED, len, Some(signer), out)
 }
 
-/// Encodes a handshake with its tag.
 #[cfg(feature = "auth")]
 pub(crate) fn encode_handshake(
     header: Header,
@@ -234,7 +231,6 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
 }
 
 /// Encodes COBS in place: the `len` bytes from the second one on, fewer than 254, then the delimiter; returns the total length.
-///
 /// The encoders of `cobs` need a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.

@@ -22,8 +22,8 @@
 //!
 //! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It is no proof,
 //! because it does not contain this relay's new nonce: it is no sign of life, it causes nothing but a handshake, and an old nonce
-//! is replaced by the current one, which is larger. So it does no lasting harm: until the current handshake arrives, nothing
-//! could be sent to that node anyway.
+//! is replaced by the current one, which is larger. So it does no lasting harm: before the current handshake, nothing can be sent
+//! to that node.
 
 use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
@@ -33,7 +33,6 @@ use crate::time::{Duration, Instant};
 /// Length of a handshake's body, bytes.
 pub(crate) const HELLO: usize = 17;
 
-/// Maximum number of remembered nodes.
 const PEERS: usize = 8;
 
 /// Maximum difference of two numbers in nonces of one epoch that belong to the same node.
@@ -95,7 +94,6 @@ impl Older {
 }
 
 impl Peer {
-    /// Returns the nonces of frames to this node.
     const fn nonces(&self, epoch: u32) -> Nonces {
         Nonces {
             sender: (epoch as u64) << 32 | self.own as u64,
@@ -104,7 +102,6 @@ impl Peer {
     }
 }
 
-/// Authentication state of a relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Session {
     auth: Auth,
@@ -143,9 +140,8 @@ pub(crate) enum Checked {
 }
 
 impl Session {
-    /// Creates a session without known nodes for a node with claim number `claim`.
-    ///
-    /// A node that is silent for `gone_after` is replaced by another one with its number.
+    /// Creates a session without known nodes for a node with claim number `claim`. A node that is silent for `gone_after` is
+    /// replaced by another one with its number.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         Self {
             auth,
@@ -203,9 +199,8 @@ impl Session {
         }
     }
 
-    /// Schedules such a handshake to a silent node, unless that node restarted with a used nonce.
-    ///
-    /// Shown its own nonce, such a node would continue as its earlier start, and use nonces and counters twice.
+    /// Schedules such a handshake to a silent node, unless that node restarted with a used nonce. Shown its own nonce, such a
+    /// node would continue as its earlier start, and use nonces and counters twice.
     pub(crate) fn ask_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;
@@ -231,7 +226,6 @@ impl Session {
         self.find(to).is_some_and(|peer| peer.proven)
     }
 
-    /// Returns the body of a handshake to node `to`.
     pub(crate) fn handshake(&mut self, to: u16) -> [u8; HELLO] {
         let mut body = [0; HELLO];
         let epoch = self.auth.epoch;
@@ -248,7 +242,6 @@ impl Session {
         body
     }
 
-    /// Returns the signer of frames to node `to`.
     pub(crate) fn signer(&mut self, to: u16) -> Signer<'_> {
         let epoch = self.auth.epoch;
         let nonces = self
@@ -398,10 +391,8 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates an entry for `node` if it has none.
-    ///
-    /// A full table replaces an entry that is not pinned, preferably an unproven one, and of those the least recently used. After
-    /// four billion entries no more are created: a nonce is never used twice.
+    /// Creates an entry for `node` if it has none. A full table replaces an entry that is not pinned, preferably an unproven one,
+    /// and of those the least recently used. After four billion entries no more are created: a nonce is never used twice.
     fn make(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -445,9 +436,8 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch belong to two nodes: their numbers differ by more than one node's do.
-///
-/// The increment by which a node raises its claim number is ignored.
+/// Returns true if two nonces of one epoch belong to two nodes: their numbers differ by more than one node's do. The increment by
+/// which a node raises its claim number is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR

@@ -105,7 +105,6 @@ impl Upload {
         })
     }
 
-    /// Checks the parameters of an upload.
     pub(super) fn checked(
         version: u16,
         base: u16,

@@ -269,8 +269,7 @@ impl Axis {
         let turn = c / self.radius_m;
         let tangent = self.along.minus(self.up.times(turn));
         let normal = self.up.plus(self.along.times(turn)).unit();
-        // North is the projection of the earth's axis onto the ground plane; both vectors are as long as the cosine of the
-        // latitude.
+        // North is the projection of the earth's axis onto the ground plane; both are as long as the cosine of the latitude.
         let north = tangent.dot(Vector::POLE.minus(normal.times(normal.z)));
         let east = tangent.dot(Vector::POLE.cross(normal));
         let length = libm::sqrt(north * north + east * east);

@@ -34,7 +34,6 @@ impl Vector {
         }
     }
 
-    /// Returns the ellipsoid's normal at this point.
     pub(super) fn normal(self) -> Self {
         Self {
             z: self.z / (1.0 - E2),
@@ -118,10 +117,9 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
 /// Radians in 10⁻⁷ degrees.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
-/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees.
-///
-/// The angle is reduced to an eighth of a turn exactly, in integers; sine and cosine of the remainder are fdlibm's series, within
-/// a unit in the last place. A function for any f64 would be ten times as large, for angles that no position has.
+/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The angle is reduced to an eighth of a turn exactly, in
+/// integers; sine and cosine of the remainder are fdlibm's series, within a unit in the last place. A function for any f64 would
+/// be ten times as large, for angles that no position has.
 #[inline(never)] // called from several places
 pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     const EIGHTH: i32 = 450_000_000;

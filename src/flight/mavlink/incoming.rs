@@ -3,7 +3,7 @@
 use super::frame::{Address, MAX_PAYLOAD};
 use super::table::id;
 
-/// Payload of a message; reads beyond its end return the zeros that are not sent.
+/// Payload of a message; reads beyond its end return 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Payload<'a>(pub(super) &'a [u8]);
 

@@ -93,7 +93,6 @@ mod mask {
 /// `MAV_FRAME_GLOBAL_INT`: latitude, longitude, and altitude above mean sea level.
 const FRAME_AMSL: u8 = 5;
 
-/// MAV_CMD_SET_MESSAGE_INTERVAL.
 pub(in crate::flight) const SET_MESSAGE_INTERVAL: u16 = 511;
 
 impl Outgoing<'_> {

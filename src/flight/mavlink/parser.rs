@@ -29,8 +29,7 @@ pub struct Received {
 pub struct Counters {
     /// Valid frames.
     pub frames: u32,
-    /// Known messages with a wrong checksum or unknown incompatible flags: corrupted frames, and sometimes other bytes that look
-    /// like one.
+    /// Known messages with a wrong checksum or unknown incompatible flags: corrupted frames, sometimes other bytes.
     pub broken: u32,
 }
 

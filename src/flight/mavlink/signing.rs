@@ -7,8 +7,8 @@
 //! | 7 to 12 | first 6 bytes of SHA-256 over the key, the frame up to its checksum, link id and timestamp |
 //!
 //! A frame is accepted if its signature is right and its timestamp is above the last one of its sender and link. The first
-//! timestamp of a sender may be up to a minute behind the own one. An accepted timestamp advances the own one, so two ends of a
-//! link share one time.
+//! timestamp of a sender may be up to a minute behind the own one. An accepted timestamp advances the own one, so both ends share
+//! one time.
 //!
 //! *A board without a clock* starts in 2015. Until it has accepted a frame it cannot tell an old one from a new one, so a
 //! replayed recording may be accepted first; after the first current frame none is. Its own frames before that are too old for an
@@ -43,8 +43,8 @@ const BEGIN_S: u64 = 1_420_070_400;
 /// Number of remembered senders; an autopilot forwards frames that others have signed.
 const SENDERS: usize = 8;
 
-/// Sender and its next timestamp. A new sender replaces the one with the oldest last frame, whose frames of the last minute could
-/// then be replayed.
+/// Sender and its next timestamp. A new sender replaces the one with the oldest last frame, whose last minute could then be
+/// replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,

@@ -435,8 +435,7 @@ fn an_old_fence_says_nothing_of_where_its_owner_is() {
     }
 }
 
-/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other: relay 2 sends the lower x upstream, so
-/// that relay 1 relies on no more.
+/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other: relay 2 sends the lower x upstream.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {

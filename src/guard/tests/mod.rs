@@ -77,7 +77,6 @@ impl One {
         self.guard.steer(self.now).unwrap().x_m
     }
 
-    /// Returns its message on `side`.
     fn says(&mut self, side: Side) -> Fence {
         self.guard.steer(self.now);
         self.guard.follower.association.due = true;

@@ -47,10 +47,8 @@ const ASTRAY: f32 = 0.3;
 /// Limit of the negative slack at the end of an ascent, in units of D: the judge makes up for less.
 const ASTRAY_AT_END: f32 = 0.1;
 
-/// Maximum number of iterations.
 const ITERATIONS: u8 = 40;
 
-/// Next step of an ascent.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
     /// Try this fraction of the step with this target, in ln gamma.
@@ -63,13 +61,11 @@ pub(crate) enum AscentStep {
     Over,
 }
 
-/// State of an ascent.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
     /// Target of the nominal chain, in ln gamma, and its slack, m.
     pub(crate) sigma: f32,
     pub(crate) slack: f32,
-    /// Minimum target.
     floor: f32,
     /// Maximum target until the chain is probed, in ln gamma, and its next increase.
     limit: f32,
@@ -121,7 +117,6 @@ impl Ascent {
         }
     }
 
-    /// Returns the current maximum target.
     pub(crate) const fn limit(&self) -> f32 {
         self.limit
     }
@@ -166,7 +161,6 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Starts a backward pass.
     pub(crate) const fn look_back(&mut self) {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }

@@ -17,8 +17,8 @@
 //! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + F_11 R_z R_z') / a
 //! ```
 //!
-//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares the resulting chains with
-//! an independent optimiser.
+//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares them with an independent
+//! optimiser.
 //!
 //! # Coordinates
 //!
@@ -71,9 +71,8 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives for the hop `from` - `to`, with the dependent coordinate first in each triple.
-    ///
-    /// `noise` is nu, 1/m^2. Returns [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
+    /// Returns the derivatives for the hop `from` - `to`, with the dependent coordinate first in each triple. `noise` is nu,
+    /// 1/m^2. Returns [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -143,7 +142,6 @@ impl Bend {
     }
 }
 
-/// Coordinate of a position.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Coordinate {
     #[default]
@@ -200,12 +198,10 @@ impl Coordinate {
     }
 }
 
-/// Returns the coordinates of a position.
 pub(super) const fn triple(place: Placement) -> Triple {
     [place.x_m, place.y_m, place.altitude_m]
 }
 
-/// Returns the difference of two triples.
 pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
@@ -221,7 +217,6 @@ pub(super) struct Tangent {
 }
 
 impl Tangent {
-    /// Returns the hop without noise.
     pub(super) const fn free(c: f32, e: f32) -> Self {
         Self { c, e, spare: 0.0 }
     }

@@ -1,9 +1,8 @@
 //! Value function: the slack of the rest of a chain as a quadratic in the position of the relay before it.
 //!
 //! The slack is the length by which the chain overshoots Rx for a target; all relays maximise it. Its first and second
-//! derivatives by a relay's position are all that the relays before need to know of those after (Bellman's principle). With
-//! second derivatives this is differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard and Todorov
-//! 2014).
+//! derivatives by a relay's position are all that the relays before need to know of those after (Bellman's principle). With the
+//! second, this is differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard and Todorov 2014).
 
 use super::hop::Reach;
 use super::hop::{Coordinate, Triple};
@@ -28,9 +27,8 @@ pub(crate) struct Outlook {
 }
 
 impl Outlook {
-    /// Returns the slack of a last relay at `at`, m, and its derivatives; the last hop is at most `reach_m` long.
-    ///
-    /// The slack is the spare length of that hop. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
+    /// Returns the slack of a last relay at `at`, m, and its derivatives; the last hop is at most `reach_m` long. The slack is
+    /// the spare length of that hop. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -67,9 +65,8 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function through a hop to the relay before, and returns the optimal policy.
-    ///
-    /// The step of the two free coordinates is limited to `low` to `high`, m, relative to the current position.
+    /// Propagates the value function through a hop to the relay before, and returns the optimal policy. The step of the two free
+    /// coordinates is limited to `low` to `high`, m, relative to the current position.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,

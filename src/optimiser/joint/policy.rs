@@ -7,7 +7,6 @@ use crate::sir::square;
 /// Step of a relay in the two free coordinates of its hop.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
-    /// Dependent coordinate.
     pub(super) axis: Coordinate,
     /// True for the larger of the two values that the hop allows for the dependent coordinate.
     pub(super) rising: bool,

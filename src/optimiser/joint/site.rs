@@ -35,13 +35,11 @@ pub(crate) struct Site<'a> {
     pub(super) distance_m: f32,
     /// Minimum distance to the sender, m.
     pub(super) apart_m: f32,
-    /// Maximum SIR of the hop.
     pub(super) most: f32,
 }
 
 impl<'a> Site<'a> {
-    /// Returns the relay that receives from `sender` and is limited to `room`; `first` if the sender is Tx, which needs no
-    /// separation.
+    /// Returns the relay that receives from `sender` and is limited to `room`; `first` if the sender is Tx.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -78,7 +76,6 @@ impl<'a> Site<'a> {
     }
 
     /// Returns the position at `wanted`, or as close to it as the hop reaches, for `target` and a sender at `from_m` along x.
-    ///
     /// `None` if no hop meets the target. x is at most that of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
@@ -103,7 +100,6 @@ impl<'a> Site<'a> {
     }
 
     /// Returns `wanted`, or the reachable cross-section closest to it on the line from the best cross-section in the room.
-    ///
     /// Reachable means without a step back along x; `None` if nothing is. For c > 1 the reach of a hop is a ball: its centre is
     /// (p - m) / (c - 1) from the sender's position p, its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
@@ -326,7 +322,6 @@ fn toward(
     })
 }
 
-/// Largest code of three bytes.
 const LAST: f32 = 16_777_215.0;
 
 /// Cross-section (y, h) of one relay, each in three bytes as a fraction of its room.
@@ -416,11 +411,10 @@ const LITTLE: f32 = 0.999_97;
 /// Bisection steps between Tx and the noise-free optimum of a first hop.
 const END_HALVINGS: u8 = 24;
 
-/// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice.
-///
-/// The optimum is straight away from the interferer, at t times its distance from Tx. With U and B the squared distances along
-/// that line and across it, s = B + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t
-/// s^2, which falls with t. So with noise there is one optimum, closer to Tx.
+/// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice. The optimum is straight away
+/// from the interferer, at t times its distance from Tx. With U and B the squared distances along that line and across it, s = B
+/// + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with
+/// noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);

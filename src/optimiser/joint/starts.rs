@@ -245,9 +245,7 @@ impl Start {
 pub(super) struct Seek {
     /// Highest feasible target, and true if relays have to hold back for it.
     low: Option<(f32, bool)>,
-    /// Lowest infeasible target.
     high: Option<f32>,
-    /// Target to try.
     pub(super) sigma: f32,
     step: f32,
     growth: f32,

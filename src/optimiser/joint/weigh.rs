@@ -20,10 +20,9 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the violation of the minimum separation at `to` in squares, m^2, its weight, and its slope by ln gamma.
-    ///
-    /// A full hop shorter than d_min ends too close to the interferer: |p' - p|^2 = q(|p' - m|^2) / c < d_min^2. With noise this
-    /// is |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// Returns the violation of the minimum separation at `to` in squares, m^2, its weight, and its slope by ln gamma. A full hop
+    /// shorter than d_min ends too close to the interferer: |p' - p|^2 = q(|p' - m|^2) / c < d_min^2. With noise this is |p' -
+    /// m|^2 < L / (1 - nu L) for L = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -44,10 +43,8 @@ impl Site<'_> {
         0.5 * weight * square(near)
     }
 
-    /// Returns the policy of the relay at `to`, and propagates `outlook` to the relay before, at `from`.
-    ///
-    /// The step is limited to `trust` times the distance from the interferer. Work: some 400 multiplications and two square
-    /// roots.
+    /// Returns the policy of the relay at `to`, and propagates `outlook` to the relay before, at `from`. The step is limited to
+    /// `trust` times the distance from the interferer. Work: some 400 multiplications and two square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -101,9 +98,8 @@ impl Site<'_> {
         }
     }
 
-    /// Returns the dependent coordinate and the slope of F by it.
-    ///
-    /// It is the coordinate with the steepest slope that is not at an end of its room `low` to `high`.
+    /// Returns the dependent coordinate and the slope of F by it. It has the steepest slope and is not at an end of its room
+    /// `low` to `high`.
     fn axis(
         &self,
         c: f32,

@@ -52,7 +52,6 @@ const ROUNDING: f32 = 4.0 * f32::EPSILON;
 const CLOSE: f32 = 5e-7;
 
 impl Hop {
-    /// Returns true if the receivers have no noise.
     pub(in crate::optimiser) fn is_silent(&self) -> bool {
         !(self.noise > 0.0)
     }
@@ -83,7 +82,6 @@ impl Hop {
     }
 }
 
-/// Hop with one target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// rho = gamma / A.
@@ -136,8 +134,7 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer at which the curvature of g changes its sign, m; `None` if g is concave
-    /// everywhere.
+    /// Returns the distance from the interferer at which g's curvature changes sign, m; `None` if g is concave.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -151,9 +148,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the last d in [`low`, `high`] at which the target is met, m; `None` if there is none.
-    ///
-    /// `high` is at most the limit by noise. Work: at most 96 evaluations of g, usually five.
+    /// Returns the last d in [`low`, `high`] at which the target is met, m; `None` if there is none. `high` is at most the limit
+    /// by noise. Work: at most 96 evaluations of g, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {

@@ -6,9 +6,8 @@ use crate::root::sqrt_in_place;
 use crate::sir::square;
 
 impl Hop {
-    /// Returns the reach without a minimum step, as a smooth function of all parameters; `None` if there is none.
-    ///
-    /// It is before `from_m` if the distance across the line is longer than the hop may be.
+    /// Returns the reach without a minimum step, as a smooth function of all parameters; `None` if there is none. It is before
+    /// `from_m` if the distance across the line is longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if !(self.noise > 0.0) {
@@ -20,8 +19,7 @@ impl Hop {
             return Some(place);
         }
         let heard = hop.through_noise()?;
-        // Below A the target may be met on two intervals, of which the one before the sender is no hop; above A there is one
-        // interval.
+        // Below A the target may be met on two intervals, the one before the sender being no hop; above A on one.
         let least = if hop.excess > 0.0 { -heard } else { 0.0 };
         Some(from_m + hop.last(least, heard.min(most))?)
     }

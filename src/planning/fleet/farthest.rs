@@ -9,7 +9,6 @@ use crate::optimiser::spacing::Stand;
 use crate::optimiser::walk::{Walk, before};
 use crate::place::Placement;
 
-/// Returns the minimum number of relays for `target`; see [`super::fewest`].
 pub(super) fn fewest(
     mission: &Mission,
     target: f32,
@@ -72,7 +71,6 @@ fn chain<'a, F: Fn(u16) -> Profile>(
     }
 }
 
-/// Returns the positions of the chain for `target`; see [`super::places`].
 pub(super) fn places(
     mission: &Mission,
     target: f32,

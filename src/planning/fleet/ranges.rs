@@ -23,7 +23,6 @@ use crate::sir::square;
 /// Number of additional relays that are tried with a minimum separation.
 const MORE: u16 = 32;
 
-/// Bisection steps of the range of targets.
 const TARGETS: u8 = 48;
 
 fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
@@ -36,9 +35,8 @@ fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
     chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns the minimum number of equal relays for `target` in a field; see [`super::fewest`].
-///
-/// The number without a separation is found by bisection.
+/// Returns the minimum number of equal relays for `target` in a field; see [`super::fewest`]. Without a separation it is found by
+/// bisection.
 pub(super) fn fewest(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {
         mission

@@ -59,15 +59,14 @@
 //!   line on the other side, where (1 / s w)(r - |(X, Y)|) = r / l, 1 / s w is above 1 / l, and SIR_1 rises to both sides.
 //! - On a circle about Rx s and l are linear in (cos w, sin w): they follow an ellipse. q(s) / l with q(s) = s / (1 + nu s) is at
 //!   least v on a convex set, since q(s) - v l is concave, and better with a larger s and a smaller l. So on the arc from the
-//!   point closest to Tx to that farthest from the interferer it has one maximum, which is that of the circle; bisection finds
-//!   it.
+//!   point closest to Tx to that farthest from the interferer it has one maximum, found by bisection.
 //! - On a sphere about Rx l is linear in x, and s in x and y. For Y = 0 SIR_1 is symmetric in y; for any other Y it rises toward
 //!   the side away from the interferer. On that side the relay descends as it moves there, so the lowest altitude is optimal if
 //!   there is room. On the interferer's side it climbs, so the highest may be optimal. In a vertical face along the line the
 //!   level lines may touch in between: `touching`. In the two faces across the line l is constant along such a circle, so they do
 //!   not touch.
-//! - If the touching position is outside of the corridor, another one may be inside, in the lowest plane or in the highest:
-//!   `corridor` searches for it.
+//! - If the touching position is outside of the corridor, another one may be inside, in the lowest plane or the highest: see
+//!   `corridor`.
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 

@@ -21,8 +21,7 @@ const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
 
-/// Returns the best position at `altitude_m` in `along` by `across`. Work: at most 145 lines, each some 90 evaluations of both
-/// hops.
+/// Returns the best position at `altitude_m` in `along` by `across`. Work: at most 145 lines of some 90 evaluations.
 pub(super) fn best(
     hops: &TwoHops<'_>,
     interferer: &Interferer,

@@ -37,7 +37,6 @@ pub(super) struct TwoHops<'a> {
 }
 
 impl TwoHops<'_> {
-    /// Returns SIR_1 and SIR_2.
     fn both(&self, at: Placement) -> (f32, f32) {
         let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
         (first, sir::at_receiver(self.mission, at, self.power_w))
@@ -110,10 +109,8 @@ impl Edge {
         [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
     }
 
-    /// Returns the best position on the edge.
-    ///
-    /// Work: at most 10 evaluations of both hops, and 40 more for each interval on which one SIR rises, the other falls, and they
-    /// cross: without noise one such interval for x and for the altitude, two for y.
+    /// Returns the best position on the edge. Work: at most 10 evaluations of both hops, and 40 more for each interval on which
+    /// one SIR rises, the other falls, and they cross: without noise one such interval for x and for the altitude, two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,

@@ -11,7 +11,6 @@
 //! with |t| from a positive value: one extremum, closer than the noise-free one. For P = 0 the sign is that of -t (a - b + nu
 //! (t^2 + a)^2).
 
-/// Bisection steps, in f64.
 const HALVINGS: u8 = 60;
 
 /// Doublings of t at most until a falling function is below 0.

@@ -59,8 +59,7 @@ impl PlaceCase {
 
 /// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case; `None` in a field.
 ///
-/// Valid for any position of the interferer, and any D and altitude of a valid mission. Work: at most 90 evaluations of both
-/// hops, and with noise 230 more.
+/// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two { mission, profile };

@@ -29,8 +29,8 @@ fn best_of(two: &Two, low: f32, high: f32) -> Found {
 
 /// Returns the optimal position of a relay with `profile` between Tx and Rx; `None` without a field.
 ///
-/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops per field point; for planning, not for a
-/// relay's main loop.
+/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops per field point; not for a relay's main
+/// loop.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.heard()?;
     let two = Two { mission, profile };

@@ -29,8 +29,7 @@ use super::{Found, HALVINGS};
 use crate::mission::{Band, Interferer};
 use crate::place::Placement;
 
-/// Returns the touching position at `y_m`; `None` outside of [0, D] and `band`, and without noise. Work: 40 bisection steps in
-/// f64.
+/// Returns the touching position at `y_m`; `None` outside of [0, D] and `band`, and without noise. 40 bisection steps.
 pub(super) fn inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,

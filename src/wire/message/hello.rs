@@ -26,8 +26,7 @@ pub struct Hello {
     pub form: bool,
     /// True if the sender has restarted and has not taken part in anything yet.
     pub fresh: bool,
-    /// True if the sender could join between the destination and the destination's neighbour: the sender and that node receive
-    /// each other.
+    /// True if the sender could join between the destination and the destination's neighbour: these two receive each other.
     pub ready: bool,
     /// Number of connected relays from the sender on toward its other side, 1 to 1000.
     pub behind: u16,

@@ -1,8 +1,7 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
 //! Each kind of message has one file with its type, its encoder and its decoder, which checks all ranges: a decoded message has
-//! no invalid number. A body is a byte, the `tag`, and postcard of a tuple, whose order is the format. `parts` has what several
-//! kinds share.
+//! no invalid number. A body is a byte, the `tag`, and postcard of a tuple, whose order is the format. `parts` has shared parts.
 
 mod claim;
 mod fence;
@@ -105,8 +104,7 @@ pub enum Message {
     Decision(Decision),
     /// Either direction: fence between two neighbours.
     Fence {
-        /// [`digest`](super::digest::digest) of the sender's mission as loaded before flight, combined with the sites of the
-        /// upload that it flies, if any.
+        /// [`digest`](super::digest::digest) of the sender's mission as loaded before flight, combined with its upload's sites.
         mission: u16,
         /// State of the fence at the sender.
         fence: Fence,

@@ -12,7 +12,6 @@ use crate::wire::upload::Upload;
 /// Length of an encoded upload, bytes: its tag and the fixed-size fields of its wire form.
 pub const UPLOAD: usize = size_of::<u8>() + size_of::<OfferBody>();
 
-/// Length of an offer's body, bytes.
 pub(super) const LENGTH: usize = UPLOAD + size_of::<Word>();
 
 pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
@@ -44,9 +43,8 @@ impl Upload {
     }
 }
 
-/// Wire form: version and base, the numbers in the order of the digest, and the sites.
-///
-/// It is packed, so its size in memory is that on the wire, from which [`UPLOAD`] is computed.
+/// Wire form: version and base, the numbers in the order of the digest, and the sites. It is packed, so its size in memory is
+/// that on the wire, from which [`UPLOAD`] is computed.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {

@@ -49,10 +49,8 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes numbers of targets, and returns the rest.
-///
-/// postcard also accepts longer encodings, with a count padded by empty varint bytes, up to a limit that depends on the width of
-/// usize. They are rejected here, so that all nodes accept the same.
+/// Decodes numbers of targets, and returns the rest. postcard also accepts longer encodings, with a count padded by empty varint
+/// bytes, up to a limit that depends on the width of usize. They are rejected here, so that all nodes accept the same.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -66,7 +64,6 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
 /// Maximum slack or reach, m: a position is at most 1e6, and the last hop is limited to 1e9.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
-/// Number and mission digest of a pass.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct PassId {
     number: Word,
@@ -90,7 +87,6 @@ impl PassId {
     }
 }
 
-/// Position above the line.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct PlaceBody {
     x_m: f32,
@@ -105,14 +101,12 @@ impl PlaceBody {
         }
     }
 
-    /// Returns the position if it is in range.
     pub(super) fn checked(self) -> Option<Placement> {
         let place = Placement::on_line(self.x_m, self.altitude_m);
         is_place(place).then_some(place)
     }
 }
 
-/// Returns true if the position is in range.
 pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
@@ -122,7 +116,6 @@ pub(super) fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
 
-/// Returns a profile if the numbers are in range.
 pub(super) fn profile(altitude_m: f32, power_w: f32) -> Option<Profile> {
     let profile = Profile {
         altitude_m,

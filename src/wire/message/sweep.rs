@@ -72,7 +72,6 @@ impl Sweep {
         }
     }
 
-    /// Decodes the sweep with this tag.
     pub(super) fn decode(tag: u8, body: &[u8]) -> Result<Self, MessageError> {
         let (head, rest): (SweepHead, _) = take(body)?;
         let (between, rest) = match tag {

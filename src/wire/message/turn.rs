@@ -166,7 +166,6 @@ impl Moved {
     }
 }
 
-/// Returns `sir` if it is a valid linear SIR.
 fn sir_in_range(sir: f32) -> Option<f32> {
     (0.0..=f32::MAX).contains(&sir).then_some(sir)
 }

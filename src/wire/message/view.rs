@@ -85,7 +85,6 @@ pub struct Decision {
     pub lease_left: u16,
 }
 
-/// Mission, proposal and position on its path.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct CallBody {
     digest: Word,
@@ -104,7 +103,6 @@ impl CallBody {
         }
     }
 
-    /// Returns the numbers if they are in range.
     fn checked(self) -> Option<(MissionId, ViewId, u16)> {
         let mission_id = MissionId {
             version: self.version.number(),
@@ -117,7 +115,6 @@ impl CallBody {
     }
 }
 
-/// View identifier and size.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SizedBody {
     id: [u8; 4],

@@ -23,7 +23,6 @@ fn session() -> Session {
     Session::new(Auth { key: KEY, epoch: 5 }, 0, GONE)
 }
 
-/// Frame without COBS.
 type Plain = Vec<u8>;
 
 fn plain(frame: &FrameBuf, len: usize) -> Plain {
@@ -245,8 +244,7 @@ fn recorded_handshakes_do_not_drive_out_who_is_known() {
     }
 }
 
-/// A node that restarted without a handshake, or forgot this one, cannot be understood in either direction; `greet` starts a new
-/// session.
+/// A node that restarted without a handshake, or forgot this one, has no session in either direction; `greet` starts one.
 #[test]
 fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();

@@ -13,7 +13,6 @@ use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
 use crate::sir::{Sender, square};
 
-/// Data that all passes share.
 #[derive(Clone, Copy)]
 pub(super) struct SolverContext<'a, F> {
     pub(super) mission: &'a Mission,
@@ -60,7 +59,6 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         (free && band.is_single()).then_some(band.least_m)
     }
 
-    /// Returns true if any relay has a fixed altitude.
     pub(super) fn holds(&self) -> bool {
         (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
     }
@@ -127,7 +125,6 @@ pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Roo
     best.1
 }
 
-/// Relays in a segment.
 pub(super) const SEGMENT: usize = 10;
 /// Relays of a segment in memory; 0 without the feature `altitude`.
 pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
@@ -165,14 +162,12 @@ impl Mark {
     }
 }
 
-/// Relay of the current segment.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stage {
     pub(super) x_m: f32,
     pub(super) policy: Brief,
 }
 
-/// Returns the last segment.
 pub(super) fn last_of(mission: &Mission) -> u8 {
     let last = (usize::from(mission.relays()) - 1) / SEGMENT;
     u8::try_from(last).unwrap_or(u8::MAX)

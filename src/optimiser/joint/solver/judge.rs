@@ -42,9 +42,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.tried(chain, seek, purpose, met.then_some(false))
     }
 
-    /// Checks one more segment, from the last to the first, for positions that let all relays hold back.
-    ///
-    /// `place_m` is the required x of the segment's last relay. Bounded by twenty relays.
+    /// Checks one more segment, from the last to the first, for positions that let all relays hold back. `place_m` is the
+    /// required x of the segment's last relay. Bounded by twenty relays.
     pub(super) fn stand(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -253,9 +252,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of a polished chain that meets `sigma`: one relay by a fraction of its room, halved round by round.
-    ///
-    /// It finds gains that the derivatives do not show because another constraint is active.
+    /// Tries the next move of a polished chain that meets `sigma`: one relay by a fraction of its room, halved round by round. It
+    /// finds gains that the derivatives do not show because another constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -368,14 +366,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Gives up the current start.
     pub(super) fn given_up(&mut self) -> Work {
         self.number += 1;
         Work::Begin
     }
 
-    /// Returns the cross-section of relay `index` in a pass without changes, or in the pass that gives the chain its initial
-    /// shape.
+    /// Returns the cross-section of relay `index` in a pass without changes or in an initial one.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -134,7 +134,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Restarts the pass at Tx.
     pub(super) fn restart(&mut self) {
         self.pass = ForwardPass::default();
     }

@@ -3,7 +3,6 @@
 use crate::optimiser::joint::starts::Seek;
 use crate::place::Placement;
 
-/// State of a forward pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ForwardPass {
     /// Relays that the pass has completed.
@@ -14,11 +13,9 @@ pub(super) struct ForwardPass {
     pub(super) penalty: f32,
     /// Maximum x of the next relay, m.
     pub(super) end_m: f32,
-    /// True if a relay has to hold back.
     pub(super) holds_back: bool,
 }
 
-/// Work item.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Work {
     /// Begin the next start.
