@@ -7,7 +7,6 @@ use crate::time::Duration;
 pub(crate) struct Jitter(u32);
 
 impl Jitter {
-    /// Generator without a seed.
     pub(crate) const NONE: Self = Self(0);
 
     /// Creates a generator; distinct seeds give distinct numbers.

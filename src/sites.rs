@@ -29,7 +29,6 @@ impl Sites {
         bytes
     }
 
-    /// Decodes the bytes of [`Sites::to_bytes`].
     #[cfg(feature = "upload")]
     pub(crate) fn from_bytes(bytes: [u8; LENGTH]) -> Self {
         let mut numbers = [0; LENGTH / 4];

@@ -77,7 +77,6 @@ impl Stats {
     }
 }
 
-/// Increments a counter, saturating.
 #[inline(never)] // called from many places
 pub(crate) fn bump(counter: &mut u32) {
     *counter = counter.saturating_add(1);

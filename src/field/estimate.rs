@@ -207,7 +207,6 @@ impl Fit {
         (w > 0.0).then_some(Self { m, rest, s, w })
     }
 
-    /// Skewness and excess kurtosis.
     fn shape(&self) -> [f32; 2] {
         let Self { m, s, w, .. } = *self;
         let lean = (1.0 - 2.0 * m) / s;
@@ -218,7 +217,6 @@ impl Fit {
     }
 }
 
-/// Converts `part`, 0 to 1, to the nearest fixed-point number.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -71,7 +71,6 @@ impl InNoise<'_> {
         self.field.points
     }
 
-    /// Returns `point` with noise.
     pub(crate) const fn point(&self, point: FieldPoint) -> FieldPoint {
         FieldPoint {
             x_m: point.x_m,

@@ -139,7 +139,6 @@ pub struct Guard {
     disorder: bool,
     /// Reminders in a row without order.
     waits: u8,
-    /// Reminders so far, wrapping.
     reminders: u8,
     refused: u32,
 }

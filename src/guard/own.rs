@@ -9,7 +9,6 @@ use crate::time::Instant;
 /// Reminders, one per second, after which a setpoint short of the agreed position is reported.
 const MOST_STANDS: u8 = 5;
 
-/// State that both fences use.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
     pub(super) config: GuardConfig,
@@ -132,7 +131,6 @@ impl Own {
         }
     }
 
-    /// Sets the first setpoint.
     pub(super) fn begin(&mut self, place: Placement, now: Instant) {
         self.left = place;
         self.go(place, now);

@@ -7,7 +7,6 @@ use crate::time::Instant;
 
 use super::config::GuardConfig;
 
-/// Interval along x, m.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Span {
     low_m: f32,
@@ -33,7 +32,6 @@ impl Span {
 /// Reachable interval of the relay, m along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
-    /// Setpoint.
     pub(super) at_m: f32,
     pub(super) low_m: f32,
     pub(super) high_m: f32,
@@ -44,7 +42,6 @@ pub(super) struct ReachableInterval {
     since: Instant,
     /// Span of earlier setpoints that may still have had an effect at the last report.
     before: Span,
-    /// Time of the last report.
     reported: Instant,
     /// True once a report shows the effect of the first setpoint.
     known: bool,

@@ -152,7 +152,6 @@ impl Ladder {
     }
 }
 
-/// Returns the middle gap and the gaps outward of it.
 fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     let ratio = 1.0 + f32::from(growth) / 16.0;
     let mut next = gap_value(gap);
@@ -174,7 +173,6 @@ fn geometric_mean(low: f32, high: f32) -> f32 {
     sqrt(low) * sqrt(high)
 }
 
-/// Returns the gap of which `gaps` lead from `low` to `high`.
 fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }

@@ -24,7 +24,6 @@ const ROUNDS: u8 = 9;
 /// Bisection steps along x for each altitude.
 const HALVINGS: u8 = 20;
 
-/// Relative rounding error of a step.
 const ROUNDING: f32 = 3e-7;
 
 /// Method of the local search.

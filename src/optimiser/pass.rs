@@ -249,7 +249,6 @@ impl Link<'_> {
     }
 }
 
-/// Hop in either direction.
 enum Onward {
     Rx(Hop),
     Tx(Retreat),

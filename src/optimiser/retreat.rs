@@ -37,7 +37,6 @@ pub struct Retreat {
     gain: f32,
     /// (h - h0)^2, m^2.
     climb_squared: f32,
-    /// Minimum step to the sender, m.
     least_step: f32,
     /// Smallest x of the sender, m.
     end_m: f32,

@@ -76,7 +76,6 @@ pub struct Search {
     /// infeasible / feasible - 1 before the last sweep.
     width: f32,
     ladder: Ladder,
-    /// Number of sweeps with a verdict.
     tried: u32,
     /// True for plain passes: in the paper's schedule, and after a chain with relays that hold back was refused.
     plain: bool,
@@ -237,7 +236,6 @@ impl Search {
         Ok(self.inside(low, high, &targets, slacks))
     }
 
-    /// Returns the next ladder inside a bracket.
     #[inline(never)] // keeps its stack apart from that of `targets`
     fn inside(&mut self, low: f32, high: f32, targets: &[f32], slacks: &[f32]) -> Ladder {
         let width = (high - low) / low;

@@ -74,7 +74,6 @@ pub struct Hop {
     across_squared: f32,
     /// nu = N eta / P, 1/m^2: 0 without noise.
     noise: f32,
-    /// Minimum step to the receiver, m.
     least_step: f32,
     /// True if the sender is Tx, which cannot hold back.
     from_tx: bool,

@@ -125,7 +125,6 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
     }
 }
 
-/// Returns the relay before relay `index` on a pass.
 pub(crate) fn before(mission: &Mission, index: u16) -> Option<u16> {
     match mission.heading() {
         Heading::TowardRx => index.checked_sub(1).filter(|before| *before > 0),

@@ -129,7 +129,6 @@ impl Knowledge {
 pub(crate) struct Review {
     pub(crate) adopt: Option<Belief>,
     pub(crate) known: Knowledge,
-    /// Reason why there is no source.
     pub(crate) unfit: Option<Unfit>,
     /// Transmitter or receiver whose measurements do not fit those of the relays.
     pub(crate) ends: EndsOff,

@@ -39,7 +39,6 @@ impl Factor {
         })
     }
 
-    /// Returns L^-1 `right`.
     fn forward(&self, right: [f64; 4]) -> [f64; 4] {
         let [l1, l2, m2, l3, m3, n3] = self.below;
         let [a, b, c, d] = right;

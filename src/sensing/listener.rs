@@ -24,7 +24,6 @@ pub(crate) struct Listener {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,
-    /// v of the average there.
     pub(crate) v: f32,
 }
 

@@ -53,7 +53,6 @@ pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     ]
 }
 
-/// Returns the sum of `terms` times `coefficients`.
 pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     let [a, b, c, d] = coefficients;
     let [one, u, q, t] = terms.map(f64::from);

@@ -40,9 +40,7 @@ impl Place for AtomicU16 {
 /// Indices of both sides. The ring is empty if they are equal, so one cell is never used.
 #[derive(Debug)]
 pub(super) struct Marks {
-    /// Next cell to read.
     first: AtomicUsize,
-    /// Next cell to write.
     end: AtomicUsize,
 }
 

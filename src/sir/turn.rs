@@ -136,7 +136,6 @@ fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
     low
 }
 
-/// Returns an x beyond `from` at which `holds` is false.
 fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
     let mut at = 2.0 * from;
     for _ in 0..DOUBLINGS {

@@ -124,7 +124,6 @@ fn turn([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *d = [d[3], d[0], d[1], d[2]];
 }
 
-/// Inverts [`turn`].
 fn turn_back([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *b = [b[3], b[0], b[1], b[2]];
     *c = [c[2], c[3], c[0], c[1]];

@@ -41,7 +41,6 @@ const NEAR: u32 = 1 << 12;
 /// Number of handshakes of an older epoch in a row that cannot be delayed ones.
 const WENT_BACK: u8 = 5;
 
-/// Session with one node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,

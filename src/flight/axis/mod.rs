@@ -292,7 +292,6 @@ impl Axis {
         (-AROUND_M..=beyond).contains(&x_m) && y_m.abs() <= AROUND_M && altitude_m.abs() <= AROUND_M
     }
 
-    /// AMSL of the datum at `x`, m.
     fn datum_m(&self, x: f64) -> f64 {
         let [tx, rx] = self.ends_amsl_m;
         tx + (rx - tx) * x / self.distance_m

@@ -41,7 +41,6 @@ pub struct Parser {
     counters: Counters,
 }
 
-/// Classification of the first bytes.
 enum First {
     /// Incomplete frame.
     Part,

@@ -34,7 +34,6 @@ const BEHIND: u64 = 6_000_000;
 /// Maximum timestamp, in the year 2104.
 const LAST: u64 = (1 << 48) - 1;
 
-/// Microseconds per timestamp unit.
 const UNIT_US: u32 = 10;
 
 /// Seconds from 1970-01-01 to 2015-01-01, where timestamps start.

@@ -80,7 +80,6 @@ pub(crate) struct Ascent {
     linear: f32,
     square: f32,
     pub(crate) trust: f32,
-    /// Index of the current fraction in `SHARES`.
     share: u8,
     iterations: u8,
     idle: u8,

@@ -156,7 +156,6 @@ impl Brief {
     }
 }
 
-/// Returns the upper half of an f32's bits, rounded.
 const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

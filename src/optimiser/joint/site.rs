@@ -33,7 +33,6 @@ pub(crate) struct Site<'a> {
     pub(super) sender: Sender,
     pub(super) room: Room,
     pub(super) distance_m: f32,
-    /// Minimum distance to the sender, m.
     pub(super) apart_m: f32,
     pub(super) most: f32,
 }
@@ -336,7 +335,6 @@ impl Cell {
         Self([a, b, c, d, e, f])
     }
 
-    /// Returns the cross-section of the cell.
     pub(super) fn place(self, room: Room) -> CrossSection {
         let Self([a, b, c, d, e, f]) = self;
         CrossSection {

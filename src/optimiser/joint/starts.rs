@@ -12,7 +12,6 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Shape of an initial chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
     /// Parabola over the line; `aside` and `up` are the offsets in the middle, in units of D / 2.
@@ -73,7 +72,6 @@ const SPIRALS: [(f32, f32, f32); 9] = [
 
 /// Path about the interferer along which the logarithm of the distance to it changes linearly with the direction.
 struct Way {
-    /// Direction of the path's end.
     to: Triple,
     angle: f32,
     /// Increase of the logarithm of the distance.

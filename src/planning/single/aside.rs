@@ -201,7 +201,6 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     Some(best)
 }
 
-/// Returns both ends of a band, or one if they are equal.
 fn both_ends(band: Band) -> impl Iterator<Item = f32> {
     let other = (!band.is_single()).then_some(band.most_m);
     core::iter::once(band.least_m).chain(other)

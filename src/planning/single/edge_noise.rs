@@ -51,7 +51,6 @@ impl Slope {
         p * t - (p * p + a - b) - p * b / t - noise * s * s
     }
 
-    /// Returns the derivative of phi.
     fn bend(&self, t: f64) -> f64 {
         let Self { p, a, b, noise } = *self;
         let s = (t - p) * (t - p) + a;
@@ -98,7 +97,6 @@ fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Returns a t beyond `from` at which `holds` is false.
 fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let mut at = 2.0 * from;
     for _ in 0..DOUBLINGS {

@@ -14,7 +14,6 @@ pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<u
     write(&(tag::FENCE, pass, numbers, places, fence.flags), buffer)
 }
 
-/// Decodes the mission digest of the sender, and the fence.
 pub(super) fn decode(body: &[u8]) -> Result<(u16, Fence), MessageError> {
     type FenceBody = (PassId, [Word; 2], [f32; 5], u8);
     let (pass, [echo, number], places, flags): FenceBody = read(body)?;

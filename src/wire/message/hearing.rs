@@ -91,7 +91,6 @@ impl BeliefBody {
 type Parts = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {
-    /// Encodes the message with this tag, for onward or back.
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         let [a, b, c, d, e, f, g, h, i, rest @ ..] = self.sums.numbers;

@@ -41,7 +41,6 @@ pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u
     postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
 }
 
-/// Decodes `bytes` completely; an error if bytes are left.
 pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
     match take(bytes)? {
         (body, []) => Ok(body),
@@ -124,7 +123,6 @@ pub(super) fn profile(altitude_m: f32, power_w: f32) -> Option<Profile> {
     profile.is_valid().then_some(profile)
 }
 
-/// Returns true if all numbers are within [`least`, `FARTHEST_M`].
 pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
     numbers
         .iter()

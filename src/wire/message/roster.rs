@@ -39,7 +39,6 @@ pub struct Roster {
 type Parts = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
-    /// Encodes the message with this tag, for onward or back.
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         let mut parts = Parts::new();

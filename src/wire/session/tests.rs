@@ -18,7 +18,6 @@ const GONE: Duration = Duration::from_millis(15_000);
 
 const KEY: Key = Key::new([0xA5; 32]);
 
-/// Session of node 1, epoch 5.
 fn session() -> Session {
     Session::new(Auth { key: KEY, epoch: 5 }, 0, GONE)
 }
@@ -282,7 +281,6 @@ fn a_handshake_of_another_length_is_forged() {
     }
 }
 
-/// Nonces are never reused.
 #[test]
 fn after_the_last_nonce_nobody_new_is_met() {
     let mut own = session();

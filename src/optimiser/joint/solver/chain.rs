@@ -18,7 +18,6 @@ pub(super) struct SolverContext<'a, F> {
     pub(super) mission: &'a Mission,
     pub(super) interferer: &'a Interferer,
     pub(super) seat_of: &'a F,
-    /// Gain of the mission's common relay power.
     pub(super) gain: PowerRatio,
 }
 
@@ -132,7 +131,6 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 } else {
     0
 };
-/// [`SEGMENT`] as a u16.
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
 /// State of the chain at a segment: the position before it and the value function at its end.

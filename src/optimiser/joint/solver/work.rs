@@ -11,7 +11,6 @@ pub(super) struct ForwardPass {
     pub(super) from: Placement,
     pub(super) old: Placement,
     pub(super) penalty: f32,
-    /// Maximum x of the next relay, m.
     pub(super) end_m: f32,
     pub(super) holds_back: bool,
 }
