@@ -6,8 +6,7 @@
 //! midpoint of the chord C = |R - T|, u its direction, *up* the ellipsoid's normal at m made perpendicular to u, and r the radius
 //! of curvature of the ellipsoid at m in the direction u (Euler: 1/r = cos²α / M + sin²α / N). Then
 //!
-//! - c = (P - m) · u is P's coordinate along the chord, and x = D / 2 + c (1 + (c/r)² / 6), since an arc is longer than its
-//!   chord,
+//! - c = (P - m) · u is P's coordinate along the chord, and x = D / 2 + c (1 + (c/r)² / 6), the longer arc,
 //! - y = (P - m) · (u × up), to the right of the line,
 //! - D is x at R: twice C / 2 (1 + (C / 2r)² / 6).
 //!
