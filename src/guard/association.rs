@@ -457,4 +457,15 @@ impl KeepOut {
     pub(super) const fn clear(&mut self) {
         *self = Self::none();
     }
+
+    /// Keeps clear of relays at `side` that were never heard and may hover anywhere beyond `limit_m`, until any of them has sent
+    /// a message.
+    pub(super) fn expect(&mut self, side: Side, limit_m: f32, separation_m: f32) {
+        let (nearest, near_m) = match side {
+            Side::Upstream => (0, limit_m + separation_m),
+            Side::Downstream => (u16::MAX, limit_m - separation_m),
+        };
+        self.lost = Some((nearest, limit_m));
+        self.near_m = near_m;
+    }
 }

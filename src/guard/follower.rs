@@ -228,11 +228,9 @@ impl FenceFollower {
     }
 
     /// Returns the highest x of the neighbour upstream and relays beyond it that are not yet the separation below it, m. It
-    /// applies while this relay is below the newest fence; beyond it, all of them are below this relay. A fence that was cleared once
-    /// does not suffice: the neighbour raises it if a relay beyond it starts too close.
+    /// applies until this relay has cleared the first fence: then all of them are below this relay.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
-        let is_beyond = self.clear && own.reachable.low_m >= self.fence_m;
-        if self.is_agreed() && !is_beyond {
+        if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)
         } else {
             f32::NEG_INFINITY

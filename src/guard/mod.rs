@@ -32,7 +32,7 @@
 //! | 4 | The owner never raises its setpoint to less than the step before the x it relies on. | the two intervals are the step apart |
 //! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has already been cleared |
 //! | 6 | As far as rule 5 allows, the fence is halfway between the two agreed positions plus half the step. | both can reach their positions |
-//! | 7 | The first fence is the separation beyond the owner's own interval, and beyond the highest x that the fence upstream leaves to its owner. Other fences, and moves across the line, start when the follower has cleared it. | a start that is too close is opened first, and no relay descends onto another |
+//! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, start when the follower has cleared it. Until a relay has cleared the first fence upstream, each of its fences downstream is also the separation beyond the highest x that the fence upstream leaves to its owner. | a start that is too close is opened first, and no relay descends onto another |
 //! | 8 | The first setpoint is the last reported position, with side and altitude, even outside of the geofence. It remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
 //! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
 //! | 10 | With a fence the owner sends the step that it requests. From a step below the separation until the next one that equals it, neither moves across the line: the owner from its request on, the follower from its reception on. | the follower's reported position across the line remains valid |
@@ -282,10 +282,22 @@ impl Guard {
     }
 
     /// Removes the limits of lost relays at `side`, which have landed or were removed.
-    pub fn forget(&mut self, side: Side) {
-        match side {
-            Side::Upstream => self.follower.keep_out.clear(),
-            Side::Downstream => self.owner.keep_out.clear(),
+    ///
+    /// `others` states that the chain has more relays at that side. This relay then keeps clear of them, as of a neighbour that it
+    /// has not heard after a start, until it has heard one of them.
+    pub fn forget(&mut self, side: Side, others: bool) {
+        let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
+        let (is_heard, limit_m, keep_out) = match side {
+            Side::Upstream => (
+                self.follower.is_agreed(),
+                low_m,
+                &mut self.follower.keep_out,
+            ),
+            Side::Downstream => (self.owner.is_heard(), high_m, &mut self.owner.keep_out),
+        };
+        keep_out.clear();
+        if others && !is_heard {
+            keep_out.expect(side, limit_m, self.own.config.separation_m);
         }
     }
 

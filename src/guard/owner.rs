@@ -112,7 +112,7 @@ impl FenceOwner {
         }
     }
 
-    const fn is_heard(&self) -> bool {
+    pub(super) const fn is_heard(&self) -> bool {
         self.association.heard != 0
     }
 
@@ -287,8 +287,9 @@ impl FenceOwner {
             best
         };
         let nearest = own.reachable.high_m + self.apart(own, taken_m).max(ask);
+        let nearest = nearest.max(upstream_m + own.config.separation_m);
         if !self.clear {
-            return Some((nearest.max(upstream_m + own.config.separation_m), ask, true));
+            return Some((nearest, ask, true));
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
         let goal = 0.5 * (own.goal_m() + other_m + best);

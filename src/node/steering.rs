@@ -137,10 +137,10 @@ impl Steering {
         }
     }
 
-    /// Who fell silent at `side` is not in the air any more.
-    pub(crate) fn clear_lost(&mut self, side: Side) {
+    /// Removes the limits of lost relays at `side`; `others` states that the view has more relays there.
+    pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
-            guard.forget(side);
+            guard.forget(side, others);
         }
     }
 

@@ -202,7 +202,7 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
         What::Back(who, side, k) => world.link(who, side, Some(k)),
         What::Forget(k, side) => {
             if let Some(guard) = &mut world.drones[k].guard {
-                guard.forget(side);
+                guard.forget(side, false);
             }
         }
         What::Speed(k, speed) => world.drones[k].speed = speed,
@@ -254,7 +254,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
             .zip(beside(*k, relays))
         {
             if there.is_some_and(|there| gone[there]) {
-                guard.forget(side);
+                guard.forget(side, false);
             }
         }
         guard.commit(place(*target));

@@ -350,7 +350,7 @@ fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
         one.guard.hold_reason(Side::Upstream),
         Some(HoldReason::Lost)
     );
-    one.guard.forget(Side::Upstream);
+    one.guard.forget(Side::Upstream, false);
     one.is_at(110.0);
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
@@ -378,8 +378,8 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
             assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits(), "{side:?}");
             assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
         }
-        one.guard.forget(side);
-        one.guard.forget(side.other());
+        one.guard.forget(side, false);
+        one.guard.forget(side.other(), false);
         assert_eq!(one.setpoint().to_bits(), to_m.to_bits(), "{side:?}");
     }
 }

@@ -180,7 +180,7 @@ fn a_lost_relay_is_kept_clear_of() {
         one.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Lost)
     );
-    one.guard.forget(Side::Downstream);
+    one.guard.forget(Side::Downstream, false);
     assert_eq!(one.setpoint().to_bits(), 400.0_f32.to_bits());
 
     lost.guard.commit(at(50.0));
@@ -188,8 +188,35 @@ fn a_lost_relay_is_kept_clear_of() {
     assert!(least >= 300.0 - 200.0);
     lost.guard.link(Side::Upstream, None);
     assert_eq!(lost.setpoint().to_bits(), least.to_bits());
-    lost.guard.forget(Side::Upstream);
+    lost.guard.forget(Side::Upstream, false);
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
+}
+
+/// An operator has cleared the lost neighbour; the one beyond it was never heard.
+#[test]
+fn a_relay_keeps_clear_of_those_beyond_a_cleared_one_until_it_hears_them() {
+    let mut one = One::new([Some(2), None], 300.0, 300.0);
+    let mut next = One::new([None, Some(3)], 100.0, 100.0);
+    one.guard.link(Side::Upstream, None);
+    one.guard.forget(Side::Upstream, true);
+    one.guard.commit(at(200.0));
+    assert_eq!(one.setpoint().to_bits(), 300.0_f32.to_bits());
+    let reason = one.guard.hold_reason(Side::Upstream);
+    assert_eq!(reason, Some(HoldReason::Lost));
+    // It moves away from them before it moves across the line.
+    one.guard.commit(Placement {
+        y_m: 50.0,
+        ..at(200.0)
+    });
+    assert_eq!(one.guard.steer(one.now), Some(at(310.0)));
+    one.is_at(310.0);
+    one.guard.link(Side::Upstream, Some(1));
+    for _ in 0..6 {
+        one.hears(Side::Upstream, 1, next.says(Side::Downstream));
+        next.hears(Side::Downstream, 3, one.says(Side::Upstream));
+    }
+    one.guard.commit(at(200.0));
+    assert_eq!(one.setpoint().to_bits(), 200.0_f32.to_bits());
 }
 
 #[test]
@@ -205,7 +232,7 @@ fn one_that_was_never_heard_may_be_anywhere() {
         guard.steer(now);
         assert_eq!(guard.steer(now), Some(at(500.0)));
     }
-    guard.forget(Side::Downstream);
+    guard.forget(Side::Downstream, false);
     assert_eq!(guard.steer(now), Some(at(900.0)));
 }
 

@@ -106,7 +106,7 @@ fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
     assert_eq!(row.all[1].guard.hold_reason(Side::Upstream), None);
     // Both may move after an operator has checked.
     row.all[0].guard.commit(at(180.0));
-    row.all[0].guard.forget(Side::Downstream);
+    row.all[0].guard.forget(Side::Downstream, false);
     assert_eq!(row.setpoint(0), Some(180.0));
 }
 

@@ -3,6 +3,7 @@
 use super::state::Node;
 use crate::event::{About, Event};
 use crate::guard::HoldReason;
+use crate::node::context::Member;
 use crate::node::neighbour::liveness::patient_tick;
 use crate::node::timing::first_pass;
 use crate::place::Placement;
@@ -139,9 +140,16 @@ impl Node {
         self.steer(now);
     }
 
-    /// Who fell silent at `side` is not in the air any more.
+    /// Handles the report that the lost relays at `side` are not in the air any more. The others of the view at that side are not
+    /// meant.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
-        self.steering.clear_lost(side);
+        let Member { index, mission, .. } = &self.member;
+        let in_view = match side {
+            Side::Upstream => index.saturating_sub(1),
+            Side::Downstream => mission.relays().saturating_sub(*index),
+        };
+        let lost = u16::from(self.layers.neighbours.at(side).node() != 0);
+        self.steering.clear_lost(side, in_view > lost);
         self.steer(now);
     }
 
