@@ -482,3 +482,53 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     let told = told.expect("relay 2 is in order with relay 3");
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
+
+/// Relay 1 starts beside relay 2, in order with it but for the error of the reports, after relays 2 and 3 have cleared their first fence:
+/// the next fence between these two is the separation beyond relay 1, too (rule 7).
+#[test]
+fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
+    let config = GuardConfig {
+        hover_m: 2.0,
+        ..config()
+    };
+    let places = [
+        Placement {
+            y_m: 20.0,
+            ..at(202.0)
+        },
+        at(200.0),
+        at(212.0),
+    ];
+    let mut guards = [1_u16, 2, 3].map(|k| {
+        let neighbours = [(k == 2).then_some(1), (k == 2).then_some(3)];
+        let neighbours = if k == 3 { [Some(2), None] } else { neighbours };
+        Guard::new(config, neighbours, 7 + u32::from(k), Instant::ZERO)
+    });
+    guards[1].link(Side::Upstream, None);
+    guards[1].forget(Side::Upstream, false);
+    let mut fences = [0.0_f32; 2];
+    for second in 1..20 {
+        let now = Instant::from_millis(1_000 * second);
+        let first = if second < 10 { 1 } else { 0 };
+        if second == 10 {
+            guards[0].link(Side::Downstream, Some(2));
+            guards[1].link(Side::Upstream, Some(1));
+        }
+        for k in first..3 {
+            guards[k].commit(places[k]);
+            guards[k].position(now, places[k]);
+            guards[k].steer(now);
+            guards[k].remind();
+            while let Some((side, to, fence)) = guards[k].poll() {
+                if side == Side::Downstream && fence.number > 0 {
+                    fences[k] = fence.x_m;
+                }
+                let from = u16::try_from(k).unwrap_or(0) + 1;
+                guards[usize::from(to) - 1].hear(side.other(), from, &fence);
+            }
+        }
+    }
+    let [first_m, second_m] = fences;
+    assert!(first_m >= 212.0, "{first_m}");
+    assert!(second_m >= first_m, "{second_m} {first_m}");
+}
