@@ -14,7 +14,7 @@
 //!
 //! The last relay is `Waiting` only while it computes its own part. The leader has no previous relay to reply to, and without an
 //! agreement it has work to do. A pass with a number just below the current one is stale in every phase. Only an agreement or a
-//! turn of Algorithm 2 changes the setpoint.
+//! turn of Algorithm 2 changes the setpoint. In `Holding` and `Infeasible` the leader may still start a sensing pass.
 
 use crate::node::numbering::Stragglers;
 
