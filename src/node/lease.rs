@@ -377,8 +377,9 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Returns the span, in tenths of a second, that a leader announces after it accepts a view 40 s after an unfinished renewal
-    /// of view 1. The new view follows view `base` and loses no relay.
+    /// Returns the span, in tenths of a second, that a leader announces 40 s after an unfinished renewal of view 1.
+    ///
+    /// Just before, it has accepted a view that follows view `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

@@ -87,7 +87,7 @@ pub(super) struct Chain {
     pub(super) parts: Vec<u8>,
     /// Frames in the air, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// All views that were ever decided on, and all that were ever agreed on.
+    /// Lists of all views that were ever decided on, and of all that were ever agreed on.
     pub(super) decrees: Vec<Decree>,
     pub(super) agreed: Vec<Sized>,
     pub(super) cuts: u8,
