@@ -4,9 +4,8 @@ use core::future::Future;
 
 use crate::time::Instant;
 
-/// Time and timers of an executor: `embassy-time`, `rtic-monotonics`, a virtual clock.
-///
-/// A delay alone (`embedded-hal-async`'s `DelayNs`) is not enough, because the relay needs the current time.
+/// Time and timers of an executor: `embassy-time`, `rtic-monotonics`, a virtual clock. A delay alone (`embedded-hal-async`'s
+/// `DelayNs`) is not enough, because the relay needs the current time.
 pub trait Clock {
     /// Returns the time since an arbitrary epoch; never decreases.
     fn now(&self) -> Instant;

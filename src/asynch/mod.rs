@@ -162,16 +162,14 @@ where
         }
     }
 
-    /// Moves bytes between the relay and its ports and handles its timers, forever.
-    ///
-    /// The documentation of [`asynch`](self) describes the work per poll and the effect of dropping the future.
+    /// Moves bytes between the relay and its ports and handles its timers, forever. The documentation of [`asynch`](self)
+    /// describes the work per poll and the effect of dropping the future.
     pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
         self.run_keeping(relay, clock, &mut |_| {}).await
     }
 
-    /// Runs like [`run`](Self::run), and calls `keep` between receiving and sending.
-    ///
-    /// Use `keep` to persist what must be stored before it is sent: see [`Relay::view_record`].
+    /// Runs like [`run`](Self::run), and calls `keep` between receiving and sending. Use `keep` to persist what must be stored
+    /// before it is sent: see [`Relay::view_record`].
     pub async fn run_keeping(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -198,9 +196,8 @@ where
     }
 }
 
-/// Link to a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable pin.
-///
-/// Channel access is up to the modem; this crate only keeps relays from retransmitting in step.
+/// Link to a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable pin. Channel access is
+/// up to the modem; this crate only keeps relays from retransmitting in step.
 #[derive(Debug)]
 pub struct AsyncShared<R, W, Pin = NoPin> {
     channel: AsyncLink<R, W, Pin>,

@@ -46,10 +46,8 @@ impl<'a> AsyncRelay<'a> {
         }
     }
 
-    /// Passes the relay to `work`, for a position, a sample or a mission; the ports run once this task waits.
-    ///
-    /// Returns `None`, and does nothing, inside the `work` of another call, which already has the relay. Takes constant time
-    /// beside that of `work`.
+    /// Passes the relay to `work`, for a position, a sample or a mission; the ports run once this task waits. Returns `None`, and
+    /// does nothing, inside the `work` of another call, which already has the relay. Takes constant time beside that of `work`.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.poke();
@@ -61,10 +59,8 @@ impl<'a> AsyncRelay<'a> {
         self.lend(|relay| look(relay))
     }
 
-    /// Completes with the next event for the firmware.
-    ///
-    /// Only one task can wait at a time; a second one replaces the first. Dropping the future loses no event. Takes constant time
-    /// per poll.
+    /// Completes with the next event for the firmware. Only one task can wait at a time; a second one replaces the first.
+    /// Dropping the future loses no event. Takes constant time per poll.
     pub fn next_event(&self) -> impl Future<Output = Event> + '_ {
         poll_fn(|cx| {
             let event = self.lend(Relay::poll_event).flatten();
@@ -113,7 +109,6 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// Updates the counters of `port`.
     pub(super) fn count(&self, port: Port, count: impl FnOnce(&mut SerialStats)) {
         let counters = self.counters(port);
         let mut stats = counters.get();

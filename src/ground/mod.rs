@@ -1,8 +1,5 @@
 //! Ground station: the transmitter or the receiver as a node that uploads missions and reports interference.
 //!
-//! It offers a new mission to the nearest relay that answers, polls until the chain flies it, and sends its interference
-//! measurements to the relays nearby.
-//!
 //! | progress | state of the polled relay | action |
 //! | --- | --- | --- |
 //! | `Offering` | holds an older mission, or has not answered | send a hello every second, and the mission in reply to the relay's hello; after three unanswered hellos poll the next of the four nearest relays |
@@ -49,8 +46,7 @@ const QUESTIONS: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference; sans-IO.
 ///
-/// Like [`Relay`](crate::Relay) it has no input or output of its own. After every input call
-/// [`poll_transmit`](Self::poll_transmit) until it returns `None`, then wait for a byte or for
+/// After every input call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then wait for a byte or for
 /// [`poll_timeout`](Self::poll_timeout). It accepts any bytes and ignores what is not addressed to it.
 ///
 /// ```
@@ -116,8 +112,7 @@ pub struct Ground {
 impl Ground {
     /// Creates a ground station for relays that were loaded with `base`.
     ///
-    /// `end` is `Upstream` for the transmitter, `Downstream` for the receiver. The epoch in `auth` must be larger at every start,
-    /// as a relay's.
+    /// `end` is `Upstream` at the transmitter. The epoch in `auth` must be larger at every start.
     pub fn new(base: &Mission, end: Side, network: u16, wiring: Wiring, auth: Auth) -> Self {
         let all = base.relays();
         let reach = match wiring {
@@ -156,8 +151,7 @@ impl Ground {
 
     /// Asks the chain which mission it flies; [`Ground::flown`] returns the answer. Ends an upload in progress.
     ///
-    /// The polled relay answers with the upload that it holds. A ground station that knows only the loaded mission learns in this
-    /// way what earlier uploads have changed.
+    /// The polled relay sends the upload that it holds, so that the ground station learns what earlier uploads have changed.
     pub fn ask_flown(&mut self, now: Instant) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -200,13 +194,12 @@ impl Ground {
 
     /// Reports the interference measured here to the relays nearby; returns false if outside 1e-30 to 1e6 W.
     ///
-    /// `power_w` is the mean received power, W, including the receiver's noise but not the chain's own signals, averaged long
-    /// enough for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is
+    /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged long enough
+    /// for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is
     /// enough.
     ///
-    /// A link to one neighbour carries one frame of 23 bytes and a tag, a shared channel one frame to each of the four nearest
-    /// relays. A relay that is absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next
-    /// measurement replaces a lost one.
+    /// A link carries one frame of 23 bytes and a tag, a shared channel one to each of the four nearest relays. A relay that is
+    /// absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next one replaces a lost one.
     pub fn measured(&mut self, power_w: f32) -> bool {
         if !is_level(power_w) {
             return false;
@@ -235,16 +228,14 @@ impl Ground {
 
     /// Returns the counters of sent and received frames.
     ///
-    /// `mission` counts hellos of relays that were loaded with another mission, `foreign` frames of other networks, and
-    /// `overheard` frames to other nodes.
+    /// `mission` counts relays with another loaded mission, `foreign` other networks, `overheard` frames to other nodes.
     pub const fn stats(&self) -> &Stats {
         &self.stats
     }
 
     /// Returns the node numbers of the relays in reach, nearest first, each with true if its key has been verified.
     ///
-    /// A verified relay is present and can read messages. A relay that has restarted, or was sent a new handshake, is unverified
-    /// until it answers. Work: four relays at most.
+    /// After a restart or a new handshake a relay is unverified until it answers. Work: four relays at most.
     pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.within).map(|distance| self.at(distance));
         nodes.map(|node| (node, self.endpoint.knows(node)))
@@ -425,7 +416,6 @@ impl Ground {
         self.again = Some(now + PATIENCE);
     }
 
-    /// Returns the polled relay.
     fn to(&self) -> u16 {
         self.at(self.distance)
     }

@@ -9,36 +9,36 @@
 //!
 //! | state | event | action | next state |
 //! | --- | --- | --- | --- |
-//! | any | own claim, or a frame with a tag of its own, received | none: an echo of its own radio | same |
+//! | any | own claim, or frame with a tag of its own, received | none: an echo of its own radio | same |
 //! | any | claim of another node received, the first for twice `dead_after` | `Event::IndexTaken` | same |
-//! | active | other frame under its own number, no key | send a claim, and 8 more every four `hop_time`; an echo of its own was received within `probe_after`: none | active |
+//! | active | other frame with its own index received, no key | send a claim, and 8 more every four `hop_time`; none if an echo of its own was received within `probe_after` | active |
 //! | active | smaller claim, or one that does not name its own | send a claim, and 32 more every four `hop_time` while the other node is not known to be passive | active |
 //! | active | claim of a passive node | send a claim | active |
-//! | active | larger claim of the same epoch, it has held a place since before it first received the other node, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
-//! | active | larger claim otherwise | discard its agreed place | passive |
-//! | active | 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after`, on links, no key | send a claim | active |
+//! | active | larger claim of the same epoch; it has held a position since before it first received the other node; its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
+//! | active | larger claim otherwise | drop its agreed position | passive |
+//! | active | on links, no key: 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after` | send a claim | active |
+//! | active | on a shared channel, with a key: one message of each lease renewal sent | send a handshake after it | active |
 //! | passive | every quarter of `probe_after`, no key | send a claim with the flag passive | passive |
-//! | active, on a shared channel, with a key | one message of each pulse sent | send a handshake after it | active |
-//! | passive | claim of an active node, or other frame under its own number | restart the timer | passive |
-//! | passive | handshake of a neighbour that shows the nonce of the other node | none: the neighbour may not know yet that it is gone | passive |
-//! | passive | timer of twice `dead_after`, and up to an eighth more by chance, expired | leave the view; ask for another one | active |
-//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; leave the view; ask for another one | active |
+//! | passive | claim of an active node, or other frame with its own index received | restart the timer | passive |
+//! | passive | handshake of a neighbour that shows the nonce of the other node | none: the neighbour may not know yet that the node is gone | passive |
+//! | passive | timer of twice `dead_after`, and a random part of up to an eighth more, expired | leave the view; request a new one | active |
+//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; leave the view; request a new one | active |
 //!
 //! Claims are sent at most once in four `hop_time`.
 //!
 //! # Safety
+//! A relay becomes passive as soon as it receives a larger claim, and the order of claims is total. If two active nodes exchange
+//! claims, the one with the smaller claim therefore becomes passive, unless it raises its claim number; since it does so only
+//! once, the exchange ends after three claims. Only a relay that had a position before it first received the other node raises
+//! its number. It therefore keeps its position when a copy of it is switched on later, although that copy may have been placed in
+//! a new view meanwhile.
 //!
-//! A relay becomes passive as soon as it receives a larger claim, and the order of claims is total. Of two active nodes that exchange claims
-//! the one with the smaller claim thus becomes passive, unless it raises its claim number; since it does so once, the exchange ends after
-//! three claims. Only a relay that had a place before it first received the other node raises it, so it keeps its place when a copy of it
-//! is switched on later, although that copy may have been placed in a new view meanwhile.
-//!
-//! With a key, only a handshake with the right tag counts as a claim, and nothing else that bears this relay's number is answered. A recorded
-//! handshake has no effect: those of this relay have an older epoch or its own claim number, and those of another node are true or have been
-//! overtaken by a larger claim. A message under its own number cannot be checked, because its tag covers nonces that only its two ends
-//! know: it raises the event and restarts the timer of a passive relay, and makes no relay passive.
-//! The neighbours apply the same order: they believe the larger nonce, and show it to the node that sends the smaller one. Once the node of the
-//! larger nonce is silent for `dead_after` they forget it, and believe the next one.
+//! With a key, only a handshake with the right tag counts as a claim, and no other frame with this relay's index is answered. A
+//! replayed handshake has no effect: one of this relay has an older epoch or its own claim number, and one of another node is
+//! still true or superseded by a larger claim. A message with its own index cannot be verified, because its tag covers nonces
+//! that only its two ends know: it raises the event and restarts the timer of a passive relay, but makes no relay passive. The
+//! neighbours apply the same order: they accept the larger nonce, and show it to the node that sends the smaller one. Once the
+//! node of the larger nonce has been silent for `dead_after` they forget it, and accept the next one.
 //!
 //! Two nodes with one index can propose views with the same identifier for different members. Therefore a relay that becomes
 //! active drops its view, lease and proposal, as after a restart with its vote record; no relay takes part in a lease renewal
@@ -64,7 +64,6 @@ pub(crate) enum Sender {
 /// The claim of another node to this relay's number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
-    /// Claim number.
     pub(crate) number: u32,
     /// True if it is of a newer epoch than this relay; false if it is of the same epoch.
     pub(crate) newer_epoch: bool,
@@ -163,7 +162,6 @@ impl DuplicateIndex {
         duplicate
     }
 
-    /// Returns the claim number of this relay.
     pub(crate) const fn number(&self) -> u32 {
         self.number
     }
@@ -197,7 +195,6 @@ impl DuplicateIndex {
         })
     }
 
-    /// Returns the last received claim number of another node; 0 for none.
     pub(crate) const fn heard(&self) -> u32 {
         self.heard
     }
@@ -307,9 +304,8 @@ impl DuplicateIndex {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the unprompted claims on links without a key, and those of a defence.
-    ///
-    /// On a shared channel, which every unprompted frame loads, the other node is received directly, by whatever it sends.
+    /// Starts the unprompted claims on links without a key, and those of a defence. On a shared channel, which every unprompted
+    /// frame loads, the other node is received directly, by whatever it sends.
     fn announce(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();

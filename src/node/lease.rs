@@ -17,7 +17,6 @@
 //! | any | lease expired | drop the agreement; request a new view |
 //!
 //! # Safety
-//!
 //! No relay uses an old agreement once positions of a later view may be used. Suppose that every member took part in renewal n
 //! and that relay r forwarded it at time t: r relies on the agreement until t + span. Every other member reports the completion
 //! no earlier than t: members closer to the leader after r has replied, members farther away after r has forwarded. A member that
@@ -25,7 +24,6 @@
 //! never before r's expiry.
 //!
 //! # Timing
-//!
 //! The span is three round trips plus two periods, at least `dead_after` and at most eight times `dead_after`: on a lossy channel
 //! a silence is weaker evidence. The renewal period is the larger of half of `probe_after` and two round trips; the latter count
 //! for at most a quarter of `dead_after`.
@@ -39,7 +37,6 @@ use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::message::{Message, Pulse, Pulsed};
 
-/// State of a lease.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
     /// State without an agreement in this view, or with one that is not known to all members.
@@ -56,7 +53,6 @@ struct Current {
     span: u16,
 }
 
-/// Lease of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Lease {
     state: LeaseState,
@@ -133,12 +129,9 @@ impl Lease {
 
     /// Accepts `view`, which follows `base` and whose positions must not be used before `rest`.
     ///
-    /// Members of `base` that have not accepted the new view may still hold a lease, but only for as long as they rely on this
-    /// relay, if it was a member of `base`: without it no renewal completes.
-    ///
-    /// The age of an outstanding renewal counts as a round trip only if the view loses no relay (`lost`) and this relay was a
-    /// member of `base`. A relay that was left out of `base` has a renewal of an older view, whose age is the time of its
-    /// absence.
+    /// Members of `base` that have not accepted the new view hold a lease for no longer than they rely on this relay, if it was a
+    /// member of `base`: without it no renewal completes. The age of an outstanding renewal counts as a round trip only if the
+    /// view loses no relay (`lost`) and this relay was a member of `base`; otherwise it measures an outage.
     pub(crate) fn renew(
         &mut self,
         now: Instant,
@@ -222,10 +215,8 @@ impl Lease {
         effects
     }
 
-    /// Extends the lease after all members took part in `pulse`, unless that lease has expired already.
-    ///
-    /// `next` is the span of the next renewal. If it is more than twice as long, the first spans were too short: the lease would
-    /// expire before its renewal.
+    /// Extends the lease after all members took part in `pulse`, unless that lease has expired already. If `next`, the span of
+    /// the next renewal, is more than twice as long, the first spans were too short: the lease would expire before its renewal.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -377,9 +368,8 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Returns the span, in tenths of a second, that a leader announces 40 s after an unfinished renewal of view 1.
-    ///
-    /// Just before, it has accepted a view that follows view `base` and loses no relay.
+    /// Returns the span, in tenths of a second, that a leader announces 40 s after an unfinished renewal of view 1. Just before,
+    /// it has accepted a view that follows view `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

@@ -220,7 +220,7 @@ impl Relay {
 
     /// Writes the next frame to send into `frame`, if there is one. Call it until it returns `None`.
     ///
-    /// The work is linear in the length of the frame, plus a tag if frames are signed.
+    /// The work is linear in the frame's length, plus a tag if frames are signed.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -300,7 +300,7 @@ impl Relay {
 
     /// Restores the [`view_record`](Self::view_record) stored before the relay was switched off in flight.
     ///
-    /// Call it right after the relay was created; only [`resume`](Self::resume) may come before. Takes constant time.
+    /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
     ///
     /// # Errors
     /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and [`RecordError::Begun`] if the
@@ -324,14 +324,12 @@ impl Relay {
         self.node.resume(upload)
     }
 
-    /// Accepts a new mission that was not received over the link; the chain adopts it like any other upload.
-    ///
-    /// Takes constant time.
+    /// Accepts a new mission that was not received over the link; the chain adopts it like any other upload. Constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if the upload is for other relays,
-    /// [`UploadError::Line`] if there is no line on earth for it, and [`UploadError::Old`] if the relay holds a mission that is
-    /// as new.
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays,
+    /// [`UploadError::Line`] without a line on earth for it, and [`UploadError::Old`] if the relay holds a mission that is as
+    /// new.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }

@@ -12,9 +12,8 @@ use crate::wire::message::Message;
 #[cfg(feature = "auth")]
 use crate::wire::session::{Checked, Session};
 
-/// Number of questions to a silent neighbour of which one is accompanied by a handshake that requests a reply.
-///
-/// The neighbour may take another node with this relay's index for this relay; its reply shows which one.
+/// Questions to a silent neighbour of which one comes with a handshake that requests a reply. The reply shows whether the
+/// neighbour takes another node with this relay's index for this relay.
 #[cfg(feature = "auth")]
 const QUESTIONS: u16 = 4;
 
@@ -130,7 +129,6 @@ fn receive_signed(
     }
 }
 
-/// Handles the message in an accepted frame.
 fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     let Ok(message) = Message::decode(frame.body) else {
         return bump(&mut node.stats_mut().malformed);

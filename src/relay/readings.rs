@@ -1,7 +1,4 @@
-//! Getters of a relay, mostly of its last agreement, and inputs besides bytes.
-//!
-//! Inputs are measurements, the drone's position and control state, and lost relays that are out of the way. All take constant
-//! time.
+//! Getters of a relay, and inputs besides bytes: measurements, position, control state, lost relays out of the way.
 
 use super::facade::Relay;
 use crate::field::estimate::Estimate;
@@ -42,7 +39,7 @@ impl Relay {
 
     /// Returns true unless the drone is known to be out of order with a flown neighbour.
     ///
-    /// In that case it must not be engaged before its pilot has flown it to its own side along the line. Pass the value to
+    /// If false, its pilot must fly it to its own side along the line before engaging. Pass the value to
     /// `Autopilot::handle_ready`.
     ///
     /// ```
@@ -57,16 +54,14 @@ impl Relay {
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
     }
 
-    /// Returns the reason why the guard holds the drone back on `side`; `None` without `Settings::guard`.
+    /// Returns the reason why the guard holds the drone back on `side`; `None` without a guard.
     ///
     /// While the drone is not flown only [`HoldReason::Order`] is possible.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
 
-    /// Returns the linear SIR that every hop of the agreed chain meets.
-    ///
-    /// `None` before the first agreement, and while the interference is unknown.
+    /// Returns the linear SIR of every hop of the agreed chain; `None` before an agreement or without known interference.
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
@@ -94,9 +89,8 @@ impl Relay {
 
     /// Returns true while this relay is passive, because another relay with the larger claim uses its index.
     ///
-    /// A passive relay has no setpoint and takes no part in the protocol. It becomes active by
-    /// [`clear_index_taken`](Self::clear_index_taken), or once the other relay has been silent for twice `Settings::dead_after`,
-    /// and has a position again after the next agreement.
+    /// It has no setpoint and takes no part in the protocol until the other relay has been silent for twice
+    /// `Settings::dead_after`, or until [`clear_index_taken`](Self::clear_index_taken) is called.
     pub fn stands_down(&self) -> bool {
         self.node.is_passive()
     }
@@ -147,8 +141,7 @@ impl Relay {
 
     /// Returns the sites of the active mission; `None` for the ones configured before flight.
     ///
-    /// Positions are along the line between these sites. When they change, the firmware must use the new ones for all conversions
-    /// to and from latitude and longitude.
+    /// They define the line of all positions: once they change, convert latitude and longitude by the new ones only.
     pub fn sites(&self) -> Option<Sites> {
         self.node.member().sites()
     }
@@ -170,8 +163,7 @@ impl Relay {
 
     /// Returns the interference measured at the transmitter (upstream) or the receiver (downstream), W.
     ///
-    /// It is the mean without the receiver's noise. `None` before the first report, and if the relay does not listen
-    /// ([`Settings::listen`](crate::Settings::listen)).
+    /// The mean without noise; `None` before a report or without [`Settings::listen`](crate::Settings::listen).
     pub fn level_w(&self, side: Side) -> Option<f32> {
         self.node.round().sensing().level_w(side)
     }
@@ -213,10 +205,9 @@ impl Relay {
         self.node.handle_sample(self.clock.advance(now), sample);
     }
 
-    /// Processes the drone's position at the time `at` of its measurement, not of its reading: `x_m` and altitude.
+    /// Processes the drone's position, `x_m` and altitude, at the time `at` of its measurement. Takes constant time.
     ///
-    /// With `Settings::guard` there is no setpoint before the first position. Takes constant time. A position that is not a
-    /// number, or farther than 1e7 m, is ignored.
+    /// A guard needs it before the first setpoint. A position that is not a number, or farther than 1e7 m, is ignored.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -237,13 +228,12 @@ impl Relay {
             .handle_position(now, self.clock.internal(at), place);
     }
 
-    /// Reports whether the drone flies to the setpoints from now on; initially true.
+    /// Reports whether the drone flies to the setpoints from now on; initially true. Takes constant time.
     ///
     /// Report false while a pilot controls the drone or it is on the ground. With `Settings::guard`, a relay that is not flown
     /// has no setpoint, and its neighbours are informed that it may be anywhere: they keep their positions toward it. When flown
-    /// again, it starts as after power-up, with the next position from [`handle_position`](Self::handle_position).
-    ///
-    /// Takes constant time. A repeated report has no effect.
+    /// again, it starts as after power-up, with the next position from [`handle_position`](Self::handle_position). A repeated
+    /// report has no effect.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -268,8 +258,7 @@ impl Relay {
 
     /// Reports that the other relay with this index ([`Event::IndexTaken`](crate::Event::IndexTaken)) is gone.
     ///
-    /// It has landed or has another index. A [passive](Self::stands_down) relay becomes active, with a larger claim than the
-    /// other had. Takes constant time.
+    /// A [passive](Self::stands_down) relay becomes active, with a larger claim than the other had. Takes constant time.
     pub fn clear_index_taken(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }

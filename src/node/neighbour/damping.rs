@@ -12,11 +12,9 @@
 //! | without a neighbour | candidate heard again after a silence of more than `dead_after` | one more for its link |
 //! | without a neighbour | first answer of any candidate, `probe_after` after the search began or later | all links: at least those of the link that was lost last |
 //!
-//! The last row is a partition: no candidate answered, so all links of the side were down together. If each link were counted
-//! alone, the chain would close over the second nearest node once the nearest one is held down, and every link would be forgiven
-//! two losses.
-//!
-//! A side forgets the losses of a link 32 times `dead_after` after the last one.
+//! The last row is a partition: all links of the side were down together. If each link were counted alone, the chain would close
+//! over the second nearest node once the nearest one is held down, and every link would be forgiven two losses. A side forgets
+//! the losses of a link 32 times `dead_after` after the last one.
 
 use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
@@ -157,10 +155,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the node `distance` places away.
-    ///
-    /// `counts` is false if many frames are lost on the channel: the loss is then added only if the link has flapped before. If
-    /// another link on this side flaps, this link inherits its losses, because both cross the same gap.
+    /// Records the loss of the node `distance` places away. `counts` is false if many frames are lost on the channel: the loss is
+    /// then added only if the link has flapped before. If another link on this side flaps, this link inherits its losses, because
+    /// both cross the same gap.
     pub(super) fn lose(&mut self, distance: u16, counts: bool, now: Instant, settings: &Settings) {
         let most = self.links.iter().map(|link| link.recent(now, settings));
         let most = most.max().filter(|most| *most > FORGIVEN).unwrap_or(0);
@@ -170,10 +167,8 @@ impl Damping {
         }
     }
 
-    /// Records a frame from the node `distance` places away.
-    ///
-    /// `asks` is the start of the search while the side has no neighbour. A search sends requests to all candidates, so a
-    /// candidate that has answered and is then silent for longer than `dead_after` counts as lost.
+    /// Records a frame from the node `distance` places away. `asks` is the start of the search while the side has no neighbour: a
+    /// candidate that has answered the search and is then silent for longer than `dead_after` counts as lost.
     pub(super) fn hear(
         &mut self,
         distance: u16,
@@ -227,9 +222,8 @@ impl Damping {
         link.is_some_and(|link| link.holds(now, settings))
     }
 
-    /// Returns true if a link on this side flaps slowly: then it is worth noticing its next loss early.
-    ///
-    /// Such a link has been lost more often than is forgiven, and stays up for long each time.
+    /// Returns true if a link on this side flaps slowly: then it is worth noticing its next loss early. Such a link has been lost
+    /// more often than is forgiven, and stays up for long each time.
     pub(super) fn is_slow(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW);
         let is_slow = |link: &Link| link.recent(now, settings) > FORGIVEN && link.apart >= slow;

@@ -10,11 +10,9 @@
 //! | silence of `Settings::dead_after`, or of the lease's span if that is longer | - |
 //! | sixteen unanswered questions, and three times as many as before a recent answer | a run of lost frames is not a lost neighbour |
 //!
-//! It is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`.
-//!
-//! Relays of one view that choose their positions jointly compute at the same time and send nothing until they are done. While a
-//! relay computes, it therefore excuses the silence of a neighbour in the same view: the silence counts from the end of its own
-//! computation.
+//! It is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`. Relays of one view that
+//! choose their positions jointly compute at the same time and send nothing meanwhile. The silence of a neighbour in the same
+//! view therefore counts from the end of this relay's own computation.
 
 use crate::node::timing::longest_lease;
 use crate::settings::Settings;
@@ -26,9 +24,8 @@ const QUESTIONS: u16 = 16;
 /// Factor on the recent maximum of unanswered questions.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between urgent questions: sixteen or more fit before `dead_after`.
-///
-/// It is as short as one channel allows for all of a chain of `all` relays.
+/// Returns the interval between urgent questions: sixteen or more fit before `dead_after`. It is as short as one channel allows
+/// for all of a chain of `all` relays.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, u64::from(QUESTIONS))
 }
@@ -53,9 +50,8 @@ fn paced(settings: &Settings, all: u16, least: u64) -> Duration {
     )
 }
 
-/// Returns the silence after which a sign of life is requested.
-///
-/// It is `Settings::probe_after`, or the round trip through a chain of `all` relays if that is longer.
+/// Returns the silence after which a sign of life is requested. It is `Settings::probe_after`, or the round trip through a chain
+/// of `all` relays if that is longer.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
@@ -64,7 +60,6 @@ pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
 /// Number of past questions whose answers are accepted.
 const OPEN: usize = 4;
 
-/// Liveness of a neighbour.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
     /// Time of the last sign of life, or of this relay's start.
@@ -108,11 +103,9 @@ impl Liveness {
         }
     }
 
-    /// Restarts with another node, and keeps the longest run of unanswered questions.
-    ///
-    /// That includes the run that has just ended: if the previous node was not lost after all, the run was too short. If the link
-    /// `was_down`, the run that has ended measures an outage of the link and not the channel, and is dropped. If the link `flaps`
-    /// slowly, the earlier runs are dropped, too.
+    /// Restarts with another node, and keeps the longest run of unanswered questions. That includes the run that has just ended:
+    /// if the previous node was not lost after all, the run was too short. If the link `was_down`, that run measures an outage
+    /// and not the channel, and is dropped. If the link `flaps` slowly, the earlier runs are dropped, too.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             QUESTIONS
@@ -128,7 +121,6 @@ impl Liveness {
         };
     }
 
-    /// Returns the time of the last sign of life, or of this relay's start.
     pub(crate) const fn heard(&self) -> Instant {
         self.heard
     }

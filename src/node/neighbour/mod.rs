@@ -19,7 +19,6 @@ use crate::time::Instant;
 
 use state::Neighbour;
 
-/// Neighbours on both sides.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbours {
     upstream: Neighbour,

@@ -181,7 +181,6 @@ impl Neighbour {
         self.look_at = Some(now + wait);
     }
 
-    /// Returns the selected node, 0 for none.
     pub(crate) const fn node(&self) -> u16 {
         self.node
     }
@@ -266,9 +265,8 @@ impl Neighbour {
         self.look_at
     }
 
-    /// Handles a silence; returns true if the neighbour is lost from this moment on, which is not before `dead`.
-    ///
-    /// `searches` is true if other nodes can be heard here. `asking` replaces the usual interval between questions.
+    /// Handles a silence; returns true if the neighbour is lost from this moment on, which is not before `dead`. `searches` is
+    /// true if other nodes can be heard here. `asking` replaces the usual interval between questions.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -380,9 +378,8 @@ impl Neighbour {
         }
     }
 
-    /// Considers a node that has sent a hello and is not selected; returns true if it is selected from now on.
-    ///
-    /// The candidate hears this relay, and has selected this relay or none.
+    /// Considers a node that has sent a hello and is not selected; returns true if it is selected from now on. The candidate
+    /// hears this relay, and has selected this relay or none.
     pub(crate) fn consider(
         &mut self,
         candidate: Candidate,
@@ -531,17 +528,14 @@ impl AgreedNodes {
         }
     }
 
-    /// Returns the neighbour in the agreed view.
     pub(super) const fn node(self) -> u16 {
         self.in_view
     }
 
-    /// Returns the neighbour at the last decision on a proposal, granted or refused.
     pub(super) const fn counted(self) -> u16 {
         self.counted
     }
 
-    /// Records the proposer: the neighbour `node`, or this relay itself, which then has no predecessor.
     pub(super) const fn proposed_by(&mut self, proposer: Proposer, node: u16) {
         self.proposer = match proposer {
             Proposer::Itself => 0,
@@ -560,7 +554,6 @@ impl AgreedNodes {
         self.counted = node;
     }
 
-    /// Records a refusal: there is no further request until the neighbour is another node than `node`.
     pub(super) const fn refuse(&mut self, node: u16) {
         self.counted = node;
     }

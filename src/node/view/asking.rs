@@ -5,7 +5,7 @@ use crate::node::timing::PAUSE;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Request state: true while a view is requested, and the time of the next request.
+/// State of this relay's view request, and the time of the next one.
 #[derive(Clone, Debug)]
 pub(crate) struct Asking {
     asks: bool,
@@ -33,7 +33,6 @@ impl Asking {
         }
     }
 
-    /// Returns true while this relay requests a view.
     pub(crate) const fn asks(&self) -> bool {
         self.asks
     }

@@ -10,7 +10,7 @@
 //!
 //! No pass is forwarded while a proposal is outstanding. A refused proposal leaves the positions unchanged; its leader proposes
 //! again after `probe_after` or later ([`Asking`]), and a leader without neighbours only if its own vote would suffice. A
-//! proposal is bound to the one node that it was forwarded to: if that neighbour is lost or replaced, this relay requests a later
+//! proposal is bound to the node that it was forwarded to: if that neighbour is lost or replaced, this relay requests a later
 //! view.
 
 use super::asking::Asking;
@@ -68,9 +68,8 @@ impl ViewChange {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
-    /// Restores the acceptor state of a relay that has just been switched on, and requests a view.
-    ///
-    /// `untouched` is true if no other layer has started. Returns an error if this relay has started, or has another mission.
+    /// Restores the acceptor state of a relay that was just switched on, and requests a view. `untouched` is true if no other
+    /// layer has started. Returns an error if this relay has started, or has another mission.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -94,14 +93,12 @@ impl ViewChange {
         Ok(())
     }
 
-    /// Returns the latest known view.
     pub(crate) const fn newest(&self) -> ViewId {
         self.newest
     }
 
-    /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message.
-    ///
-    /// One message could otherwise use up all view numbers; a relay that was away for long repeats its view often enough.
+    /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message. One message could otherwise
+    /// use up all view numbers; a relay that was away for long repeats its view often enough.
     pub(crate) fn heard_of(&mut self, view: ViewId) {
         if view > self.newest {
             self.newest = self.newest.toward(view, LEAP);
@@ -448,9 +445,7 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Handles the timers: retransmission and view requests.
-    ///
-    /// `leads` is true if there is no neighbour toward the leader, `fresh` if nothing has been received since start-up.
+    /// Handles retransmission and view requests. `leads`: there is no neighbour toward the leader; `fresh`: nothing received yet.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -517,7 +512,6 @@ impl ViewChange {
 /// A proposal at one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
-    /// Proposed view.
     pub(crate) view: ViewId,
     /// Mission of the view.
     pub(crate) mission_id: MissionId,
@@ -539,9 +533,7 @@ pub(crate) struct Proposed {
 /// Decision on a proposal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conclusion {
-    /// Number of relays that the proposal has reached.
     pub(super) there: u16,
-    /// View that the decision follows.
     pub(super) base: View,
     pub(super) view: Option<View>,
     pub(super) lease_left: u16,

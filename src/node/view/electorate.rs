@@ -17,30 +17,26 @@
 //! | poll among the members of the newest view known to be agreed on | decision |
 //! | --- | --- |
 //! | all relays of the mission have been polled, members or not | a view of all: no other relay can hold an agreement |
-//! | at most half of the members, or exactly half without the view's proposer | refused |
+//! | fewer than half of the members, or exactly half without the view's proposer | refused |
 //! | a quorum, and a member has accepted a successor that may have been agreed on | the successor with the latest proposal; the leader then proposes anew from it |
 //! | a quorum otherwise | a view of all polled relays |
 //!
 //! # Safety
-//!
 //! Two decisions on the successor of one view have a member of that view in common. If the member accepts the earlier decision
 //! before the later proposal arrives, it reports that decision with its vote. Otherwise it has promised the later proposal and no
 //! longer accepts the earlier decision, so the earlier leader never learns that all members have accepted it. Only members vote.
 //!
 //! # Membership
-//!
 //! Each relay forwards a proposal to only one other, so a proposal takes one route, and every relay that has voted on it is a
 //! member of the view that may result, whether or not it receives the decision. A relay remembers [`VOTES`] proposals without a
 //! known decision, the earliest and the latest. If it has forgotten its vote for a view it cannot vote in that view, but may in
 //! the next one; this is safe.
 //!
 //! # Requirement
-//!
 //! A relay that restarts without its [`ViewRecord`](crate::ViewRecord) is a member of the initial view only, and its promises are
-//! lost. Therefore relays that know no later view, including those that have lost their records, must not form a quorum of the
-//! initial view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it
-//! decides beside the two that remember. A relay that loses its record during a proposal may also forward the same proposal on a
-//! second route.
+//! lost. Therefore relays that know no later view, including those without their records, must not form a quorum of the initial
+//! view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it decides beside
+//! the two that remember. A relay that loses its record during a proposal may also forward the proposal on a second route.
 
 use crate::node::timing::tenths;
 use crate::time::Duration;
@@ -127,10 +123,8 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on `proposal` and returns the poll with this vote; `None` if a later one, or this one, was promised before.
-    ///
-    /// `told` is the poll so far (`None` at the proposer), `held` the remaining leases of other relays as far as this relay
-    /// knows.
+    /// Votes on `proposal` and returns the poll with this vote; `None` if a later one, or this one, was promised before. `told`
+    /// is the poll so far (`None` at the proposer), `held` the remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -218,9 +212,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts the decision on `proposal`, unless a later one was promised; returns true if it was accepted.
-    ///
-    /// `view` is the decided view, which follows `base`, or `None` for a refusal.
+    /// Accepts the decision on `proposal`, unless a later one was promised; returns true if it was accepted. `view` is the
+    /// decided view, which follows `base`, or `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -252,9 +245,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second, at most `most`.
-///
-/// An unknown time counts as `most`.
+/// Returns the time until positions of the next view may be used, in tenths of a second, at most `most`. An unknown time counts
+/// as `most`.
 pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

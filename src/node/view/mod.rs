@@ -2,14 +2,13 @@
 //!
 //! A *view* is an agreed membership: the number of relays and the place of each. View 0 is the chain as configured in the
 //! mission. The digest of every pass includes the view, so a pass is ignored in any other view. A relay whose neighbours differ
-//! from its view, or that receives a pass it cannot take part in, requests a new view from its neighbour toward the leader; the
-//! request is forwarded hop by hop and repeated until a view comes. The relay without a neighbour toward the leader is the
-//! leader. It proposes the view; the proposal is forwarded to the last relay and collects votes on the way, and the decision
-//! travels back.
+//! from its view, or that receives a pass it cannot take part in, requests a new view from its neighbour toward the leader, hop
+//! by hop, until a view comes. The leader, which has no such neighbour, proposes the view; the proposal is forwarded to the last
+//! relay and collects votes on the way, and the decision travels back.
 //!
 //! | event | action |
 //! | --- | --- |
-//! | neighbour differs from the view's and has taken this relay, too; or no neighbour | request a view |
+//! | neighbour differs from the view's and has selected this relay, too; or no neighbour | request a view |
 //! | pass received of another view, from a restarted leader, or after missed passes | request a view |
 //! | no pass for a while after start-up | request a view |
 //! | hello received that requests a view, from a neighbour whose latest view is as new, or that has just started | request a view |

@@ -10,8 +10,7 @@ const FORMAT: u32 = 1;
 
 /// Acceptor state that must survive a reboot in flight.
 ///
-/// It holds the proposals that the relay has promised and accepted, and the newest view that it knows to be agreed on. Without it
-/// a restarted relay could vote twice, and two parts of a chain could each decide on a view.
+/// Without it a restarted relay could vote twice, and two parts of a chain could each decide on a view.
 ///
 /// | event | action of the firmware |
 /// | --- | --- |

@@ -46,9 +46,8 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until all relays of `there` are in one view of them all and know it to be agreed on.
-    ///
-    /// Links between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if [`MOST`] are not
+    /// Returns the number of proposals until all relays of `there` are in one view of them all and know it to be agreed on. Links
+    /// between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if [`MOST`] are not
     /// enough.
     pub(super) fn settles(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();

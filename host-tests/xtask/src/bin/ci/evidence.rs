@@ -31,7 +31,6 @@ impl Evidence {
         Ok(())
     }
 
-    /// Adds one line of the output.
     pub(crate) fn add(&mut self, line: &str) {
         // The heading appears twice: before the panics, and before the names.
         if line == "failures:" {
