@@ -1,4 +1,4 @@
-//! Frames to the node and from it: addressed, checked and only then decoded.
+//! Frames to and from the protocol: address and tag are checked before a message is decoded.
 
 use super::port::Port;
 use crate::node::Node;
@@ -12,8 +12,8 @@ use crate::wire::message::Message;
 #[cfg(feature = "auth")]
 use crate::wire::session::{Checked, Session};
 
-/// Questions to a silent neighbour for each of which one goes with a handshake that asks for a reply: the neighbour may believe another
-/// node of this relay's number, and its reply shows which.
+/// Questions to a silent neighbour of which one comes with a handshake that requests a reply. The reply shows whether the
+/// neighbour takes another node with this relay's index for this relay.
 #[cfg(feature = "auth")]
 const QUESTIONS: u16 = 4;
 
@@ -54,7 +54,7 @@ pub(super) fn receive(
     }
 }
 
-/// Handles a frame under this relay's own number.
+/// Handles a frame with this relay's own index as its sender.
 fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: &Opened<'_>) {
     #[cfg(feature = "auth")]
     if let Some(session) = endpoint.session() {
@@ -74,7 +74,7 @@ fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: 
     node.hear_duplicate(now, sender);
 }
 
-/// Handles a frame to this relay from a node that is a neighbour, or might become one.
+/// Handles a frame to this relay from a neighbour or a possible neighbour.
 fn receive_addressed(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -104,7 +104,7 @@ fn receive_signed(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    // A passive relay waits for the other node itself: the neighbours show the nonce of one that is gone, too.
+    // A passive relay waits for the other node itself: neighbours also show the nonce of a node that is gone.
     if let Some(rival) = rival
         && !node.is_passive()
     {
@@ -122,14 +122,13 @@ fn receive_signed(
             node.meet(side, sender, first);
         }
         Checked::Unproven => node.called(side, sender),
-        // The tag of anything else is wrong, too, while the two do not know each other's nonces yet.
+        // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.
         Checked::Forged if frame.handshake => node.is_forged(side, sender),
         Checked::WentBack => node.went_back(side, sender),
         Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
     }
 }
 
-/// Handles the message in a frame that is accepted.
 fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     let Ok(message) = Message::decode(frame.body) else {
         return bump(&mut node.stats_mut().malformed);
@@ -142,7 +141,7 @@ fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     bump(counter);
 }
 
-/// Writes the next frame; handshakes before messages.
+/// Writes the next frame; handshakes come before messages.
 pub(super) fn poll_transmit(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -177,7 +176,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules the handshake that goes with `message`, if there is one.
+/// Schedules the handshake that accompanies `message`, if there is one.
 #[cfg(feature = "auth")]
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { ask, .. } = message
@@ -193,7 +192,7 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
         && hello.ask
         && !hello.is_heard(node.member().node, to)
     {
-        // The node may have restarted since: then it accepts nothing else, and has nothing to send by itself.
+        // The node may have restarted: then it accepts only handshakes and sends nothing by itself.
         session.ask_silent(to);
     }
 }

@@ -1,4 +1,4 @@
-//! The end of the counter, which no test gets to by sending.
+//! End of the frame counter, which no test can reach by sending.
 
 use super::Relay;
 use crate::mission::tests::paper;
@@ -19,7 +19,7 @@ fn relay(auth: Option<Auth>) -> Relay {
     Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
 }
 
-/// A counter that came again would let an old frame be taken for a new one: better to fall silent.
+/// Checks that the relay stops sending: a repeated counter would let an old frame pass for a new one.
 #[test]
 fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
     let auth = Auth {
