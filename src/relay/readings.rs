@@ -251,7 +251,8 @@ impl Relay {
 
     /// Reports that lost or unflown relays on `side` ([`handle_control`](Self::handle_control)) have landed or were removed.
     ///
-    /// The guard no longer keeps clear of them. Takes constant time.
+    /// The guard no longer keeps clear of them. It keeps clear of the other relays of the view on that side until it has heard the
+    /// nearest one; if that one is lost before, clear again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
