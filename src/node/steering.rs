@@ -103,13 +103,13 @@ impl Steering {
         }
     }
 
-    /// Whether the drone flies to the setpoints from `now` on.
-    pub(crate) fn control(&mut self, now: Instant, flown: bool) {
-        if let Some(guard) = self.guard()
-            && guard.control(now, flown)
-        {
+    /// Takes the control state from `now` on: true while the drone flies to the setpoints. Returns true if a guard did not know that state.
+    pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
+        let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
+        if is_news {
             self.remind_at = Some(now + REMINDER);
         }
+        is_news
     }
 
     /// Places are along another line, since `now` if the drone has flown along the one before.

@@ -242,7 +242,12 @@ impl Relay {
     /// relay.handle_control(Instant::from_millis(9_000), true);
     /// ```
     pub fn handle_control(&mut self, now: Instant, flown: bool) {
-        self.node.handle_control(self.clock.advance(now), flown);
+        self.control(now, flown);
+    }
+
+    /// As [`handle_control`](Self::handle_control). Returns true if the relay has a guard that did not know this control state.
+    pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
+        self.node.handle_control(self.clock.advance(now), flown)
     }
 
     /// Relays at `side` that fell silent, or are not flown ([`handle_control`](Self::handle_control)), have landed, or were taken away: the

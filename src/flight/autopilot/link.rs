@@ -28,6 +28,8 @@ use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::side::Side;
+#[cfg(feature = "upload")]
+use crate::sites::Sites;
 use crate::time::{Duration, Instant, MonotonicClock};
 
 /// An onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
@@ -66,7 +68,10 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 ///   until [`poll_timeout`](Self::poll_timeout) or the next byte.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
-    axis: Axis,
+    pub(super) axis: Axis,
+    /// Sites of the line that the link was created with.
+    #[cfg(feature = "upload")]
+    pub(super) loaded: Sites,
     pace: Pace,
     clock: MonotonicClock,
     began: Instant,
@@ -113,6 +118,8 @@ impl Autopilot {
     /// The link to the autopilot of a drone that flies along `axis`, at most as fast as `pace` says.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
+            #[cfg(feature = "upload")]
+            loaded: axis.sites(),
             axis,
             pace,
             clock: MonotonicClock::new(now),

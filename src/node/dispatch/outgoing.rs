@@ -133,10 +133,13 @@ impl Node {
         self.steer(now);
     }
 
-    /// Whether the drone flies to the setpoints from now on.
-    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) {
-        self.steering.control(now, flown);
-        self.steer(now);
+    /// Takes the control state of the drone: true while it flies to the setpoints. Returns true if a guard did not know that state.
+    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
+        let is_news = self.steering.control(now, flown);
+        if is_news {
+            self.steer(now);
+        }
+        is_news
     }
 
     /// Who fell silent at `side` is not in the air any more.
