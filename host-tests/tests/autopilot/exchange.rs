@@ -1,6 +1,6 @@
 //! Exchange between the link and the relay of one drone.
 
-use uav_relay::flight::autopilot::Autopilot;
+use uav_relay::flight::autopilot::{Autopilot, WaitReason};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
     Auth, Event, GuardConfig, Key, MAX_FRAME, Mission, MissionConfig, Port, Relay, Settings, Side,
@@ -54,11 +54,16 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         if relay.poll_timeout().is_some_and(|at| at <= now) {
             relay.handle_timeout(now);
         }
+        let mut expected = relay.clone();
         let exchanged = vehicle.link.exchange(relay, now);
+        // Control before the position: the first position of an engaged drone is where its relay starts.
+        expected.handle_control(now, vehicle.link.is_flown());
         if let Some(position) = exchanged.position {
             assert!(exchanged.is_news);
+            expected.handle_position(now, position.at, position.place);
             positions.push(position.place);
         }
+        assert!(format!("{relay:?}") == format!("{expected:?}"));
         // The link has what the relay has computed from the newest position.
         let told = told_again(&vehicle.link, relay, now);
         assert_eq!(format!("{:?}", vehicle.link), format!("{told:?}"));
@@ -113,6 +118,14 @@ fn a_relay_has_a_setpoint_while_its_drone_is_engaged_and_the_drone_flies_there()
         vehicle.mode = Mode::Position;
         run(&mut vehicle, &mut relay, 1_100);
         assert_eq!(relay.setpoint(), None, "its pilot flies again");
+
+        vehicle.mode = Mode::Companion;
+        run(&mut vehicle, &mut relay, 2_000);
+        assert!(relay.setpoint().is_some());
+        vehicle.mute = true;
+        run(&mut vehicle, &mut relay, 4_000);
+        assert_eq!(vehicle.link.state(), State::Silent);
+        assert_eq!(relay.setpoint(), None, "nobody knows who flies");
     }
 }
 
@@ -130,8 +143,8 @@ fn a_relay_is_handed_what_the_radio_hears() {
     assert_eq!(relay.stats().samples_refused, 1);
 }
 
-/// Exchanges frames between two relays, unless the second one is silent. The second one flies to its setpoints at once.
-fn talk(first: &mut Relay, second: &mut Relay, now: Instant, is_silent: bool) {
+/// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
+fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_silent: bool) {
     let mut frame = [0; MAX_FRAME];
     while let Some(sent) = first.poll_transmit(now, &mut frame) {
         if sent.port == Port::Downstream && !is_silent {
@@ -142,7 +155,7 @@ fn talk(first: &mut Relay, second: &mut Relay, now: Instant, is_silent: bool) {
         return;
     }
     second.handle_timeout(now);
-    let at = second.setpoint().unwrap_or(place(900.0));
+    let at = second.setpoint().unwrap_or(place(start_m));
     second.handle_position(now, now, at);
     while let Some(sent) = second.poll_transmit(now, &mut frame) {
         if sent.port == Port::Upstream {
@@ -168,7 +181,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
             // The pilot of the second drone takes the sticks, and its relay is switched off later.
             second.handle_control(vehicle.now, false);
         }
-        talk(&mut first, &mut second, vehicle.now, tenths > 300);
+        talk(&mut first, &mut second, vehicle.now, 900.0, tenths > 300);
         while let Some(event) = first.poll_event() {
             vehicle.link.handle_event(event);
             if matches!(event, Event::NeighbourLost { .. }) {
@@ -193,6 +206,22 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     expected.clear_lost(vehicle.now, side);
     assert!(format!("{before:?}") != format!("{expected:?}"));
     assert!(format!("{first:?}") == format!("{expected:?}"));
+}
+
+/// The second of two drones is in the air on the wrong side of the first one.
+#[test]
+fn a_drone_out_of_order_cannot_be_engaged() {
+    let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.armed = true;
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    for _ in 0..200 {
+        run(&mut vehicle, &mut first, 100);
+        talk(&mut first, &mut second, vehicle.now, 50.0, false);
+    }
+    assert!(!first.is_ready());
+    let waits = AutopilotEvent::Waits(WaitReason::NotReady);
+    assert_eq!(vehicle.events.last(), Some(&waits));
 }
 
 /// A mission between other sites, then one between those that the link was created with.
