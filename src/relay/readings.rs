@@ -38,7 +38,7 @@ impl Relay {
     }
 
     /// Returns true unless the drone is known to be out of order with a flown neighbour: it must not be engaged before its pilot has flown
-    /// it to its own side along the line. Hand it to `Autopilot::handle_ready`.
+    /// it to its own side along the line. `Autopilot::exchange` hands it to the link of an autopilot.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
