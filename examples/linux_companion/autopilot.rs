@@ -170,7 +170,7 @@ impl Companion {
             let bytes = bytes.get(..count).unwrap_or_default();
             self.link.handle_bytes(now, bytes);
         }
-        if let Some(position) = self.link.exchange(relay, now).position {
+        if let (_, Some(position)) = self.link.exchange(relay, now) {
             self.astray.handle_place(now, position.place);
         }
         while let Some(frame) = self.link.poll_transmit(now) {

@@ -131,7 +131,7 @@ impl AsyncAutopilot {
             self.news.settle();
             let now = clock.now();
             let exchanged = self.lend(|link| relay.lend(|relay| link.exchange(relay, now)));
-            if exchanged.flatten().is_some_and(|it| it.is_news) {
+            if exchanged.flatten().is_some_and(|(is_news, _)| is_news) {
                 relay.poke();
             }
             wake(&self.listener);

@@ -55,11 +55,11 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
             relay.handle_timeout(now);
         }
         let mut expected = relay.clone();
-        let exchanged = vehicle.link.exchange(relay, now);
+        let (is_news, position) = vehicle.link.exchange(relay, now);
         // Control before the position: the first position of an engaged drone is where its relay starts.
         expected.handle_control(now, vehicle.link.is_flown());
-        if let Some(position) = exchanged.position {
-            assert!(exchanged.is_news);
+        if let Some(position) = position {
+            assert!(is_news);
             expected.handle_position(now, position.at, position.place);
             positions.push(position.place);
         }
@@ -69,7 +69,7 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         assert_eq!(format!("{:?}", vehicle.link), format!("{told:?}"));
         let before = format!("{:?} {relay:?}", vehicle.link);
         let again = vehicle.link.exchange(relay, now);
-        assert_eq!((again.position, again.is_news), (None, false));
+        assert_eq!(again, (false, None));
         assert_eq!(before, format!("{:?} {relay:?}", vehicle.link), "no effect");
         vehicle.answer();
     }
@@ -139,7 +139,7 @@ fn a_relay_is_handed_what_the_radio_hears() {
         ..RADIO_STATUS_DATA::DEFAULT
     };
     vehicle.say_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
-    assert!(vehicle.link.exchange(&mut relay, vehicle.now).is_news);
+    assert!(vehicle.link.exchange(&mut relay, vehicle.now).0);
     assert_eq!(relay.stats().samples_refused, 1);
 }
 
@@ -200,7 +200,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     });
     let before = first.clone();
     vehicle.say_from([255, 190], &command);
-    assert!(vehicle.link.exchange(&mut first, vehicle.now).is_news);
+    assert!(vehicle.link.exchange(&mut first, vehicle.now).0);
     // The guard forgets where the second drone may be.
     let mut expected = before.clone();
     expected.clear_lost(vehicle.now, side);

@@ -8,17 +8,6 @@ use crate::relay::Relay;
 use crate::side::Side;
 use crate::time::Instant;
 
-/// What the relay was handed in one [`Autopilot::exchange`].
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct Exchanged {
-    /// Position of the drone, if a new one has been received.
-    pub position: Option<Position>,
-    /// True if the relay was handed anything that it did not know: its frames, its events and its next timeout may have changed.
-    pub is_news: bool,
-}
-
 impl Autopilot {
     /// Exchanges data with the relay of the same drone, in both directions, and handles the link's timeouts.
     ///
@@ -34,6 +23,9 @@ impl Autopilot {
     /// [`poll_transmit`](Self::poll_transmit). The relay sends the position in the same turn if its ports are served afterwards. A loop
     /// may call it a second time once they have been served: the link then sends a new setpoint in the same turn. A call that has
     /// nothing new to hand over has no effect.
+    ///
+    /// Returns true if the relay was handed anything that it did not know, so that its frames, its events and its next timeout may have
+    /// changed; and the drone's position, if a new one was handed over. A loop that serves the relay's ports after each call ignores both.
     ///
     /// The caller still hands events of the relay to [`handle_event`](Self::handle_event), because [`Relay::poll_event`] returns each event
     /// once, and [`handle_bearing`](Self::handle_bearing) the bearing of an antenna. The first line is that of [`new`](Self::new); an
@@ -75,7 +67,7 @@ impl Autopilot {
     /// # Ok::<(), uav_relay::flight::axis::AxisError>(())
     /// ```
     #[inline(never)] // called from two places of a firmware's loop; its stack frame is released
-    pub fn exchange(&mut self, relay: &mut Relay, now: Instant) -> Exchanged {
+    pub fn exchange(&mut self, relay: &mut Relay, now: Instant) -> (bool, Option<Position>) {
         #[cfg(feature = "upload")]
         self.follow(relay, now);
         self.handle_timeout(now);
@@ -100,7 +92,7 @@ impl Autopilot {
         self.handle_setpoint(now, setpoint);
         let sir_db = relay.target().map(|target| 10.0 * libm::log10f(target));
         self.handle_values(now, sir_db, setpoint);
-        Exchanged { position, is_news }
+        (is_news, position)
     }
 
     /// Switches to the line between the sites of the relay's mission.

@@ -40,7 +40,6 @@ mod vehicle;
 
 pub use astray::OffLine;
 pub use event::{AutopilotEvent, RelayNumbers};
-pub use exchange::Exchanged;
 pub use kind::Kind;
 pub use link::Autopilot;
 pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};

@@ -128,7 +128,7 @@ impl Chain {
             return;
         }
         vehicle.sites = member.relay.sites();
-        let exchanged = vehicle.link.exchange(&mut member.relay, now);
+        let (is_news, _) = vehicle.link.exchange(&mut member.relay, now);
         let is_flown = vehicle.link.is_flown();
         while let Some(frame) = vehicle.link.poll_transmit(now) {
             vehicle.hear(now, &frame);
@@ -151,7 +151,7 @@ impl Chain {
         for turning in turnings {
             self.tell(index, turning, None);
         }
-        if exchanged.is_news || is_sooner {
+        if is_news || is_sooner {
             self.drain(index);
         }
     }
