@@ -81,8 +81,7 @@ pub(crate) struct Circulation {
     started_at: Option<Instant>,
     completed_at: Option<Instant>,
     is_forward_due: bool,
-    is_reply_due: bool,
-    is_in_progress_due: bool,
+    reply_due: Option<Reply>,
     /// Retransmissions since a neighbour replied last.
     retries: u8,
     /// True once the next relay has replied that it has the message.
@@ -105,8 +104,7 @@ impl Circulation {
             started_at: None,
             completed_at: None,
             is_forward_due: false,
-            is_reply_due: false,
-            is_in_progress_due: false,
+            reply_due: None,
             retries: 0,
             is_received: false,
             is_lossy: false,
@@ -163,7 +161,7 @@ impl Circulation {
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
         self.completed_at = Some(now);
-        self.is_reply_due = path.hops > 0;
+        self.reply_due = (path.hops > 0).then_some(Reply::Result);
         self.repeat_reply(now, path);
     }
 
@@ -187,8 +185,7 @@ impl Circulation {
     const fn stop(&mut self, stage: Stage) {
         self.stage = stage;
         self.is_forward_due = false;
-        self.is_reply_due = false;
-        self.is_in_progress_due = false;
+        self.reply_due = None;
         self.replies_left = 0;
         self.timer = None;
     }
@@ -197,11 +194,11 @@ impl Circulation {
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if self.stage == Stage::Completed {
-            self.is_reply_due = true;
+            self.reply_due = Some(Reply::Result);
             self.repeat_reply(now, path);
             return;
         }
-        self.is_in_progress_due = true;
+        self.reply_due = Some(Reply::InProgress);
         let soon = now + self.jitter.spread(path.hop_time.times(SOON));
         if !self.is_received && self.timer.is_some_and(|at| at > soon) {
             self.timer = Some(soon);
@@ -238,11 +235,8 @@ impl Circulation {
     }
 
     /// Returns the pending reply and marks it as sent.
-    pub(crate) fn poll_reply(&mut self) -> Option<Reply> {
-        if core::mem::take(&mut self.is_reply_due) {
-            return Some(Reply::Result);
-        }
-        core::mem::take(&mut self.is_in_progress_due).then_some(Reply::InProgress)
+    pub(crate) const fn poll_reply(&mut self) -> Option<Reply> {
+        self.reply_due.take()
     }
 
     fn repeat_reply(&mut self, now: Instant, path: Path) {
@@ -269,7 +263,7 @@ impl Circulation {
         if self.replies_left > 0 {
             self.replies_left -= 1;
             self.await_reply(now, hop_time);
-            self.is_reply_due = true;
+            self.reply_due = Some(Reply::Result);
             return false;
         }
         // The first retransmission on a lossy channel shows nothing: the neighbour has had no reason yet to reply that it has the message.
