@@ -48,6 +48,14 @@ pub struct ChannelLoad {
 }
 
 impl ChannelLoad {
+    /// Relays in range of each other whose radios sense the carrier as IEEE 802.15.4 has it: a frame costs 12 bytes beside its own.
+    pub const fn of_radios(in_range: u16) -> Self {
+        Self {
+            in_range,
+            overhead: 12,
+        }
+    }
+
     /// Bits that are sent unasked in one `probe_after`, times a second in µs, over the share that they may take.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;

@@ -91,7 +91,7 @@
 //!     tolerance: 1e-4,
 //! })?;
 //! let identity = Identity { network: 7, index: 1 };
-//! let mut relay = Relay::new(mission, identity, Settings::default(), 1, Time.now())?;
+//! let mut relay = Relay::new(mission, identity, Settings::wires(115_200), 1, Time.now())?;
 //! let relay = AsyncRelay::new(&mut relay);
 //! let link = || AsyncLink::new(Uart, Uart, byte_time(115_200)); // the halves of a UART
 //! let mut ports = AsyncPair::new(link(), link());

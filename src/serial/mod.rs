@@ -74,7 +74,7 @@
 //! })?;
 //! let identity = Identity { network: 7, index: 1 };
 //! let mut now = Instant::ZERO; // a firmware reads its clock
-//! let mut relay = Relay::new(mission, identity, Settings::default(), 1, now)?;
+//! let mut relay = Relay::new(mission, identity, Settings::wires(115_200), 1, now)?;
 //! let link = || SerialLink::new(Nb(Uart::default()), byte_time(115_200));
 //! let mut ports = Pair::new(link(), link());
 //!

@@ -93,7 +93,7 @@ fn main() -> ! {
     );
     let id = Uid::get();
     let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
-    let mut relay = Relay::new(MISSION, IDENTITY, Settings::default(), seed, now()).unwrap();
+    let mut relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
     loop {
         ports.poll(now(), &mut relay);
         while let Some(event) = relay.poll_event() {

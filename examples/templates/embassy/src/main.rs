@@ -88,7 +88,7 @@ async fn main(_spawner: Spawner) {
     let seed = seed(embassy_stm32::uid::uid());
     let slot = RELAY.init(None);
     let now = EmbassyClock.now();
-    let relay = Relay::new_in(slot, &MISSION, IDENTITY, &Settings::default(), seed, now).unwrap();
+    let relay = Relay::new_in(slot, &MISSION, IDENTITY, &Settings::wires(BAUD), seed, now).unwrap();
     let relay = AsyncRelay::new(relay);
     let mut ports = AsyncPair::new(
         AsyncLink::new(up_rx, up_tx, byte_time(BAUD)),

@@ -87,7 +87,7 @@ mod app {
 
         let id = Uid::get();
         let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
-        let relay = Relay::new(MISSION, IDENTITY, Settings::default(), seed, now()).unwrap();
+        let relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
         let local = Local {
             upstream: Served {
                 uart: usart2,
