@@ -80,13 +80,12 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
-    use uav_relay::serial::{Pair, SerialLink, byte_time};
+    use uav_relay::serial::{Pair, SerialLink};
 
     let (clock, upstream, downstream, uart) = wires::start()?;
-    let byte_time = byte_time(port::BAUD);
     let links = cortex_m::singleton!(
         LINKS: Links =
-            Pair::new(SerialLink::new(upstream, byte_time), SerialLink::new(downstream, byte_time))
+            Pair::new(SerialLink::new(upstream, port::BAUD), SerialLink::new(downstream, port::BAUD))
     )?;
     Some((clock, links, uart))
 }

@@ -84,7 +84,6 @@ fn fly(
 
     use embassy_futures::select::select;
     use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay};
-    use uav_relay::serial::byte_time;
 
     let time = executor::Time::new(clock);
     let drone::Drone {
@@ -99,7 +98,7 @@ fn fly(
     let (upstream, downstream) = (RefCell::new(upstream), RefCell::new(downstream));
     let link = |port| {
         let (rx, tx) = ports::halves(port, &time);
-        AsyncLink::new(rx, tx, byte_time(port::BAUD))
+        AsyncLink::new(rx, tx, port::BAUD)
     };
     let mut ports = AsyncPair::new(link(&upstream), link(&downstream));
     let mut keep = |relay: &uav_relay::Relay| views.keep(relay);

@@ -68,12 +68,11 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
-    use uav_relay::serial::{SerialLink, Shared, byte_time};
+    use uav_relay::serial::{SerialLink, Shared};
 
     let (clock, channel, driver_enable, uart) = radio::start()?;
-    let byte_time = byte_time(port::BAUD);
     let channel = cortex_m::singleton!(
-        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, byte_time, driver_enable))
+        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, port::BAUD, driver_enable))
     )?;
     Some((clock, channel, uart))
 }

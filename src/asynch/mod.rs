@@ -21,7 +21,7 @@
 //! being written; with [`AsyncPair`] what does not fit is dropped and counted in [`SerialStats::dropped`](crate::serial::SerialStats::dropped),
 //! with [`AsyncShared`] it stays in the relay.
 //!
-//! Each time the future is polled, a port is read once ([`READ_LIMIT`](crate::serial::READ_LIMIT) bytes at most), the relay handles one
+//! Each time the future is polled, a port is read once (64 bytes at most), the relay handles one
 //! timeout, and each writer is handed what waits. What is ready at once gives the executor back before it goes on.
 //!
 //! # When it is dropped
@@ -41,7 +41,6 @@
 //! use embassy_futures::select::{Either, select};
 //! use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
 //! use uav_relay::channel::{AirGround, Channel};
-//! use uav_relay::serial::byte_time;
 //! use uav_relay::{Band, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
 //!
 //! # struct Uart;
@@ -93,7 +92,7 @@
 //! let identity = Identity { network: 7, index: 1 };
 //! let mut relay = Relay::new(mission, identity, Settings::wires(115_200), 1, Time.now())?;
 //! let relay = AsyncRelay::new(&mut relay);
-//! let link = || AsyncLink::new(Uart, Uart, byte_time(115_200)); // the halves of a UART
+//! let link = || AsyncLink::new(Uart, Uart, 115_200); // the halves of a UART
 //! let mut ports = AsyncPair::new(link(), link());
 //!
 //! let firmware = async {

@@ -30,11 +30,6 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// The fewest samples an estimate is made from.
-///
-/// With so few and a true alpha below 1.5, an estimate is made mostly where chance made alpha large, and is then too low.
-pub const MIN_SAMPLES: u32 = 100;
-
 /// 1 as a fixed-point number: 2^32 samples of it sum to 2^63, and their squares, times their number, to 2^126.
 const ONE: f32 = 2_147_483_648.0;
 
@@ -80,6 +75,11 @@ pub struct Estimate {
 }
 
 impl Estimator {
+    /// The fewest samples an estimate is made from.
+    ///
+    /// With so few and a true alpha below 1.5, an estimate is made mostly where chance made alpha large, and is then too low.
+    pub const MIN_SAMPLES: u32 = 100;
+
     /// No samples yet, of an interference that never exceeds `i_max_w`, W: 1e-30 to 1e6.
     ///
     /// With any other `i_max_w` every sample is rejected and there is never an estimate.
@@ -131,7 +131,7 @@ impl Estimator {
 
     /// What the samples so far say. Constant work, at most 1000 instructions on a Cortex-M4F; 408 were counted.
     ///
-    /// `None` with fewer than [`MIN_SAMPLES`]; without any spread; where alpha is not above 1 by more than two of its
+    /// `None` with fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES); without any spread; where alpha is not above 1 by more than two of its
     /// own standard errors, as E[1/I] may then be infinite; and where the mean is below 1e-6 `I_max` or Upsilon above 1e32.
     /// From 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20;
     /// `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_holds` in
@@ -188,7 +188,7 @@ struct Fit {
 
 impl Fit {
     fn of(samples: &Estimator) -> Option<Self> {
-        if samples.accepted < MIN_SAMPLES {
+        if samples.accepted < Estimator::MIN_SAMPLES {
             return None;
         }
         let count = u64::from(samples.accepted);

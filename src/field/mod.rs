@@ -2,16 +2,13 @@
 //!
 //! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times
 //! Upsilon(x) = E[1 / I(x)], in 1/W: the one thing about the distribution that a plan needs. A [`Field`] is a table of it
-//! along x. Where I / `I_max` has a Beta distribution there is a closed form, [`beta_upsilon`]; where nothing is known but
+//! along x. Where I / `I_max` has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; where nothing is known but
 //! measurements, [`estimate::Estimator`] fits one.
 
 pub mod estimate;
 mod in_noise;
 
 pub(crate) use in_noise::InNoise;
-
-/// The most points a field may have.
-pub const MAX_POINTS: usize = 1024;
 
 /// The smallest and largest Upsilon of a field, 1/W: interference between 1e9 W and 1e-32 W, far outside what is measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
@@ -31,7 +28,7 @@ pub struct FieldPoint {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FieldError {
-    /// There is no point, or more than [`MAX_POINTS`].
+    /// There is no point, or more than [`Field::MAX_POINTS`].
     Points,
     /// The `x_m` of a point is not within -1e7 to 1e7.
     Place,
@@ -64,6 +61,9 @@ pub struct Field {
 }
 
 impl Field {
+    /// The most points a field may have.
+    pub const MAX_POINTS: usize = 1024;
+
     /// Checks every point. Usable in a constant, where [`Field::new`] turns a mistake into a failed build.
     ///
     /// Work: a few comparisons for each point.
@@ -71,7 +71,7 @@ impl Field {
     /// # Errors
     /// [`FieldError`] names what is outside its range, for the first point where something is.
     pub const fn try_new(points: &'static [FieldPoint]) -> Result<Self, FieldError> {
-        if points.is_empty() || points.len() > MAX_POINTS {
+        if points.is_empty() || points.len() > Self::MAX_POINTS {
             return Err(FieldError::Points);
         }
         let (mut smallest, mut largest) = (f32::MAX, 0.0);
@@ -209,34 +209,34 @@ pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
     upsilon_per_w >= UPSILON.0 && upsilon_per_w <= UPSILON.1
 }
 
-/// Upsilon = E[1/I] in 1/W where I / `i_max_w` has a Beta distribution with the shapes `alpha` and `beta`.
-///
-/// (alpha + beta - 1) / ((alpha - 1) `I_max`); printed without `I_max`, for I as a part of it. `i_max_w` in W. `None` unless
-/// alpha > 1 (E[1/I] is infinite otherwise), beta > 0, `i_max_w` > 0, and all three and the result are finite.
-/// In f64, since next to alpha = 1 an f32 of alpha would already be off; meant for constants, where it costs nothing.
-/// Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
-pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
-    let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
-    if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
-        return None;
-    }
-    let upsilon = ((alpha - 1.0) + beta) / (alpha - 1.0) / i_max_w;
-    if upsilon.is_finite() {
-        Some(upsilon)
-    } else {
-        None
-    }
-}
-
 impl FieldPoint {
+    /// Upsilon = E[1/I] in 1/W where I / `i_max_w` has a Beta distribution with the shapes `alpha` and `beta`.
+    ///
+    /// (alpha + beta - 1) / ((alpha - 1) `I_max`); printed without `I_max`, for I as a part of it. `i_max_w` in W. `None` unless
+    /// alpha > 1 (E[1/I] is infinite otherwise), beta > 0, `i_max_w` > 0, and all three and the result are finite.
+    /// In f64, since next to alpha = 1 an f32 of alpha would already be off; meant for constants, where it costs nothing.
+    /// Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
+    pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
+        let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
+        if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
+            return None;
+        }
+        let upsilon = ((alpha - 1.0) + beta) / (alpha - 1.0) / i_max_w;
+        if upsilon.is_finite() {
+            Some(upsilon)
+        } else {
+            None
+        }
+    }
+
     /// The point at `x_m` metres of a field whose I / `i_max_w` has a Beta distribution there; `None` where
-    /// [`beta_upsilon`] has nothing. Constant work.
+    /// [`beta_upsilon`](Self::beta_upsilon) has nothing. Constant work.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a field refuses what does not fit"
     )]
     pub const fn from_beta(x_m: f32, alpha: f64, beta: f64, i_max_w: f64) -> Option<Self> {
-        match beta_upsilon(alpha, beta, i_max_w) {
+        match Self::beta_upsilon(alpha, beta, i_max_w) {
             Some(upsilon) => Some(Self {
                 x_m,
                 upsilon_per_w: upsilon as f32,

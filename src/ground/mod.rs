@@ -31,7 +31,7 @@ use crate::view::ViewId;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
-use crate::wire::frame::{self, FrameBuf, FrameError, Header};
+use crate::wire::frame::{self, FrameBuf, FrameError, Header, MAX_FRAME};
 use crate::wire::message::{Hello, Message};
 use crate::wire::session::{Checked, Session};
 use crate::wire::upload::{Upload, UploadError};
@@ -452,7 +452,7 @@ impl Ground {
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
-    pub fn poll_transmit(&mut self, frame: &mut FrameBuf) -> Option<usize> {
+    pub fn poll_transmit(&mut self, frame: &mut [u8; MAX_FRAME]) -> Option<usize> {
         if self.counter == u32::MAX {
             return None;
         }

@@ -33,6 +33,9 @@ pub struct Mission {
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
+    /// The most relays a mission may have; addresses on the wire are 12 bits wide.
+    pub const MAX_RELAYS: u16 = super::config::MAX_RELAYS;
+
     /// Checks every parameter. Usable in a constant, where [`Mission::new`] turns a mistake into a failed build.
     ///
     /// ```

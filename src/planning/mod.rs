@@ -3,6 +3,7 @@
 //! | for | files |
 //! | --- | --- |
 //! | one relay alone | `single`: Theorems 1 to 3, Algorithm 3 |
+//! | one relay of a chain, without a message | [`Mission::silent_place`](crate::Mission::silent_place) |
 //! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
 
 pub mod fleet;
@@ -11,6 +12,3 @@ mod single;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod single;
-
-pub use crate::optimiser::plan::silent_place;
-pub use crate::optimiser::search::Infeasible;

@@ -15,7 +15,7 @@ use crate::stats::bump;
 use crate::time::{Instant, MonotonicClock};
 use crate::wire::deframe::{DeframeError, Deframer};
 use crate::wire::frame;
-use crate::wire::frame::{FrameBuf, Header};
+use crate::wire::frame::{Header, MAX_FRAME};
 #[cfg(feature = "auth")]
 use crate::wire::session::Session;
 #[cfg(feature = "upload")]
@@ -280,7 +280,7 @@ impl Relay {
     /// }
     /// ```
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
-    pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
+    pub fn poll_transmit(&mut self, now: Instant, frame: &mut [u8; MAX_FRAME]) -> Option<Transmit> {
         let now = self.clock.advance(now);
         let sender = self.node.member().node;
         let mut header = Header {

@@ -2,6 +2,7 @@
 //!
 //! Faults on this side are counted.
 
+use super::READ_LIMIT;
 use super::port::{Fault, SerialPort};
 use crate::relay::{Port, Relay};
 use crate::stats::bump;
@@ -10,9 +11,6 @@ use crate::wire::frame::MAX_FRAME;
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
-
-/// The most bytes, or failed reads, that one poll takes from one port.
-pub const READ_LIMIT: usize = 64;
 
 /// Room for two frames: one on its way, and one that is due before it has left.
 const QUEUE: usize = 2 * MAX_FRAME;
@@ -40,7 +38,7 @@ impl OutputPin for NoPin {
 
 /// The least time one byte of 10 bits (a start bit, 8 data bits, a stop bit) takes on a line of `baud` bit/s, rounded up to
 /// a microsecond. `baud` is at least 1; 0 counts as 1.
-pub const fn byte_time(baud: u32) -> Duration {
+pub(crate) const fn byte_time(baud: u32) -> Duration {
     let baud = if baud == 0 { 1 } else { baud as u64 };
     Duration::from_micros(10_000_000_u64.div_ceil(baud))
 }
@@ -71,26 +69,26 @@ pub struct SerialLink<P, D = NoPin> {
 }
 
 impl<P: SerialPort> SerialLink<P> {
-    /// A link over `port`, on which a byte takes `byte_time` (see [`byte_time`]; at least 1 us).
-    pub fn new(port: P, byte_time: Duration) -> Self {
-        Self::with_pin(port, byte_time, None)
+    /// A link over `port` at `baud` bit/s, with ten bits a byte.
+    pub fn new(port: P, baud: u32) -> Self {
+        Self::with_pin(port, baud, None)
     }
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// A link over `port`, on which a byte takes `byte_time` (at least 1 us), with a pin that is high while this relay sends.
+    /// A link over `port` at `baud` bit/s, with ten bits a byte, and a pin that is high while this relay sends.
     ///
     /// The pin is set low by the first poll, unless that one has something to send.
-    pub fn half_duplex(port: P, byte_time: Duration, pin: D) -> Self {
-        Self::with_pin(port, byte_time, Some(pin))
+    pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
+        Self::with_pin(port, baud, Some(pin))
     }
 
-    fn with_pin(port: P, byte_time: Duration, pin: Option<D>) -> Self {
+    fn with_pin(port: P, baud: u32, pin: Option<D>) -> Self {
         Self {
             port,
             pin,
             level: None,
-            byte_time: byte_time.max(Duration::from_micros(1)),
+            byte_time: byte_time(baud),
             waiting: Deque::new(),
             clock: MonotonicClock::new(Instant::ZERO),
             moved_at: Instant::ZERO,
@@ -159,7 +157,7 @@ impl<P, D> SerialLink<P, D> {
 
 /// A link, whatever it is made of.
 pub(super) trait FrameLink {
-    /// Takes in at most [`READ_LIMIT`] bytes as those of `port`.
+    /// Takes in at most `READ_LIMIT` bytes as those of `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
     /// Whether one more frame of any length fits.
     fn has_room(&self) -> bool;

@@ -8,7 +8,7 @@
 //! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One call
-//! `poll` reads up to [`READ_LIMIT`] bytes a port into the relay, has it handle what is due, takes its frames, and writes
+//! `poll` reads up to 64 bytes a port into the relay, has it handle what is due, takes its frames, and writes
 //! what fits. The relay is drained by then: take its events, and sleep until the time that `poll` returned or until a byte
 //! comes in, whichever is first. The time is always later than `now`; with bytes still to be written or read, or a pin to be
 //! lowered, it is one byte time ahead, which keeps a line without a FIFO busy. A port that takes nothing is tried less and
@@ -30,7 +30,7 @@
 //! 0.6) can be used through its [`embedded_hal_nb`] side.
 //! ```
 //! use uav_relay::channel::{AirGround, Channel};
-//! use uav_relay::serial::{Nb, Pair, SerialLink, byte_time};
+//! use uav_relay::serial::{Nb, Pair, SerialLink};
 //! use uav_relay::{Band, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
 //! use embedded_hal_nb::{nb, serial};
 //!
@@ -75,7 +75,7 @@
 //! let identity = Identity { network: 7, index: 1 };
 //! let mut now = Instant::ZERO; // a firmware reads its clock
 //! let mut relay = Relay::new(mission, identity, Settings::wires(115_200), 1, now)?;
-//! let link = || SerialLink::new(Nb(Uart::default()), byte_time(115_200));
+//! let link = || SerialLink::new(Nb(Uart::default()), 115_200);
 //! let mut ports = Pair::new(link(), link());
 //!
 //! while now < Instant::from_millis(100) {
@@ -95,14 +95,23 @@
 pub mod link;
 pub mod port;
 pub mod queue;
+mod read_limit;
 mod ring;
 
 use embedded_hal::digital::OutputPin;
 
 pub use link::SerialStats;
-pub use link::{NoPin, READ_LIMIT, SerialLink, byte_time};
+#[cfg(feature = "async")]
+pub(crate) use link::byte_time;
+pub use link::{NoPin, SerialLink};
 pub use port::{Fault, Io, Nb, SerialPort};
 pub use queue::{ByteQueues, InterruptEnd, Pend, QueuedPort, queue_depth};
+#[cfg(not(any(doc, feature = "internals")))]
+pub(crate) use read_limit::READ_LIMIT;
+// Documentation of public functions links to it.
+#[cfg(any(doc, feature = "internals"))]
+#[doc(hidden)]
+pub use read_limit::READ_LIMIT;
 
 use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;
@@ -161,7 +170,7 @@ macro_rules! polled {
         impl<$($of)*> $ports {
             /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
             ///
-            /// Work: at most [`READ_LIMIT`] bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
+            /// Work: at most 64 bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
             /// frames that the relay then has; of those for a shared port, as many as fit.
             pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
                 self.poll_keeping(now, relay, &mut |_| {})

@@ -46,9 +46,6 @@ use error::{LONGEST_M, SHORTEST_M};
 #[doc(hidden)]
 pub use error::{LONGEST_M, SHORTEST_M};
 
-/// How far from the line a place may be, and before and behind its ends, m.
-pub const AROUND_M: f32 = 5_000.0;
-
 /// How far the mission's distance may be from that of the sites, m: what the units of the sites amount to, and f32.
 const TOLERANCE_M: f64 = 0.05;
 
@@ -70,6 +67,9 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// How far from the line a place may be, and before and behind its ends, m.
+    pub const AROUND_M: f32 = 5_000.0;
+
     /// The line between two sites on the ground; poles and the antimeridian are places like any other. Constant work.
     ///
     /// ```
@@ -143,7 +143,7 @@ impl Axis {
         (f64::from(distance_m) - self.distance_m).abs() <= TOLERANCE_M + rounded
     }
 
-    /// Where a point on earth is along the line; `None` for one that is not on earth, or farther than [`AROUND_M`] from the line or from
+    /// Where a point on earth is along the line; `None` for one that is not on earth, or farther than [`AROUND_M`](Self::AROUND_M) from the line or from
     /// its ends. Constant work.
     pub fn place(&self, point: Geodetic) -> Option<Placement> {
         if !point.is_valid() {
@@ -160,7 +160,7 @@ impl Axis {
         };
         // What is behind the earth has a small x and y as well: it is too deep.
         let is_near = self.is_around(place)
-            && from.dot(self.up).abs() <= self.half_chord_m + f64::from(AROUND_M);
+            && from.dot(self.up).abs() <= self.half_chord_m + f64::from(Self::AROUND_M);
         is_near.then_some(place)
     }
 
@@ -203,7 +203,7 @@ impl Axis {
         Some(chord * longer)
     }
 
-    /// Where a place along the line is on earth; `None` for one that is not finite, or farther than [`AROUND_M`] from the line or from
+    /// Where a place along the line is on earth; `None` for one that is not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line or from
     /// its ends. Constant work.
     pub fn point(&self, place: Placement) -> Option<Geodetic> {
         if !self.is_around(place) {
@@ -283,8 +283,10 @@ impl Axis {
             y_m,
             altitude_m,
         } = place;
-        let beyond = narrow(self.distance_m) + AROUND_M;
-        (-AROUND_M..=beyond).contains(&x_m) && y_m.abs() <= AROUND_M && altitude_m.abs() <= AROUND_M
+        let beyond = narrow(self.distance_m) + Self::AROUND_M;
+        (-Self::AROUND_M..=beyond).contains(&x_m)
+            && y_m.abs() <= Self::AROUND_M
+            && altitude_m.abs() <= Self::AROUND_M
     }
 
     /// AMSL of the datum at `x`, m.

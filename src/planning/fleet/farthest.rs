@@ -9,7 +9,7 @@ use crate::optimiser::spacing::Stand;
 use crate::optimiser::walk::{Walk, before};
 use crate::place::Placement;
 
-/// The fewest relays whose chain meets `target`; see [`super::fewest`].
+/// The fewest relays whose chain meets `target`; see [`Fewest::of`].
 pub(super) fn fewest(
     mission: &Mission,
     target: f32,
