@@ -14,8 +14,11 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `main.rs` | entry point of this variant |
-//! | `wires.rs` | pins and interrupts |
+//! | `main.rs` | entry point with a serial port to each neighbour |
+//! | `main_radio.rs` | entry point of `stm32f405_radio`, with one serial port to a radio |
+//! | `main_async.rs` | entry point of `stm32f405_async`, on asynchronous ports |
+//! | `wires.rs`, `radio.rs` | pins and interrupts, for either wiring |
+//! | `executor.rs`, `ports.rs` | executor and asynchronous ports of `stm32f405_async` |
 //! | `drone.rs` | drone as defined by its configuration block, for either wiring |
 //! | `turns.rs` | main loop |
 //! | `autopilot.rs`, `grounded.rs` | autopilot link with the feature `flight`, and its replacement |
