@@ -1,38 +1,38 @@
-//! Path loss: how much weaker a signal arrives than it was sent, for every kind of link.
+//! Path loss of every kind of link.
 //!
-//! Received power is sent power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and
-//! mu = C (4 pi f / c)^2. C is the excess loss by shadowing and scattering, one for line of sight and one without.
+//! Received power is transmit power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and mu = C (4
+//! pi f / c)^2. C is the excess loss by shadowing and scattering; it has one value with line of sight and one without.
 
 use core::f64::consts::PI;
 
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// How the link between a drone and a place on the ground is modelled: the paper's eta.
+/// Model of the link between a drone and the ground, the paper's eta.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
     /// Line of sight: eta = `mu_los`.
     Los,
-    /// No line of sight: eta = `mu_nlos`.
+    /// Obstructed: eta = `mu_nlos`.
     Nlos,
-    /// Something between, with the weight w of line of sight in [0, 1]: eta = w `mu_los` + (1 - w) `mu_nlos`.
+    /// Weighted mean with the weight w of line of sight in [0, 1]: eta = w `mu_los` + (1 - w) `mu_nlos`.
     Weighted(f64),
 }
 
-/// The path-loss factors of the three kinds of link, dimensionless (loss = factor x distance^2, with metres).
+/// Path-loss factors of the three kinds of link, 1/m^2 (loss = factor x distance^2, with metres).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Channel {
     /// Drone to drone.
     mu_los: f64,
-    /// Interferer to receiver, both on the ground.
+    /// Interferer to ground receiver, both on the ground.
     mu_nlos: f64,
     /// Drone to ground and ground to drone.
     eta: f64,
 }
 
-/// Why a channel was refused.
+/// Reason why channel parameters are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -61,7 +61,7 @@ impl core::fmt::Display for ChannelError {
 impl core::error::Error for ChannelError {}
 
 impl Channel {
-    /// The channel at `carrier_hz` (1e6 to 1e12) with the excess loss *factors* `excess_los` and `excess_nlos` (1 to 1e20).
+    /// Creates a channel at `carrier_hz` (1e6 to 1e12) with the excess loss *factors* `excess_los` and `excess_nlos` (1 to 1e20).
     ///
     /// # Errors
     /// [`ChannelError`] names the parameter that is outside its range.
@@ -101,8 +101,9 @@ impl Channel {
         })
     }
 
-    /// As [`Channel::new`], with the excess losses in dB (0 to 200), the way data sheets and the paper state them. Not for a constant: a
-    /// power of ten is worked out.
+    /// Creates a channel with excess losses in dB (0 to 200), as in data sheets and the paper.
+    ///
+    /// It computes a power of ten and so cannot be used in a constant.
     ///
     /// ```
     /// use uav_relay::Channel;
@@ -130,8 +131,8 @@ impl Channel {
         )
     }
 
-    /// The channel of these path-loss factors, if there can be one: `mu_los` from 1e-3 to 1e30, `mu_nlos` up to 1e20 times as
-    /// large, `eta` between them.
+    /// Creates a channel from its path-loss factors. `None` unless `mu_los` is within 1e-3 to 1e30, `mu_nlos` within 1 to 1e20
+    /// times `mu_los`, and `eta` between the two.
     #[cfg(feature = "upload")]
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
@@ -144,8 +145,8 @@ impl Channel {
         })
     }
 
-    /// The same channel with eta between the other two to the last bit: of equal losses the weighted sum may be rounded to something
-    /// else, which [`Channel::from_factors`] would refuse.
+    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`]. With equal losses the weighted sum may be rounded out of
+    /// that range, which [`Channel::from_factors`] would reject.
     #[cfg(feature = "upload")]
     pub(crate) fn ordered(self) -> Self {
         Self {
@@ -154,7 +155,7 @@ impl Channel {
         }
     }
 
-    /// Path-loss factor between two drones, 1/m^2: over d metres of P watts P / (factor d^2) are received.
+    /// Path-loss factor between two drones, 1/m^2: a receiver at d metres from P watts receives P / (factor d^2).
     pub const fn mu_los(&self) -> f64 {
         self.mu_los
     }

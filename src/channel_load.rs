@@ -1,54 +1,54 @@
-//! What a channel that relays share has to carry, and the timing that it needs.
+//! Minimum data rate and timing of a radio channel that relays share.
 //!
-//! A chain that nothing happens to says so all the time: every half of `probe_after` a pulse goes to its end and back, and within
-//! `probe_after` either neighbour may ask the other for a heartbeat and be answered. So each pair of neighbours sends at most eight frames
-//! of some 32 bytes in `probe_after`. When a neighbour is silent these questions come eight times as often, frames that got lost are sent
-//! again, and sweeps of 108 bytes go along the chain. So the eight frames may take 15 % of the channel: a channel that is
-//! asked to carry more comes to a standstill when all relays are switched on, for who waits for its turn longer than an answer takes
-//! sends again.
+//! An idle chain sends keep-alive traffic: every half of `probe_after` a lease renewal travels to its end and back, and within
+//! `probe_after` each neighbour may request a heartbeat and receive the reply. So each pair of neighbours sends at most eight
+//! frames of about 32 bytes in `probe_after`. When a neighbour is silent, heartbeat requests are eight times as frequent, lost
+//! frames are retransmitted, and sweeps of 108 bytes travel along the chain. The eight frames may therefore take 15 % of the
+//! channel. A channel with a higher load collapses when all relays are switched on, because a relay that waits for the channel
+//! longer than its retransmission timer sends again.
 //!
-//! | what goes in | unit |
+//! | input | unit |
 //! | --- | --- |
 //! | `baud` | bit/s on the channel; a byte takes ten |
-//! | `in_range` | relays that share it at one place, itself among them: nine where a radio reaches four relays far |
-//! | `overhead` | what a frame costs beside its bytes (preamble, turning from receiving to sending), in bytes |
+//! | `in_range` | relays in range of one place, including the relay there: nine where a radio reaches four relays far |
+//! | `overhead` | cost of a frame beyond its bytes (preamble, turnaround), in bytes |
 //! | `probe_after` | s, as [`Settings::probe_after`](crate::Settings::probe_after) |
 //!
-//! The figures were found with simulated chains by carrier sense: up to a hundred relays in one range without losses, up to twenty with 30 % of
-//! the frames lost.
+//! The figures come from chains simulated with carrier sense: up to a hundred relays in one range without losses, twenty with 30
+//! % loss.
 
 use crate::time::Duration;
 use crate::wire::frame::MAX_SWEEP;
 
-/// Frames that two neighbours send to each other in `probe_after` at most.
+/// Maximum number of frames that two neighbours exchange in `probe_after`.
 const FRAMES: u64 = 8;
 
-/// Bytes of each: a pulse with a tag.
+/// Bytes of a frame: a lease renewal with a tag.
 const BYTES: u64 = 32;
 
-/// The part of the channel that they may take: 3 of 20.
+/// Fraction of the channel that these frames may take: 3 of 20.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// So many relays in one range are a chain of radios that reach four relays far: a frame waits for no more than its own time.
+/// Relays in range of one place in a chain whose radios reach four relays far; a frame then waits for its own time only.
 const NEAR: u16 = 9;
 
-/// The most frame times that a frame waits for its turn.
+/// Maximum wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
-/// Relays that share a channel.
+/// Number of relays that share a channel, and the overhead of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelLoad {
-    /// Relays that hear each other, 1 to 1000.
+    /// Number of relays in range of each other, 1 to 1000.
     pub in_range: u16,
-    /// What a frame costs beside its bytes, in bytes.
+    /// Cost of a frame beyond its bytes, in bytes.
     pub overhead: u16,
 }
 
 impl ChannelLoad {
-    /// Relays in range of each other whose radios sense the carrier as IEEE 802.15.4 has it: a frame costs 12 bytes beside its own.
+    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4: an overhead of 12 bytes per frame.
     pub const fn of_radios(in_range: u16) -> Self {
         Self {
             in_range,
@@ -56,14 +56,14 @@ impl ChannelLoad {
         }
     }
 
-    /// Bits that are sent unasked in one `probe_after`, times a second in µs, over the share that they may take.
+    /// Returns the bits of keep-alive traffic in one `probe_after`, in bit µs/s, divided by the allowed fraction of the channel.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
         (bits * 1_000_000 * SHARE[1]).div_ceil(SHARE[0])
     }
 
-    /// The least data rate that carries them, bit/s: 0 for a relay that is alone.
+    /// Returns the minimum data rate, bit/s; 0 for a single relay.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration};
@@ -85,8 +85,9 @@ impl ChannelLoad {
         baud
     }
 
-    /// Whether a channel of `baud` bit/s carries them, where a silent neighbour is asked after `probe_after`: the one rule that `cargo chain`,
-    /// `cargo provision` and the Linux companion go by.
+    /// Checks that a channel of `baud` bit/s carries the relays with this `probe_after`.
+    ///
+    /// `cargo chain`, `cargo provision` and the Linux companion use this check.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration};
@@ -95,19 +96,19 @@ impl ChannelLoad {
     /// let usual = Duration::from_millis(5_000);
     /// let full = all.carried(57_600, usual).expect_err("a slow radio");
     /// assert_eq!((full.least_baud, full.most_in_range), (229_974, 13));
-    /// // Signs of life that are fewer fit.
+    /// // A longer `probe_after` reduces the load.
     /// assert_eq!(full.least_probe_after, Duration::from_millis(19_963));
     /// assert_eq!(all.carried(57_600, full.least_probe_after), Ok(()));
     /// ```
     ///
     /// # Errors
-    /// [`ChannelFull`] says what would fit.
+    /// [`ChannelFull`] states what would fit.
     pub const fn carried(self, baud: u32, probe_after: Duration) -> Result<(), ChannelFull> {
         let least_baud = self.least_baud(probe_after);
         if baud >= least_baud {
             return Ok(());
         }
-        // In whole milliseconds, as options have it.
+        // Rounded up to whole milliseconds, the unit of the command-line options.
         let least_ms = self.least_probe_after(baud).as_micros().div_ceil(1_000);
         Err(ChannelFull {
             in_range: self.in_range,
@@ -117,7 +118,6 @@ impl ChannelLoad {
         })
     }
 
-    /// How many relays in one range such a channel carries.
     const fn most_in_range(self, baud: u32, probe_after: Duration) -> u16 {
         let pair = Self {
             in_range: 2,
@@ -126,7 +126,7 @@ impl ChannelLoad {
         let needed = pair.needed();
         let room = probe_after.as_micros().saturating_mul(baud as u64);
         let pairs = room / if needed == 0 { 1 } else { needed };
-        // Fewer than there are, since these are too many.
+        // Fewer than `in_range`, since that many do not fit.
         let most = self.in_range.saturating_sub(1) as u64;
         #[expect(clippy::cast_possible_truncation, reason = "it is not above the most")]
         let pairs = if pairs < most {
@@ -137,14 +137,16 @@ impl ChannelLoad {
         pairs.saturating_add(1)
     }
 
-    /// The least `probe_after` with which a channel of `baud` bit/s carries them; `dead_after` is to be three times that.
+    /// Returns the minimum `probe_after` on a channel of `baud` bit/s; `dead_after` should be three times that.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         Duration::from_micros(self.needed().div_ceil(baud))
     }
 
-    /// The least [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s, where a frame that has been sent takes
-    /// `latency` to arrive and be computed with: a sweep's time, and its wait for its turn where many share the channel.
+    /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s.
+    ///
+    /// It is the transmission time of a sweep, times the wait for a channel that many relays share, plus `latency`, the time from
+    /// the end of a transmission to the end of the receiver's computation.
     pub const fn hop_time(self, baud: u32, latency: Duration) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         let sweep = (MAX_SWEEP as u64 * BITS * 1_000_000).div_ceil(baud);
@@ -152,7 +154,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// For how many frames' time a frame is under way.
+    /// Returns the duration of a transmission with its wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -162,18 +164,19 @@ impl ChannelLoad {
     }
 }
 
-/// What a channel that does not carry its relays needs: one of the three.
+/// Reasons why a channel is overloaded, and three ways to reduce its load.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Relays that hear each other.
+    /// Number of relays in range of each other.
     pub in_range: u16,
-    /// The least data rate that carries them, bit/s.
+    /// Minimum data rate, bit/s.
     pub least_baud: u32,
-    /// The least [`Settings::probe_after`](crate::Settings::probe_after) with which the channel carries them, in whole milliseconds.
-    /// [`Settings::dead_after`](crate::Settings::dead_after) is to be three times that.
+    /// Minimum [`Settings::probe_after`](crate::Settings::probe_after), in whole milliseconds.
+    ///
+    /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times that.
     pub least_probe_after: Duration,
-    /// How many of them it carries.
+    /// Maximum number of relays in range.
     pub most_in_range: u16,
 }
 
@@ -233,7 +236,7 @@ mod tests {
             };
             load.hop_time(108_000, latency).as_micros()
         });
-        // 120 bytes of ten bits each; without `auth` a sweep is shorter by its tag.
+        // 120 bytes of ten bits each; without `auth` a sweep has no tag and is shorter.
         let frame = if cfg!(feature = "auth") {
             10_000
         } else {

@@ -1,109 +1,113 @@
-//! What the firmware is told. An event is a flag with the node that it is about beside it, so a firmware that does not listen loses
-//! nothing but repetitions, and of two nodes on one side the one before.
+//! Events for the firmware. An event is a flag, and for some kinds the node it concerns. A firmware that does not poll loses only
+//! repetitions, and of two nodes at one side the earlier one.
 
 use crate::line::LineError;
 use crate::side::Side;
 
-/// Something a firmware may want to act on. The state behind it is read from the relay.
+/// Event that a firmware may react to. The state behind it is read from the relay.
 ///
-/// A *node* is the number that a relay was given before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
+/// A *node* is a relay's index before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Event {
-    /// `Relay::setpoint` has a new value, or none any more: fly there, or hold the place.
+    /// `Relay::setpoint` has changed: fly there, or hold the position if there is none.
     SetpointChanged,
-    /// The chain has agreed on places, and on a target where the interference is known, `Relay::target`: every relay knows its place.
+    /// The chain has agreed on positions, and on a target SIR (`Relay::target`) where the interference is known.
     Converged,
-    /// Raised at the leader (relay 1; in a field relay N): no places meet any target that may be tried. Every relay stays where it is.
-    /// `Relay::restart`, a new view or a new mission has the leader try again.
+    /// Every allowed target SIR is infeasible (raised at the leader: relay 1; in a field relay N). All relays keep their positions.
+    /// `Relay::restart`, a new view or a new mission makes the leader try again.
     Infeasible,
-    /// The neighbour at that side has given no sign of life for 15 s, or what the settings say. On a channel of its own it goes on being
-    /// asked; on a shared one the relay searches for another node at that side. An operator looks for that drone; once it has landed,
-    /// `Relay::clear_lost` frees its room.
+    /// The neighbour at that side has been silent for `Settings::dead_after` (15 s by default). With two links the relay keeps
+    /// sending heartbeat requests to it; on a shared channel it searches for another node at that side. An operator looks for
+    /// that drone; once it has landed, `Relay::clear_lost` frees its room.
     NeighbourLost {
-        /// Where it was.
+        /// Side of the neighbour.
         side: Side,
-        /// Which one.
+        /// Index of the neighbour.
         node: u16,
     },
-    /// A lost neighbour has been heard again, or another node has taken its place: then it is another number than the one lost.
+    /// A lost neighbour is received again, or another node has replaced it; `node` then differs from that of the loss.
     NeighbourBack {
-        /// Where it is.
+        /// Side of the neighbour.
         side: Side,
-        /// Which one.
+        /// Index of the neighbour.
         node: u16,
     },
-    /// A node has said eight times in a row that it does not hear this relay: it cannot be a neighbour, though it is heard. Raised once
-    /// until it does. An operator looks at this relay's transmitter and at that one's receiver: antenna, power, channel.
+    /// A node has reported eight times in a row that it does not receive this relay, so it cannot be a neighbour. Raised once
+    /// until the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
     NotHeard {
-        /// Which one.
+        /// Index of the node.
         node: u16,
     },
-    /// A node was loaded with another mission, or flies one that this relay cannot come to; its messages are ignored. An operator loads
-    /// both with the same mission before take-off. Raised once a minute for each node.
+    /// A node has another mission, or one that this relay cannot obtain; its messages are ignored. An operator loads both with
+    /// the same mission before take-off. Raised once a minute for each node.
     MissionMismatch {
-        /// Which one.
+        /// Index of the node.
         node: u16,
     },
-    /// Three handshakes in a row under a node's number were signed with another key, and nothing under it with this one between them.
-    /// An operator gives both the same key. A single forged frame does not raise it, but somebody without the key who sends three in a
-    /// row does: while that node is heard, it is an attack and nothing is wrong with the node.
+    /// Three handshakes in a row under a node's index are signed with another key, and none between them with the right key. An
+    /// operator gives both nodes the same key. A single forged frame does not raise it, but an attacker without the key who sends
+    /// three in a row does: if that node is received at the same time, it is an attack and the node is fine.
     KeyMismatch {
-        /// Which one.
+        /// Index of the node.
         node: u16,
     },
-    /// Five handshakes in a row under a node's number, with the right key, are of an older epoch than is known of it, or of the same one
-    /// begun anew with the same seed, and nothing newer between them: its epoch went back or stood still at its last start, and what it says is refused.
-    /// An operator raises that node's epoch and starts it again, or switches this relay and its other neighbours off and on. A frame that
-    /// was recorded and is played again and again does not raise it, but as many as these of one start, played in order, do. This relay's
-    /// own number: its neighbours show an epoch of it that is newer than its own, and it stands down, with [`Event::IndexTaken`].
+    /// Five handshakes in a row under a node's index, with the right key, have an epoch that is not newer than the known one. The
+    /// epoch is older, or the same with the same seed, and none between them is newer: the node did not increase its epoch at its
+    /// last start, and its frames are rejected. An operator increases that node's epoch and restarts it, or restarts this relay
+    /// and its other neighbours. A replay of one recorded frame does not raise it, but a replay in order of five handshakes of
+    /// one start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive
+    /// ([`Event::IndexTaken`]).
     EpochWentBack {
-        /// Which one.
+        /// Index of the node.
         node: u16,
     },
-    /// Two nodes use one number. This relay's own: of the two at most one has a setpoint, see `Relay::stands_down`. A neighbour's: it is
-    /// received at both of the ports. An operator lands one of the two and gives it the right number. Raised once until nothing was received
-    /// of the other node for twice `dead_after`. Where frames are signed, somebody without the key can raise it, and nothing more.
+    /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
+    /// `Relay::stands_down`). If it is a neighbour's, that index is received at both ports. An operator lands one of the two and
+    /// gives it the right index. Raised once until the other node has been silent for twice `dead_after`. With signed frames, an
+    /// attacker without the key can raise it, but cause nothing else.
     IndexTaken {
-        /// Which number.
+        /// Duplicate index.
         node: u16,
     },
-    /// The chain has agreed on a new view of who is in it: `Relay::view`, `Relay::index` and the relays of `Relay::mission` have new
-    /// values, and new places follow.
+    /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
+    /// `Relay::mission` have changed, and new positions follow.
     Reformed,
-    /// It is not certain any more that all relays of the view hold what was agreed on: this one holds its place, and asks for a new view.
-    /// Raised once until a view is agreed on.
+    /// The lease has expired: the relay holds its position and requests a new view. It is no longer certain that all relays of
+    /// the view use the last agreement. Raised once until a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused: too few relays can be reached to go on without the others. This part of the chain holds its places. Raised
-    /// once until a view is agreed on. An operator brings relays that are missing back into reach, or lands these.
+    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its positions.
+    /// Raised once until a view is agreed on. An operator brings the missing relays back into range, or lands this part.
     NoQuorum,
-    /// A newer mission has come: `Relay::upload`. Store it, and hand it to `Relay::resume` when the relay is next switched on.
+    /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was refused, since it has no line on earth, or leaves the relay's own geofence. It flies on as before, and the ground is
-    /// told. Raised once for each such mission. An operator uploads one with sites that are as far apart as its distance says, and within the
-    /// geofence.
+    /// A newer mission was rejected, because it has no valid line on earth or leaves the relay's own geofence. The relay keeps
+    /// its mission, and the ground station is informed. Raised once for each such mission. An operator uploads one whose sites
+    /// are as far apart as its distance, and within the geofence.
     UploadRefused {
-        /// What is wrong with it.
+        /// Reason of the rejection.
         why: LineError,
     },
-    /// This relay believes something else of the interference than before: `Relay::belief`. New places follow.
+    /// The relay's estimate of the interference has changed (`Relay::belief`). New positions follow.
     Believed,
-    /// Raised at the leader: what the relays hear is not of one source on the ground, says too little, or does not fit together and nobody
-    /// knows who is wrong. `Relay::unfit` says which of these.
+    /// The measurements do not fit a single source on the ground, are too few, or are contradictory (raised at the leader).
+    /// `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node measures something else of the interference than follows from what all the others measure: that is left out until it fits
-    /// again. An operator looks at its receiver. An end is named by the leader alone, a relay that hears nothing at all by itself alone. With four relays or
-    /// fewer nobody can tell which of them is wrong ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator checks its
+    /// receiver. Transmitter and receiver are reported by the leader only, a relay that measures nothing at all by itself only.
+    /// With four relays or fewer the faulty one cannot be identified
+    /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
-        /// Which one: 0 for the transmitter, one more than the relays that were loaded for the receiver.
+        /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,
     },
-    /// The chain has agreed to fly it: `Relay::mission`, `Relay::version` and `Relay::sites` have new values, and new places follow.
+    /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
+    /// positions follow.
     Adopted,
 }
 
-/// Events about nobody in particular, in the order in which they are told: these first, those about a node, and the others.
+/// Events without a node, in polling order: `FIRST`, then events with a node, then `LAST`.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const LAST: &[Event] = &[
     Event::Reformed,
@@ -135,7 +139,7 @@ const LAST: &[Event] = &[
     Event::InterfererUnclear,
 ];
 
-/// What can be told of a node on one side.
+/// Kinds of event that concern a node at one side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum About {
     Lost,
@@ -146,9 +150,9 @@ pub(crate) enum About {
     Key,
     #[cfg(feature = "auth")]
     Epoch,
-    /// The number itself; of this relay's own, on either side.
+    /// Duplicate index; for this relay's own index, at either side.
     Index,
-    /// Its measurements.
+    /// Faulty measurements.
     Sensor,
 }
 
@@ -182,11 +186,11 @@ impl About {
     }
 }
 
-/// Events that have been raised and not yet taken: one bit each, and the node.
+/// Raised events that the firmware has not polled: one bit each, and the node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     plain: u16,
-    /// By side; bit i is of `About::ALL[i]`.
+    /// Bits by side; bit i is `About::ALL[i]`.
     about: [u8; 2],
     nodes: [[u16; 8]; 2],
 }
@@ -202,12 +206,11 @@ impl Pending {
             .map_or(0, |(_, bit)| 1 << bit)
     }
 
-    /// Raises one that is about nobody in particular.
     pub(crate) fn raise(&mut self, event: Event) {
         self.plain |= Self::bit(event);
     }
 
-    /// Raises one about node `node` at `side`, in place of one of that kind about another.
+    /// Raises an event about node `node` at `side`; it replaces one of the same kind about another node.
     pub(crate) fn raise_about(&mut self, about: About, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
         let (Some(bits), Some(nodes)) = (self.about.get_mut(at), self.nodes.get_mut(at)) else {
@@ -218,7 +221,7 @@ impl Pending {
             About::Back => Some(About::Lost),
             _ => None,
         };
-        // Of a loss and a return of one node only the later one still holds.
+        // A loss and a return of the same node cancel; the later event remains.
         if let Some(opposite) = opposite
             && nodes.get(opposite as usize) == Some(&node)
         {
@@ -304,7 +307,7 @@ mod tests {
         pending.raise_about(About::Lost, side, 3);
         pending.raise_about(About::Back, side, 3);
         assert_eq!(all(&mut pending)[..], [back(3)]);
-        // Another node in its place does not undo the loss.
+        // A return of another node does not cancel the loss.
         pending.raise_about(About::Lost, side, 3);
         pending.raise_about(About::Back, side, 4);
         assert_eq!(all(&mut pending)[..], [lost(3), back(4)]);

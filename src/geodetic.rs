@@ -1,8 +1,8 @@
-//! A point on earth, in the integers that autopilots speak.
+//! Geodetic positions as integers, in the units of MAVLink.
 
-/// A point on earth: WGS84, and a height above the mean sea level.
+/// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
-/// One unit of latitude is 1.1 cm on the ground, of longitude that or less.
+/// One unit of latitude is 1.1 cm on the ground, one of longitude at most that.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geodetic {
@@ -15,7 +15,7 @@ pub struct Geodetic {
 }
 
 impl Geodetic {
-    /// The point nearest to those numbers; `None` where one is not finite, or no latitude or longitude.
+    /// Returns the nearest representable position; `None` for a latitude, longitude or height that is not finite or out of range.
     ///
     /// ```
     /// use uav_relay::Geodetic;
@@ -33,13 +33,13 @@ impl Geodetic {
         })
     }
 
-    /// Whether latitude and longitude are on earth.
+    /// Returns true if latitude and longitude are within their ranges.
     pub const fn is_valid(self) -> bool {
         self.lat_e7.unsigned_abs() <= 900_000_000 && self.lon_e7.unsigned_abs() <= 1_800_000_000
     }
 }
 
-/// The nearest integer; a half is rounded away from zero.
+/// Rounds to the nearest integer, halves away from zero.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "saturates, and callers hand in what fits"

@@ -1,4 +1,4 @@
-//! The one source of jitter: numbers that only timing and the numbering of talks depend on, never a placement.
+//! Random numbers for timing and session numbers only; positions never depend on them.
 
 use crate::time::Duration;
 
@@ -7,10 +7,9 @@ use crate::time::Duration;
 pub(crate) struct Jitter(u32);
 
 impl Jitter {
-    /// Before it has a seed.
     pub(crate) const NONE: Self = Self(0);
 
-    /// Distinct seeds give distinct numbers.
+    /// Creates a generator; distinct seeds give distinct numbers.
     pub(crate) const fn new(seed: u32) -> Self {
         // Any odd multiplier keeps distinct seeds distinct; the generator must not start at zero.
         match seed.wrapping_mul(0x9E37_79B1) {
@@ -19,7 +18,7 @@ impl Jitter {
         }
     }
 
-    /// The next number, never 0.
+    /// Returns the next number, never 0.
     pub(crate) const fn draw(&mut self) -> u32 {
         let mut state = self.0;
         state ^= state << 13;
@@ -29,16 +28,16 @@ impl Jitter {
         state
     }
 
-    /// `span` and up to an eighth more, so that relays on a shared channel do not go on in step.
+    /// Returns `span` and a random eighth of it at most, so that relays on a shared channel do not stay in step.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
-        // A part of the eighth by multiplication: there is no division of this width on a Cortex-M.
+        // Multiplication scales the random part, since a Cortex-M has no division of this width.
         let eighth = (span.as_micros() / 8 + 1).min(u64::from(u32::MAX));
         let random = (u64::from(self.draw()) * eighth) >> 32;
         Duration::from_micros(span.as_micros().saturating_add(random))
     }
 
-    /// The next number, 1 to 65535.
+    /// Returns the next number, 1 to 65535.
     pub(crate) const fn number(&mut self) -> u16 {
         let [_, a, b, _] = self.draw().to_le_bytes();
         match u16::from_le_bytes([a, b]) {

@@ -1,17 +1,16 @@
-//! Whether a mission can be flown along a line on earth, and within a relay's own geofence.
+//! Check that a mission fits the line between its sites and a relay's own geofence.
 
 #[cfg(feature = "upload")]
 use crate::sites::Sites;
 
-/// Whether a mission over `distance_m` metres can be flown between these. A relay that was built without the feature `flight` flies along
-/// no line on earth, and finds nothing wrong.
+/// Accepts every mission, since a relay without the feature `flight` has no line on earth.
 #[cfg(all(feature = "upload", not(feature = "flight")))]
 #[expect(clippy::unnecessary_wraps, reason = "as with a line")]
 pub(crate) const fn check(_: Sites, _: f32) -> Result<(), LineError> {
     Ok(())
 }
 
-/// Whether a mission over `distance_m` metres can be flown between these.
+/// Checks that a mission over `distance_m` metres fits the distance between `sites`.
 #[cfg(all(feature = "upload", feature = "flight"))]
 pub(crate) fn check(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     let axis = crate::flight::axis::Axis::between(sites).map_err(|_| LineError::Sites)?;
@@ -22,21 +21,21 @@ pub(crate) fn check(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     }
 }
 
-/// Why a newer mission cannot be flown along a line on earth, or within the relay's own geofence.
+/// Reason why a newer mission does not fit its line on earth or the relay's own geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LineError {
-    /// Its distance is not that between its sites; or it has none, and its distance is not the one that was loaded, at a relay whose
-    /// line was loaded: `Settings::sited`.
+    /// The mission's distance differs from that between its sites. Or it has no sites, and its distance differs from the
+    /// configured one at a relay with `Settings::sited`.
     Distance,
-    /// Its sites are nearer to each other than 10 m or farther apart than 100 km.
+    /// The mission's sites are less than 10 m or more than 100 km apart.
     Sites,
-    /// It has altitudes outside of the relay's own geofence, [`GuardConfig::fence`](crate::guard::config::GuardConfig).
+    /// The mission's altitudes exceed the relay's own geofence, [`GuardConfig::fence`](crate::guard::config::GuardConfig).
     Altitude,
-    /// It has room to the side outside of that.
+    /// The mission's lateral band exceeds the geofence.
     Lateral,
-    /// It is over a distance that reaches out of that, between the sites that the relays were loaded with or without any.
+    /// The mission's distance exceeds the geofence, with or without sites of its own.
     Length,
 }
 

@@ -1,4 +1,4 @@
-//! Places in the air, and what stands there.
+//! Positions in the air, and the power of a relay there.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -11,7 +11,7 @@
     )
 )]
 
-/// A place in the air.
+/// Position in the air.
 ///
 /// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
 ///
@@ -34,12 +34,12 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The place right above the line, where the paper has all relays.
+    /// Returns the position right above the line, where the paper has all relays.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
 
-    /// Where it is across the line.
+    /// Returns the position's y and altitude.
     #[doc(hidden)]
     pub const fn cross_section(self) -> CrossSection {
         CrossSection {
@@ -49,7 +49,7 @@ impl Placement {
     }
 }
 
-/// Where a relay flies across the line from transmitter to receiver, wherever along it.
+/// Position of a relay across the line from transmitter to receiver, at any x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
@@ -60,7 +60,7 @@ pub struct CrossSection {
 }
 
 impl CrossSection {
-    /// Right above the line.
+    /// Returns the cross-section right above the line.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -68,7 +68,7 @@ impl CrossSection {
         }
     }
 
-    /// The place there at `x_m`.
+    /// Returns the position at `x_m` in this cross-section.
     pub const fn at(self, x_m: f32) -> Placement {
         Placement {
             x_m,
@@ -77,19 +77,18 @@ impl CrossSection {
         }
     }
 
-    /// The squared distance from `other`, m^2.
     pub(crate) fn apart_squared(self, other: Self) -> f32 {
         let (y, h) = (self.y_m - other.y_m, self.altitude_m - other.altitude_m);
         y * y + h * h
     }
 }
 
-/// A relay as the hops beside it know it, wherever along the line it stands.
+/// Cross-section and power of a relay, at any x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
-    /// Where it flies across the line.
+    /// Position across the line.
     pub at: CrossSection,
-    /// Its transmit power, W.
+    /// Transmit power, W.
     pub power_w: f32,
 }

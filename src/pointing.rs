@@ -1,8 +1,8 @@
-//! Where to point an antenna: azimuth, elevation and distance from a relay to another place.
+//! Antenna pointing: azimuth, elevation and distance from a relay to another position.
 //!
-//! Angles are approximated by micromath's `atan2`: a handful of instructions, and 0.162 degrees off at most, where a beam is
-//! ten degrees wide. Distances are not left to micromath, whose square root is off by 6 %; they are libm's.
-//! The errors are asserted by `bearings_are_within_the_stated_error_all_around` in this file, and those of the two libraries by
+//! Angles use micromath's `atan2`: a few instructions, with an error of at most 0.162 degrees, where a beam is ten degrees wide.
+//! Distances use libm's square root, because micromath's has an error of 6 %. The errors are asserted by
+//! `bearings_are_within_the_stated_error_all_around` in this file, and those of the two libraries by
 //! `host-tests/tests/accuracy.rs`.
 
 use micromath::F32;
@@ -10,18 +10,18 @@ use micromath::F32;
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// No angle of a [`Bearing`] is farther off than this, rad: 0.17 degrees.
+/// Maximum error of an angle of a [`Bearing`], rad: 0.17 degrees.
 #[cfg(test)]
 const MAX_ERROR_RAD: f32 = 0.002_967;
 
-/// The direction and distance of a place as a relay sees it.
+/// Direction and distance of a position relative to a relay.
 ///
-/// Frame: x toward the receiver, y to the side, h up, left-handed as the paper has it: seen from above, y points to the
-/// right of x, so that azimuth grows clockwise. Both angles together point at most 0.23 degrees aside.
+/// Frame: x toward the receiver, y to the side, h up, left-handed as in the paper: seen from above, y points to the right of x,
+/// so azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
-    /// Angle in the ground plane from x toward y, rad, within -pi to pi; 0 for a place straight above or below.
+    /// Angle in the ground plane from x toward y, rad, within -pi to pi; 0 for a position straight above or below.
     pub azimuth_rad: f32,
     /// Angle above the horizon, rad, within -pi/2 to pi/2.
     pub elevation_rad: f32,
@@ -30,8 +30,9 @@ pub struct Bearing {
 }
 
 impl Bearing {
-    /// The bearing of a place `ahead_m` farther along x, `aside_m` farther along y and `climb_m` higher; `None` for the same
-    /// place and for numbers that are not finite or that are too large for their distance to be.
+    /// Returns the bearing of a position `ahead_m` farther along x, `aside_m` farther along y and `climb_m` higher.
+    ///
+    /// `None` for a zero distance, and for values that are not finite or whose distance overflows.
     ///
     /// Work: two square roots, two approximated arc tangents and a few divisions.
     pub fn new(ahead_m: f32, aside_m: f32, climb_m: f32) -> Option<Self> {
@@ -47,8 +48,9 @@ impl Bearing {
         })
     }
 
-    /// The bearing of the node at `to` for the one at `from`. The ground stations are placements too, at altitude 0. `None` if both
-    /// are at one place.
+    /// Returns the bearing of `to` seen from `from`; `None` if both are equal.
+    ///
+    /// The ground stations are placements too, at altitude 0.
     ///
     /// ```
     /// use uav_relay::Placement;
@@ -67,8 +69,9 @@ impl Bearing {
         )
     }
 
-    /// The bearing of the mission's interferer, which is on the ground, for a relay at `from`; to turn a null toward it.
-    /// `None` if the relay stands on it, or the interference has no place.
+    /// Returns the bearing of the mission's interferer, on the ground, seen from `from`; for steering a null toward it.
+    ///
+    /// `None` if the relay is at the interferer's position, or the interference has no position.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {
         let interferer = mission.interferer()?;
         Self::new(
@@ -79,7 +82,7 @@ impl Bearing {
     }
 }
 
-/// sqrt(a^2 + b^2), the larger one factored out so that no square overflows or vanishes.
+/// Returns sqrt(a^2 + b^2), with the larger one factored out so that no square overflows or underflows.
 fn length(a: f32, b: f32) -> f32 {
     let large = a.abs().max(b.abs());
     if large > 0.0 {
@@ -90,11 +93,11 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// The angle whose tangent is `opposite` / `adjacent`, in the quadrant of the two; 0 if both are 0.
+/// Returns the angle whose tangent is `opposite` / `adjacent`, in the quadrant of the two; 0 if both are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());
     if large > 0.0 {
-        // The approximation squares both, and 0 / 0 would come of it for small ones.
+        // The approximation squares both, which would give 0 / 0 for small values.
         F32(opposite / large).atan2(F32(adjacent / large)).0
     } else {
         0.0
@@ -112,13 +115,13 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::place::Placement;
 
-    /// Errors of azimuth and elevation (rad), of the pointed direction (rad) and of the distance (relative).
+    /// Returns the errors of azimuth and elevation (rad), of the direction (rad) and of the distance (relative).
     fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {
         let bearing = Bearing::new(ahead_m, aside_m, climb_m).unwrap();
         let [x, y, h] = [ahead_m, aside_m, climb_m].map(f64::from);
         let ground = libm::hypot(x, y);
         let distance = libm::hypot(ground, h);
-        // Straight above there is no azimuth; the sign of a zero must not make one.
+        // A position straight above has no azimuth; the sign of a zero must not produce one.
         let azimuth = if ground > 0.0 { libm::atan2(y, x) } else { 0.0 };
         let elevation = libm::atan2(h, ground);
         let got_azimuth = f64::from(bearing.azimuth_rad);
@@ -127,7 +130,7 @@ mod tests {
         let turn = (got_azimuth - azimuth).abs();
         let turn = turn.min(2.0 * PI - turn);
         let lift = (got_elevation - elevation).abs();
-        // Chord between the two unit vectors: an arc of that length for angles this small.
+        // Chord between the two unit vectors, equal to the arc for angles this small.
         let unit = |a: f64, e: f64| {
             let (sin_a, cos_a) = libm::sincos(a);
             let (sin_e, cos_e) = libm::sincos(e);
@@ -178,7 +181,7 @@ mod tests {
         assert!(azimuth.max(elevation) * degrees < 0.17);
         assert!(direction * degrees < 0.23, "both angles together");
         assert!(distance < 3e-7);
-        // The promise to a caller: half a degree.
+        // Pointing error promised to the caller: half a degree.
         assert!(direction * degrees < 0.5);
     }
 

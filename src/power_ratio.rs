@@ -1,4 +1,4 @@
-//! A ratio that keeps its distance from its neighbours.
+//! Power ratio with twice the precision of an f32.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -11,10 +11,10 @@
     )
 )]
 
-/// A ratio of powers and path losses as the sum of two f32, so that a target next to it keeps its full distance from it.
+/// Power or path-loss ratio as the sum of two f32, so that its difference to a nearby target is exact.
 ///
-/// A target gamma is compared with a gain A through gamma - A; with A rounded to one f32 that difference would be wrong
-/// by up to 6e-8 A, which is what makes the printed closed forms lose digits near gamma = A.
+/// A target gamma is compared with a gain A through gamma - A. With A rounded to one f32 this difference has an error of up to
+/// 6e-8 A, which is why the closed forms as printed lose digits near gamma = A.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PowerRatio {
@@ -35,22 +35,21 @@ impl PowerRatio {
         }
     }
 
-    /// The gain, rounded to f32.
+    /// Returns the gain, rounded to f32.
     pub const fn value(&self) -> f32 {
         self.hi
     }
 
-    /// The gain, as f64.
     pub(crate) fn wide(self) -> f64 {
         f64::from(self.hi) + f64::from(self.lo)
     }
 
-    /// `target` / gain, rounded.
+    /// Returns `target` / gain, rounded.
     pub const fn ratio(&self, target: f32) -> f32 {
         target / self.hi
     }
 
-    /// `target` / gain - 1, relative error below 2e-7 even where the two are next to each other.
+    /// Returns `target` / gain - 1, with a relative error below 2e-7 even if the two are nearly equal.
     pub const fn excess(&self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }
@@ -62,7 +61,7 @@ mod tests {
 
     #[test]
     fn excess_keeps_its_digits_next_to_the_gain() {
-        // 1/3 is not an f32: one f32 of gain would leave half the digits of the excess wrong.
+        // 1/3 is not an f32: a gain of one f32 would make half the digits of the excess wrong.
         let gain = PowerRatio::new(1.0 / 3.0);
         let mut target = 1.0_f32 / 3.0;
         for _ in 0..40 {

@@ -1,19 +1,18 @@
-//! A square root that needs neither `unsafe` nor eighty instructions.
+//! Fast square root in safe Rust.
 //!
-//! `libm::sqrtf` works bit by bit on integers, since stable Rust has no safe way to the VSQRT of a Cortex-M4F: 81
-//! instructions, more than the rest of a reach. This one takes a guess from the exponent and improves it by Heron's rule on
-//! the FPU. It is made of additions, multiplications and divisions alone, so every target gives the same bits.
+//! `libm::sqrtf` works bit by bit on integers, since stable Rust has no safe access to the VSQRT of a Cortex-M4F: 81
+//! instructions, more than the rest of a reach. This one derives a first estimate from the exponent and improves it by Heron's
+//! rule on the FPU. It uses additions, multiplications and divisions only, so every target gives the same bits.
 
-/// The square root of `x`, within one unit in the last place of an f32; 0 for anything below the smallest normal f32.
-///
-/// `x` from there to the largest f32; 18 instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy
-/// for every mantissa: a factor of 4 changes nothing but the exponent of the result, so two octaves stand for all.
+/// Returns the square root of `x`, within one unit in the last place of an f32; 0 for `x` below the smallest normal f32. 18
+/// instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa: a factor
+/// of 4 changes only the exponent of the result, so two octaves cover all exponents.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
 pub(crate) fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
 }
 
-/// The same where a sweep spends its time: without a call.
+/// Returns the same as [`sqrt`], inlined for the inner loops of a sweep.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -23,9 +22,9 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
     if !(x >= f32::MIN_POSITIVE) {
         return 0.0;
     }
-    // Half the biased exponent, and with it half the logarithm: at most 6 % too large, never too small.
+    // Half the biased exponent, and so half the logarithm: at most 6 % too large, never too small.
     let mut y = f32::from_bits((x.to_bits() >> 1) + (0x3F80_0000 >> 1));
-    // Heron's rule squares the error and halves it: 6e-2, 2e-3, 2e-6, and then nothing but rounding.
+    // Heron's rule squares and halves the error: 6e-2, 2e-3, 2e-6, and then only rounding.
     y = 0.5 * (y + x / y);
     y = 0.5 * (y + x / y);
     0.5 * (y + x / y)

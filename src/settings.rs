@@ -1,4 +1,4 @@
-//! Who a relay is and how it behaves, checked once when it is switched on.
+//! Identity and settings of a relay, checked once at start-up.
 
 use crate::channel_load::ChannelLoad;
 use crate::guard::config::GuardConfig;
@@ -13,62 +13,62 @@ use crate::without_quorum::WithoutQuorum;
 /// Time for computing and for the buffers of a link, in the `hop_time` of a preset.
 const LATENCY: Duration = Duration::from_millis(10);
 
-/// Which relay this is.
+/// Identity of a relay in its network.
 ///
 /// ```
 /// use uav_relay::Identity;
 ///
-/// // The second of its chain, on network 7.
+/// // The second relay of its chain, on network 7.
 /// let identity = Identity { network: 7, index: 2 };
 /// # assert_eq!(identity.index, 2);
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity {
-    /// Number of the network; frames of any other are ignored.
+    /// Network number; frames of other networks are ignored.
     pub network: u16,
-    /// Place in the chain, 1 (next to the transmitter) to N.
+    /// Index in the chain, 1 (next to the transmitter) to N.
     pub index: u16,
 }
 
-/// How the relay is connected to its neighbours.
+/// Kind of connection between a relay and its neighbours.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Wiring {
-    /// A link of its own to each neighbour: two serial ports.
+    /// Separate link to each neighbour: two serial ports.
     #[default]
     Pair,
-    /// One channel that both neighbours, and perhaps others, hear: one radio.
+    /// Single channel that both neighbours, and perhaps other relays, receive: one radio.
     Shared,
 }
 
-/// What the leader has the chain do.
+/// Placement algorithm that the leader runs.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Method {
-    /// The best places at the altitudes held: Algorithm 1, in a field Algorithm 4.
+    /// Optimal x at fixed altitudes: Algorithm 1, in a field Algorithm 4.
     #[default]
     Align,
-    /// The best places, sides and altitudes together, within the mission's corridor. Not in a field; up to 100 relays.
+    /// Joint optimum of x, y and altitude within the mission's corridor. Not in a field; up to 100 relays.
     Joint,
-    /// Algorithm 1, and then Algorithm 2. Not in a field.
+    /// Algorithm 1, followed by Algorithm 2. Not in a field.
     Adjust(Adjust),
 }
 
-/// How Algorithm 2 goes.
+/// Parameters of Algorithm 2.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
-    /// Rounds at most: the paper's `Iter_max`. It ends sooner when a whole round moves nobody.
+    /// Maximum number of rounds, the paper's `Iter_max`. It ends earlier after a round in which no relay moves.
     pub rounds: u16,
-    /// How far a relay may go up or down in one turn, m: 0 to 1e5; the paper's `epsilon_h`.
+    /// Maximum change of altitude of a relay in one turn, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
-    /// How it looks for a better place.
+    /// Local search for a better position.
     pub local: Local,
 }
 
 impl Default for Adjust {
-    /// Five hundred rounds of 10 m, from coarse to fine.
+    /// 500 rounds, 10 m, [`Local::Fine`].
     fn default() -> Self {
         Self {
             rounds: 500,
@@ -78,17 +78,17 @@ impl Default for Adjust {
     }
 }
 
-/// How a relay measures the interference, for a closed loop.
+/// Measurement of the interference by a relay in a field.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
-    /// The most interference power that may be received, W: 1e-30 to 1e6. Samples above it are left out.
+    /// Maximum interference power that can be received, W: 1e-30 to 1e6. Samples above it are rejected.
     pub i_max_w: f32,
-    /// Samples to take at a place before what they say is used, 100 to 1 000 000.
+    /// Samples to take at one position before the estimate is used, 100 to 1 000 000.
     pub samples: u32,
 }
 
-/// How a chain finds its interferer by what its relays hear.
+/// Estimation of an unknown interferer from the relays' measurements.
 ///
 /// ```
 /// use uav_relay::{Listen, Settings};
@@ -100,18 +100,19 @@ pub struct Measure {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Listen {
-    /// How long after an agreement the leader asks what is heard; above 0. While nothing new comes of it, it asks less and less often,
-    /// down to a 64th.
+    /// Interval between an agreement and the leader's next collection of measurements; above 0. While the collections change
+    /// nothing, the interval grows, up to 64 times.
     pub every: Duration,
-    /// After so long what was heard elsewhere, or before, counts half; above 0. For an interferer that moves, a few seconds. From ten times
-    /// `every` on it is taken to stand still: after five beliefs only what chance cannot be 64 times over makes the chain move again.
+    /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. From ten times
+    /// `every` on, the interferer is assumed to be stationary: after five estimates the chain moves again only for a deviation
+    /// that is significant even over 64 tests.
     pub half_life: Duration,
-    /// By how much one measurement is off, relative: 1e-3 to 1. One over the root of the independent samples in it.
+    /// Relative error of a measurement, 1e-3 to 1: 1 / sqrt(number of independent samples in it).
     pub relative_error: f32,
 }
 
 impl Default for Listen {
-    /// Every five seconds, half after a minute, 3 %: a thousand samples.
+    /// Every 5 s, half-life 60 s, error 3 % (a thousand samples).
     fn default() -> Self {
         Self {
             every: Duration::from_millis(5_000),
@@ -122,7 +123,7 @@ impl Default for Listen {
 }
 
 impl Listen {
-    /// For an interferer that moves: every second, and the faster forgotten the more relays hear it, half after 16 s over their number.
+    /// Returns settings for a moving interferer: every second, with a half-life of 0.1 s + 16 s / `relays`.
     pub const fn following(relays: u16) -> Self {
         let relays = if relays > 0 { relays as u64 } else { 1 };
         Self {
@@ -132,26 +133,26 @@ impl Listen {
         }
     }
 
-    /// Whether the interferer is taken to stand still.
+    /// Returns true if the interferer is assumed to be stationary.
     pub(crate) const fn is_for_one_that_stands(&self) -> bool {
         self.half_life.as_micros() / 10 >= self.every.as_micros()
     }
 
-    /// Whether all is within its range.
+    /// Returns true if all values are within their ranges.
     pub fn is_valid(&self) -> bool {
         let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
         timed && (1e-3..=1.0).contains(&self.relative_error)
     }
 }
 
-/// What a firmware may choose.
+/// Settings that a firmware may choose.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
 /// # use paper::*;
 /// use uav_relay::{Method, Settings, Wiring};
 ///
-/// // One radio channel that all hear, and places, sides and altitudes together.
+/// // One shared radio channel; joint optimum of x, y and altitude.
 /// let settings = Settings { wiring: Wiring::Shared, method: Method::Joint, ..Settings::default() };
 /// # #[cfg(feature = "altitude")]
 /// assert!(relay(settings).setpoint().is_none());
@@ -160,48 +161,47 @@ impl Listen {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// What this relay holds, if not what the mission has in common.
+    /// Altitude and power of this relay; `None` for the mission's common profile.
     pub profile: Option<Profile>,
-    /// Whether it keeps to the altitude of that when altitudes are chosen.
+    /// True to keep this relay's altitude in methods that choose altitudes.
     pub hold_altitude: bool,
-    /// What the leader (relay 1; in a field relay N) has the chain do; the others follow.
+    /// Method that the leader (relay 1; in a field relay N) runs; the other relays follow.
     pub method: Method,
-    /// In a field: whether and how this relay measures it, to use what it measured instead of what was agreed.
+    /// Measurement of a field by this relay, used instead of the agreed field; `None` outside of a field.
     pub measure: Option<Measure>,
-    /// Not in a field: whether and how the chain finds its interferer by what the relays measure. All relays of a chain listen, or none
-    /// does.
+    /// Estimation of an unknown interferer; `None` in a field. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
-    /// Which targets the leader tries; the others follow.
+    /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// Whether the leader first solves the chain from the mission, with the bracketed schedule: one round trip if it is right.
+    /// True if the leader first solves the chain from the mission (bracketed schedule): one round trip if the solution is right.
     pub predict: bool,
-    /// Two links or one channel.
+    /// Two links or one shared channel.
     pub wiring: Wiring,
-    /// The key and the epoch that this relay signs its frames with. Then it takes signed frames alone; without, it believes whoever is
-    /// on the air. All relays of a network are given the key, or none is.
+    /// Key and epoch for signing frames. With it the relay accepts signed frames only; without it, it accepts frames from any
+    /// sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
-    /// The longest that a sweep (100 bytes) takes from one relay's `poll_transmit` to the next one's, its computing included;
-    /// above 0. For messages that take longer it is multiplied.
+    /// Maximum time of a sweep (100 bytes) from one relay's `poll_transmit` to the next one's, including its computation; above
+    /// 0. It is scaled for longer messages.
     pub hop_time: Duration,
-    /// After this long without an answer from a neighbour the relay asks whether it is there, sixteen times until `dead_after`; above 0.
+    /// Silence of a neighbour after which heartbeats are requested, 16 times until `dead_after`; above 0.
     pub probe_after: Duration,
-    /// After this long without one it counts as lost, and for this long at least a relay holds what was agreed on; above `probe_after`.
+    /// Silence after which a neighbour is lost, and minimum duration of a lease; above `probe_after`.
     pub dead_after: Duration,
-    /// Whether a part of the chain goes on without the others only if it has a quorum: more than half of the members of the view
-    /// before, or half with the one that proposed it. Without that, the parts of a chain that is split would get in each other's way.
+    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the previous
+    /// view, or half of them including its proposer. Without it, the parts of a split chain would interfere with each other.
     pub quorum: bool,
-    /// What the relay does where its part has none.
+    /// Behaviour of the relay without a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Whether setpoints lead to the agreed place only as far as the neighbours have made room, and inside which box. The relay
-    /// then has to be told where it is: `Relay::handle_position`.
+    /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence; `None` for no guard. With it
+    /// the firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// Whether the firmware turns places into latitudes and longitudes, along the line between sites that it was loaded with: then an
-    /// upload without sites of its own is refused if it is over another distance. So are all relays of a chain set, or none is.
+    /// True if the firmware converts positions to latitudes and longitudes along a line between two configured sites. Then an
+    /// upload without sites of its own is rejected if its distance differs. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
 impl Default for Settings {
-    /// Bracketed with prediction, two links of 57 600 baud or faster, a silent neighbour lost after 15 s.
+    /// Bracketed with prediction, two links of 57 600 baud or faster, neighbours lost after 15 s of silence.
     fn default() -> Self {
         Self::DEFAULT
     }
@@ -297,7 +297,7 @@ impl Settings {
     }
 }
 
-/// Which part of an [`Identity`] or of [`Settings`] was refused, and its range.
+/// Parameter of an [`Identity`] or of [`Settings`] that is rejected, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -308,8 +308,8 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` chooses altitudes, which it can not in a field, nor the joint method for more than 100 relays, or the crate was built
-    /// without the feature for it.
+    /// `method` chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature that the crate was
+    /// built without.
     Method,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,
@@ -360,7 +360,6 @@ impl core::fmt::Display for SetupError {
 
 impl core::error::Error for SetupError {}
 
-/// Checks both against the mission.
 pub(crate) fn check(
     mission: &Mission,
     identity: Identity,

@@ -1,8 +1,8 @@
-//! The two neighbours of a relay, and which of them passes go to.
+//! The two sides of a relay, and the direction of passes.
 
 use crate::mission::Heading;
 
-/// One of the two neighbours of a relay, or the link to it.
+/// Neighbour of a relay, or the link to it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
@@ -13,7 +13,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Where passes go to.
+    /// Returns the side to which passes are sent.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -21,7 +21,7 @@ impl Side {
         }
     }
 
-    /// Where passes come from, and what came of them goes back to.
+    /// Returns the side from which passes are received, and to which their replies are sent.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,
@@ -29,7 +29,6 @@ impl Side {
         }
     }
 
-    /// The one opposite.
     pub(crate) const fn other(self) -> Self {
         match self {
             Self::Upstream => Self::Downstream,

@@ -1,11 +1,12 @@
-//! Signal-to-interference ratio of every kind of hop: the one place these formulas live.
+//! Signal-to-interference ratio (SIR) of every kind of hop. These formulas are defined only here.
 //!
-//! Where receivers have noise N of their own it is the SINR, signal over I + N. A relay that is s m^2 away from the interferer hears
-//! I = P / (eta s), and I + N = P (1 + nu s) / (eta s) with nu = N eta / P: so [`quiet`] becomes s / (1 + nu s), and nothing else
-//! changes. In a field Upsilon takes the noise in, see [`Field`](crate::field::Field); at Rx K does.
+//! With receiver noise N the ratio is the SINR, signal over I + N. A relay at the squared distance s, m^2, from the interferer
+//! receives I = P / (eta s), and I + N = P (1 + nu s) / (eta s) with nu = N eta / P. So [`quiet`] becomes s / (1 + nu s), and
+//! nothing else changes. In a field, Upsilon includes the noise (see [`Field`](crate::field::Field)); at Rx, K does.
 //!
-//! The chain is as good as its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
+//! The SIR of a chain is that of its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
+//! `host-tests/tests/placement/main.rs`.
 //! `host-tests/tests/placement/main.rs`.
 
 #![cfg_attr(
@@ -27,11 +28,11 @@ use crate::mission::Mission;
 use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
 
-/// How little is heard of the interference at `at`, as a relay there sees it: the one term in which kinds of it differ.
+/// Returns the inverse interference at `at`, the one term of a hop's SIR that depends on the kind of interference.
 ///
-/// s = (X - x)^2 + (Y - y)^2 + h^2 in m^2 for an interferer, with noise s / (1 + nu s); Upsilon(x) / `Upsilon_max`, 0 to 1, in a field,
-/// both with the noise. The SIR of a hop into
-/// that place is the sender's gain times this, over the squared length of the hop.
+/// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an interferer
+/// it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) / `Upsilon_max`, with
+/// noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -46,12 +47,12 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     }
 }
 
-/// What becomes of s, m^2, with noise of `nu`, 1/m^2; without it nothing does, to the bit.
+/// Returns s / (1 + nu s), m^2, for s in m^2 and `nu` in 1/m^2; without noise exactly s.
 pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
 
-/// A node that feeds a hop: where it stands and what its power is worth against the interference.
+/// Sending node of a hop: its cross-section and its power relative to the interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
@@ -60,7 +61,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// The ground transmitter, node 0.
+    /// Returns the ground transmitter, node 0.
     pub const fn transmitter(mission: &Mission) -> Self {
         Self {
             at: CrossSection::on_line(0.0),
@@ -68,7 +69,7 @@ impl Sender {
         }
     }
 
-    /// A relay.
+    /// Returns a relay as a sender.
     pub const fn relay(mission: &Mission, relay: Station) -> Self {
         Self {
             at: relay.at,
@@ -76,11 +77,11 @@ impl Sender {
         }
     }
 
-    /// SIR at a relay at `to`, fed by this node standing at `from_m` along x; infinite when both share one place.
+    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x; infinite if both are at one place.
     ///
-    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2), which with y = y0 = 0 is the paper's
-    /// `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is the expected SIR,
-    /// p Upsilon(x) / (eta d^2) and p Upsilon(x) / (`mu_los` d^2).
+    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's
+    /// `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is
+    /// the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x) / (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.at);
@@ -88,7 +89,8 @@ impl Sender {
     }
 }
 
-/// SIR at the ground receiver, fed by a relay of `power_w` watts at `from`: K / (d^2 + y^2 + h^2), the paper's `SIR_{N+1}`.
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`: the paper's `SIR_{N+1}`, K / (d^2 + y^2 +
+/// h^2).
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);

@@ -1,22 +1,22 @@
-//! Where the transmitter and the receiver are on earth: the line that a mission is flown along.
+//! Geodetic positions of transmitter and receiver, which define the mission's line on earth.
 
 use crate::geodetic::Geodetic;
 
-/// The two ends of the line, on the ground.
+/// Ground positions of both ends of the line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sites {
-    /// Where the transmitter is.
+    /// Position of the transmitter.
     pub tx: Geodetic,
-    /// Where the receiver is.
+    /// Position of the receiver.
     pub rx: Geodetic,
 }
 
-/// Bytes of both.
+/// Length of the encoded sites, bytes.
 pub(crate) const LENGTH: usize = 24;
 
 impl Sites {
-    /// Both as bytes: latitude, longitude and height of the transmitter, then of the receiver, each in four bytes, the lowest first.
+    /// Encodes latitude, longitude and height of the transmitter, then of the receiver, as four little-endian bytes each.
     pub(crate) fn to_bytes(self) -> [u8; LENGTH] {
         let Self { tx, rx } = self;
         let numbers = [
@@ -29,7 +29,6 @@ impl Sites {
         bytes
     }
 
-    /// Of such bytes.
     #[cfg(feature = "upload")]
     pub(crate) fn from_bytes(bytes: [u8; LENGTH]) -> Self {
         let mut numbers = [0; LENGTH / 4];
@@ -48,7 +47,6 @@ impl Sites {
         }
     }
 
-    /// Whether both are on earth.
     #[cfg(feature = "upload")]
     pub(crate) const fn are_valid(self) -> bool {
         self.tx.is_valid() && self.rx.is_valid()

@@ -1,10 +1,10 @@
-//! Points in time and spans of it, as integers: the crate is told the time and never reads a clock.
+//! Instants and durations as integers. The crate receives the time from its caller and never reads a clock.
 
 use core::ops::Add;
 
 /// A point in time, in microseconds since an epoch of the caller's choosing.
 ///
-/// Arithmetic saturates: a clock that runs past the end stands still instead of wrapping.
+/// Arithmetic saturates instead of wrapping.
 ///
 /// ```
 /// use uav_relay::{Duration, Instant};
@@ -46,7 +46,7 @@ impl Instant {
         self.micros
     }
 
-    /// The span from `earlier` to `self`; zero when `earlier` is the later one.
+    /// Returns the span from `earlier` to `self`; zero if `earlier` is later.
     #[inline(never)] // as `add`
     pub const fn since(self, earlier: Self) -> Duration {
         Duration {
@@ -73,7 +73,7 @@ impl Duration {
         self.micros
     }
 
-    /// `times` as long, saturating.
+    /// Returns the duration times `times`, saturating.
     #[inline(never)] // 70 bytes of flash where it stands
     pub const fn times(self, times: u32) -> Self {
         Self {
@@ -93,11 +93,10 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Largest backward step of the caller's time that is taken for disorder of its calls, and not for a step of its clock.
+/// Maximum backward step of the caller's time that is taken for out-of-order calls, not for a clock step.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Longest forward step that is followed, some 140 years: a single wrong reading does not bring internal time to its end, where nothing
-/// expires any more.
+/// Maximum forward step, some 140 years: a wrong reading does not take internal time to its end, where no timer expires.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Converts the caller's time, which may step in either direction, to internal time, which never runs backward.
@@ -109,16 +108,16 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// | up to 100 ms before the latest | stands still until the caller's time has caught up |
 /// | earlier than that | goes on from the latest, in step with the caller's time from now on |
 ///
-/// So timers go on after a backward step, and a lease lasts no longer for it than the time between two calls.
+/// So timers continue after a backward step, which extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Latest time of the caller, and the internal time then.
+    /// Latest time of the caller, and the internal time at that moment.
     latest: Instant,
     internal: Instant,
 }
 
 impl MonotonicClock {
-    /// Creates a clock whose internal time is the caller's until that steps.
+    /// Creates a clock whose internal time equals the caller's until the caller's clock steps.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             latest: now,
@@ -126,7 +125,7 @@ impl MonotonicClock {
         }
     }
 
-    /// Takes the caller's time, and returns the internal one.
+    /// Advances to the caller's time, and returns the internal time.
     pub(crate) fn advance(&mut self, now: Instant) -> Instant {
         if now >= self.latest {
             self.internal = self.internal + now.since(self.latest).min(LONGEST);
@@ -137,18 +136,18 @@ impl MonotonicClock {
         self.internal
     }
 
-    /// Returns the internal time that was taken last.
+    /// Returns the internal time of the last call.
     #[cfg(feature = "upload")]
     pub(crate) const fn now(&self) -> Instant {
         self.internal
     }
 
-    /// Returns the internal time of the caller's time `at`.
+    /// Converts the caller's time `at` to internal time.
     pub(crate) fn internal(&self, at: Instant) -> Instant {
         shifted(at, self.latest, self.internal)
     }
 
-    /// Returns the caller's time of the internal time `at`.
+    /// Converts the internal time `at` to the caller's time.
     pub(crate) fn external(&self, at: Instant) -> Instant {
         shifted(at, self.internal, self.latest)
     }
@@ -172,16 +171,16 @@ mod tests {
     fn internal_time_never_runs_backward() {
         let mut clock = MonotonicClock::new(ms(1_000));
         assert_eq!(clock.advance(ms(5_000)), ms(5_000));
-        // Calls in disorder.
+        // Out-of-order calls.
         assert_eq!(clock.advance(ms(4_950)), ms(5_000));
         assert_eq!(clock.advance(ms(5_010)), ms(5_010));
-        // The clock steps back by five seconds, and on.
+        // The clock steps back by five seconds, then continues.
         assert_eq!(clock.advance(ms(10)), ms(5_010));
         assert_eq!(clock.advance(ms(20)), ms(5_020));
         assert_eq!(clock.internal(ms(15)), ms(5_015));
         assert_eq!(clock.external(ms(5_120)), ms(120));
         assert_eq!(clock.external(ms(4_000)), Instant::ZERO);
-        // It steps forward by an hour, and to the end of time and back.
+        // The clock steps forward by an hour, then to the maximum and back.
         assert_eq!(clock.advance(ms(3_600_020)), ms(3_605_020));
         let end = Instant::from_micros(u64::MAX);
         let far = ms(3_605_020) + super::LONGEST;

@@ -1,45 +1,45 @@
-//! Which view of the chain: who is in it, as it was agreed.
+//! Views: agreements on the members of the chain.
 
 use crate::mission::MAX_RELAYS;
 
-/// The name of a view, in the order of proposals: a number, and the node that proposed it, so that no two nodes propose one view.
+/// Identifier of a view, ordered: a number, and the node that proposed it, so that no two nodes propose the same view.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
 
-/// Bits of the node that proposed: a chain has at most 1000 relays.
+/// Bits of the proposer: a chain has at most 1000 relays.
 const NODE: u32 = 10;
 
 impl ViewId {
-    /// The chain as the mission has it, which nobody proposed.
+    /// Initial view: the chain as configured in the mission, without a proposer.
     pub const LOADED: Self = Self(0);
 
-    /// As it is written: the node in the low ten bits, the number above.
+    /// Decodes an identifier: the proposer in the low ten bits, the number above.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
 
-    /// The same, to be written.
+    /// Encodes the identifier for [`ViewId::from_bits`].
     pub const fn bits(self) -> u32 {
         self.0
     }
 
-    /// The number, 0 to 4 194 303.
+    /// Number of the view, 0 to 4 194 303.
     pub const fn number(self) -> u32 {
         self.0 >> NODE
     }
 
-    /// The node that proposed it, 0 for none.
+    /// Node that proposed the view; 0 for the initial view.
     pub const fn proposer(self) -> u16 {
         (self.0 & ((1 << NODE) - 1)) as u16
     }
 
-    /// Whether a node can have proposed it.
+    /// Returns true if a node can have proposed this view.
     pub(crate) const fn is_proposed(self) -> bool {
         self.number() > 0 && 1 <= self.proposer() && self.proposer() <= MAX_RELAYS
     }
 
-    /// The first view after this one that `node`, 1 to 1000, may propose; `None` after four million.
+    /// Returns the next view that `node`, 1 to 1000, may propose; `None` after four million.
     pub(crate) const fn next_by(self, node: u16) -> Option<Self> {
         let number = self.number() + 1;
         if number >> (32 - NODE) == 0 {
@@ -49,7 +49,7 @@ impl ViewId {
         }
     }
 
-    /// The same view, or one on the way to it, where that is more than `most` numbers after this one.
+    /// Returns `view`, or one with a lower number if `view` is more than `most` numbers ahead of this one.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -59,20 +59,21 @@ impl ViewId {
         }
     }
 
-    /// What is added to the digest of a mission for the passes of a view: views of one number, and some thousand in a row, differ.
+    /// Value added to a mission's digest in the passes of a view. Views of one number, and of thousands of consecutive ones, have
+    /// different marks.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
     }
 }
 
-/// A view and its size.
+/// View identifier and number of members.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {
-    /// Which one.
+    /// Identifier of the view.
     pub id: ViewId,
-    /// Relays in it, 1 to 1000.
+    /// Number of relays in the view, 1 to 1000.
     pub relays: u16,
 }
 

@@ -1,22 +1,22 @@
-//! What a relay does while its part of the chain has no quorum.
+//! Behaviour of a relay while its part of the chain has no quorum.
 
 use crate::place::Placement;
 
-/// What a relay does while its part of the chain is too small to fly anything, so that it is in nobody's way.
+/// Behaviour of a relay while its part of the chain has no quorum and must not block the other part.
 ///
-/// Set it alike on all relays: then those that leave keep their order and their distances.
+/// Set it to the same value on all relays: relays that leave then keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// It stays where it was agreed to be.
+    /// Hold the agreed position.
     #[default]
     Hold,
-    /// It leaves the line, along y and upward from there; with a guard as far as its box goes
+    /// Leave the line from the agreed position, along y and upward; with a guard, only within its geofence
     /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// How far to the side, m: -1e4 to 1e4.
+        /// Lateral offset, m: -1e4 to 1e4.
         y_m: f32,
-        /// How far up, m: 0 to 1e4.
+        /// Climb, m: 0 to 1e4.
         up_m: f32,
     },
 }
@@ -29,7 +29,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Where a relay is to be then that was agreed to be at `place`.
+    /// Returns the position to take without a quorum; `place` is the agreed one.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

@@ -1,35 +1,34 @@
-//! What micromath and libm are worth in f32, function by function: why the one is used for bearings and the other for all
-//! the rest. `cargo test --test accuracy -- --nocapture` prints the table, and with `--release` and
-//! `--include-ignored` how long each takes on the host.
+//! Accuracy and cost of micromath and libm in f32: the reason to use micromath for bearings alone.
+//!
+//! `cargo test --test accuracy -- --nocapture` prints the table, with `--release` and `--include-ignored` also the times.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use micromath::F32;
 
-/// How an error is measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Error {
-    /// Share of the exact value.
+    /// Fraction of the exact value.
     Relative,
-    /// Difference from it, in the unit of the row.
+    /// Difference from the exact value, in the unit of the row.
     Absolute,
 }
 
-/// One function: what both libraries make of two arguments, and the truth about the same two.
+/// Function in both libraries and in f64.
 struct Function {
     name: &'static str,
-    /// Of an absolute error.
+    /// Unit of an absolute error.
     unit: &'static str,
     error: Error,
-    /// What x runs over, evenly, or by factors if it is above 0.
+    /// Range of x, in even steps, or geometric if it is positive.
     range: [f64; 2],
-    /// The arguments for x; a function of one argument ignores the second.
+    /// Returns the arguments for x; functions of one argument ignore the second.
     arguments: fn(f64) -> [f64; 2],
     micromath: fn([f32; 2]) -> f32,
     libm: fn([f32; 2]) -> f32,
     exact: fn([f64; 2]) -> f64,
-    /// The largest errors, measured and rounded up: micromath's, libm's.
+    /// Largest errors of micromath and libm, measured and rounded up.
     largest: [f64; 2],
 }
 
@@ -104,7 +103,6 @@ const FUNCTIONS: [Function; 6] = [
 
 const POINTS: u32 = 400_000;
 
-/// The arguments of a function, as f32.
 fn arguments(function: &Function) -> impl Iterator<Item = [f32; 2]> {
     let [low, high] = function.range;
     (0..=POINTS).map(move |i| {
@@ -143,7 +141,7 @@ fn the_errors_of_both_libraries_are_as_stated() {
         );
         for (found, stated) in found.into_iter().zip(function.largest) {
             assert!(found <= stated, "{}: {found}", function.name);
-            // A statement much above the truth says nothing.
+            // The stated error must not be far above the measured one.
             assert!(found >= 0.5 * stated, "{}: {found}", function.name);
         }
     }

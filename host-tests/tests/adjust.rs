@@ -1,4 +1,4 @@
-//! Algorithm 2: turn by turn, never worse, and what a coarse grid cannot do.
+//! Algorithm 2: turns never make the chain worse, and the fine search gains more than a coarse grid.
 
 use core::task::Poll;
 
@@ -16,7 +16,7 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// X = 500, Y = 150, all relays at 220 m to begin with, 20 m to 300 m allowed, 4 m apart.
+/// Returns a chain with X = 500, Y = 150, relays at 220 m, a band of 20 m to 300 m, and 4 m of separation.
 fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     let mut link = Link {
         y_i: 150.0,
@@ -46,7 +46,7 @@ fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// SIR of the chain by the reference, and the least distance between neighbours, m.
+/// Returns the chain's SIR by the reference, and the least distance of neighbours, m.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     let places: Vec<Placement> = outcome
         .relays
@@ -79,8 +79,7 @@ fn rises(outcome: &Outcome) -> bool {
     outcome.rounds.windows(2).all(|pair| pair[1] >= pair[0])
 }
 
-/// Fifty relays, from Algorithm 1's places at 220 m: what the two local searches make of them. The joint optimum is
-/// 6.49838, 19.4 % above where they begin: the paper's 25 % cannot be had.
+/// Compares the local searches for fifty relays at 220 m: the optimum, 6.49838, is 19.4 % above the start.
 #[test]
 fn fine_turns_gain_what_a_coarse_grid_does_not() {
     let of = |rounds, local| {
@@ -119,7 +118,7 @@ fn fine_turns_gain_what_a_coarse_grid_does_not() {
     assert!((ten / 5.555 - 1.0).abs() < 1e-3, "{ten}");
 }
 
-/// Relays that begin far from balanced, as the paper's grid goes: the values of a separate program.
+/// Compares the paper's grid search, from a far from balanced start, with the values of a separate program.
 #[test]
 fn the_grid_moves_where_a_separate_program_moves() {
     let link = Link {
@@ -202,12 +201,12 @@ fn the_grid_moves_where_a_separate_program_moves() {
     }
 }
 
-/// The fine search is hardly ever below a dense grid of the same rectangle, and comes no nearer to a neighbour than it may.
+/// Compares the fine search with a dense grid of the same rectangle, separation included.
 #[test]
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
     let (mut lower, mut higher, mut far) = (0.0_f64, 0, 0);
-    // A neighbour to keep away from that is louder than the other: the best place would be next to it.
+    // The neighbour to keep away from is the louder one: the best position would be next to it.
     let apart_m = 120.0;
     let mut nearest = f32::INFINITY;
     for _ in 0..300 {
@@ -252,7 +251,7 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
     println!("nearest neighbour at {nearest} m");
     assert!((apart_m - 1e-2..apart_m + 5.0).contains(&nearest));
     assert!(higher > 200);
-    // Next to the interferer a row may have two hilltops, of which halving finds one.
+    // Next to the interferer a row may have two maxima, of which bisection finds one.
     assert!(far <= 3, "{far}");
 }
 
@@ -275,7 +274,7 @@ fn faults_change_nothing() {
     }
 }
 
-/// The hops of relay `at` (from 0) of a chain of relays of 1 W at `places`.
+/// Returns the hops of relay `at` (from 0) in a chain of 1 W relays at `places`.
 fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     let apart_m = mission.config().min_separation_m;
     let beside = |place| HopEnd { place, apart_m };
@@ -300,7 +299,7 @@ fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     )
 }
 
-/// When it ends before its last round, no relay has a better place: what one relay has moved is known to all.
+/// Checks that no relay has a better position when the algorithm ends before its last round.
 #[test]
 fn it_ends_where_nobody_can_do_better() {
     let local = Local::Grid {
@@ -314,7 +313,7 @@ fn it_ends_where_nobody_can_do_better() {
             local,
         };
         let (_, mut setup) = setup(relays, adjust);
-        // Far from where it will end, and the first relay where it may well stay.
+        // The start is far from the end, except that the first relay may well stay.
         let low = Profile {
             altitude_m: 60.0,
             power_w: 1.0,
@@ -347,7 +346,7 @@ fn it_ends_where_nobody_can_do_better() {
     }
 }
 
-/// Relays that would crowd next to each other stay apart, by either search.
+/// Checks the separation, which binds, in both searches.
 #[test]
 fn relays_keep_their_distance_where_it_costs() {
     for local in [

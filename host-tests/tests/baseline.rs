@@ -1,4 +1,4 @@
-//! The placements that the crate is compared with: against values of a separate program, and against brute force.
+//! Baseline placements, compared with values of a separate program and with brute force.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,6 @@ fn scene(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// The relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }
@@ -57,7 +56,7 @@ fn chains_stand_where_the_reference_says() {
     }
 }
 
-/// The weakest received signal of a chain, W, from the path losses alone.
+/// Returns the weakest received signal of a chain, W, from the path losses alone.
 fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     let relay = link.relays[0];
     let height2 = relay.altitude_m * relay.altitude_m;
@@ -70,7 +69,7 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// The strongest weakest signal over every ordered choice of `left` more places out of a grid of `points`.
+/// Returns the best weakest signal over all ordered choices of `left` further positions on a grid.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);
@@ -87,8 +86,7 @@ fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) ->
     best
 }
 
-/// Random links, eta and mu_LoS unlike, for 1 to 3 relays: no place of a grid has a stronger weakest signal, and the best of the
-/// grid is not far below it.
+/// Compares random links of 1 to 3 relays with a grid: it is no better, and not far below.
 #[test]
 fn no_grid_has_a_stronger_weakest_signal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(11));
@@ -108,19 +106,19 @@ fn no_grid_has_a_stronger_weakest_signal() {
             let got = weakest_signal(&link, &places);
             let grid = best_of_grid(&link, points, link.len(), &mut Vec::new());
             assert!(got >= grid * (1.0 - 1e-9), "{got} against {grid}: {link:?}");
-            // One step of the grid is a small part of the longest hop, and a signal falls with its square.
+            // A grid step is a small fraction of the longest hop, and the signal falls with its square.
             assert!(grid >= 0.8 * got, "{got} against {grid}: {link:?}");
             let relay = link.relays[0];
             let cap = link.tx_w.min(relay.power_w) / (link.eta * relay.altitude_m.powi(2));
             capped += u32::from(off(got, cap) < 1e-12);
         }
     }
-    // A relay straight above Tx or Rx, and the rest of the chain shortened: some links must be of that kind, and not all.
+    // Some links, but not all, have a relay right above Tx or Rx and shortened hops.
     println!("{capped} of 150 with a relay above a ground station");
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Above a ground station the hops are all shortened in one proportion.
+/// Checks a chain with a relay above Rx: all other hops are shortened in proportion.
 #[test]
 fn a_chain_with_more_relays_than_the_signal_needs_keeps_its_proportions() {
     let link = Link::paper(50);
@@ -132,13 +130,13 @@ fn a_chain_with_more_relays_than_the_signal_needs_keeps_its_proportions() {
     assert!(off(places[1] - places[0], step * 1000.0 / whole) < 1e-9);
 }
 
-/// The same at the other end, where Tx is the weaker one.
+/// Checks a weaker Tx, which gets a relay right above it.
 #[test]
 fn the_weaker_ground_station_has_its_relay_above_it() {
     let mut link = Link::paper(60);
     link.tx_w = 0.5;
     let places = blind::places(&scene(&link));
-    // At 0.5 W / (eta h^2): no step to the first relay, sqrt(2) h between relays, h to Rx.
+    // At 0.5 W / (eta h^2) the steps are 0 to the first relay, sqrt(2) h between relays, h to Rx.
     let (step, last) = (20.0 * 2.0_f64.sqrt(), 20.0);
     let whole = 59.0 * step + last;
     assert!(places[0].abs() < 1e-9);
@@ -146,10 +144,10 @@ fn the_weaker_ground_station_has_its_relay_above_it() {
     assert!(off(1000.0 - places[59], last * 1000.0 / whole) < 1e-9);
 }
 
-/// The mean over two random relays by its integral over the square of their places, folded at the diagonal.
+/// Compares the mean over two random relays with its integral over the ordered positions.
 #[test]
 fn the_mean_of_random_chains_is_the_integral() {
-    // An interferer near Tx and relays that are heard far: it matters which of them comes first.
+    // With an interferer near Tx and relays with a long range, the order of relays matters.
     let mut link = Link {
         x_i: 150.0,
         y_i: 50.0,
@@ -163,7 +161,7 @@ fn the_mean_of_random_chains_is_the_integral() {
     let (mut sum, mut db, mut rate) = (0.0, 0.0, 0.0);
     for a in 0..points {
         for b in 0..points {
-            // Half a cell off the diagonal, where the hop between them has no length.
+            // Half a cell off the diagonal, where the hop has no length.
             let (x, y) = (
                 place(a.min(b)),
                 place(a.max(b)) + 0.25 * link.distance_m / f64::from(points),
@@ -190,7 +188,6 @@ fn the_same_seed_draws_the_same_chains_and_another_others() {
     assert_ne!(mean(&scene(&link), 100, 1), mean(&scene(&link), 100, 2));
 }
 
-/// The standard error is that of the means of many seeds.
 #[test]
 fn the_standard_error_is_the_scatter_of_means() {
     let link = Link::paper(8);

@@ -1,4 +1,4 @@
-//! The simulated chain: what it settles on, what that costs, and that no fault changes it.
+//! Simulated chains: optimum, cost, and independence from faults.
 
 use host_tests::fixtures::mission;
 use host_tests::flights::settle;
@@ -59,10 +59,10 @@ fn without_prediction_four_sweeps_are_enough() {
             "N = {relays}: {} sweeps",
             outcome.sweeps
         );
-        // There and back; and so do the first two pulses, once there is something to hold.
+        // Each sweep, and each of the first two lease renewals, goes there and back.
         let there_and_back = 2 * u64::from(relays - 1);
         let pulses = outcome.messages - there_and_back * u64::from(outcome.sweeps);
-        // Each relay claims its number at these times, and is sent an echo.
+        // At these times, s, each relay claims its number and receives an echo.
         let seconds = outcome.ended.as_micros() as f64 * 1e-6;
         let times = [2.25, 2.75, 3.75, 5.75, 9.75, 17.75]
             .iter()
@@ -109,7 +109,7 @@ fn random_links_settle_at_their_optimum_with_and_without_prediction() {
     assert!(hopeless > 0);
 }
 
-/// The same number of targets as the paper's step of 0.1 takes, and the same last one.
+/// Compares the paper's step of 0.1: number of targets, and last target.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [
@@ -154,7 +154,7 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// 1 000 seeds of everything at once at N = 8: the very placement of the faultless run.
+/// Checks 1 000 seeds with all faults at N = 8: the positions equal those of the faultless run.
 #[test]
 fn faults_change_nothing_but_the_time_it_takes() {
     let undisturbed = settle(Setup::new(mission(8)));
@@ -272,8 +272,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
     }
 }
 
-/// Relays with an altitude and a power of their own: the leader predicts wrong, and the bracket finds what the exact
-/// reference calls feasible for the farthest chain.
+/// Checks own altitudes and powers: the leader mispredicts, and the search finds the farthest chain's optimum.
 #[test]
 fn a_mixed_chain_is_solved_as_it_is() {
     let mission = mission(8);
@@ -339,8 +338,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
         let noticed: Vec<_> = outcome.noticed.keys().copied().collect();
         assert_eq!(noticed, [(2, Side::Downstream), (4, Side::Upstream)]);
         for (&(by, _), &when) in &outcome.noticed {
-            // `Settings::dead_after` is 15 s since the last sign of life, which may be up to `probe_after` old; it is noticed by the next question,
-            // which comes within a sixteenth of 10 s and an eighth more.
+            // The question after `dead_after` notices the loss, at most a sixteenth of 10 s and an eighth of that later.
             assert!(
                 when.since(killed) <= Duration::from_millis(15_000 + 625 * 9 / 8),
                 "relay {by} took until {when:?}"
@@ -357,7 +355,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_within_the_stated_time() {
 fn neighbours_that_live_are_not_lost_over_an_hour_of_bad_days() {
     let mut setup = Setup::new(mission(4));
     setup.faults = Faults::BAD_DAY;
-    // Nobody dies before the end of the hour, so the run goes on until then.
+    // A kill at the end of the hour makes the run go on until then.
     setup.kills = vec![(4, Instant::from_millis(3_600_000))];
     let outcome = run(setup).unwrap();
     let alive = |miss: &&(u16, Side)| **miss != (3, Side::Downstream);

@@ -1,7 +1,6 @@
-//! Algorithms 1 and 4 where the farthest place is not the best one: mixed altitudes, uneven fields, separations that bind.
+//! Algorithms 1 and 4 where the farthest chain is not optimal, compared with the f64 optimum.
 //!
-//! Every chain is held against an f64 judge that knows the optimum, and so is the bound that the leader gives with it.
-//! `COUNT` and `SEED` in the environment take other scenes.
+//! `COUNT` and `SEED` select other scenes.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -18,10 +17,10 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// What counts as the optimum, relative.
+/// Relative distance from the optimum that counts as optimal.
 const NEAR: f64 = 1e-3;
 
-/// By how much a bound may be below it, relative: the search's tolerance, and f32.
+/// Relative error by which a bound may be too low: the search's tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
 fn count() -> usize {
@@ -35,7 +34,7 @@ fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile 
         .map_or(mission.config().common, |(_, profile)| *profile)
 }
 
-/// Whether the chain that holds nobody back meets the target.
+/// Returns true if the farthest chain meets the target.
 fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {
@@ -72,7 +71,7 @@ fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     }
 }
 
-/// What came of many scenes.
+/// Results of many scenes.
 #[derive(Default)]
 struct Tally {
     scenes: usize,
@@ -81,13 +80,13 @@ struct Tally {
     plain: usize,
     worst: f64,
     sweeps: u32,
-    /// The bound over the optimum: of all, and of those that are not near.
+    /// Ratios of bound to optimum: of all scenes, and of those below the optimum.
     bounds: Vec<f64>,
     bounds_of_short: Vec<f64>,
 }
 
 impl Tally {
-    /// Solves the scene, whose best is `best`, and judges what is found by `sir`.
+    /// Solves the scene with the optimum `best` and evaluates the result by `sir`.
     fn judge(
         &mut self,
         mission: &Mission,
@@ -115,7 +114,7 @@ impl Tally {
             "{reached} above {best}: {told}"
         );
         let bound = f64::from(agreed.most.unwrap());
-        // Near or not: what there is to be had is below it.
+        // The bound covers the optimum even where the optimum is missed.
         assert!(
             bound >= best * (1.0 - ROUNDING),
             "{bound} does not cover {best}: {told}"
@@ -146,14 +145,14 @@ impl Tally {
         println!("  of those short: {}", spread(&mut self.bounds_of_short));
     }
 
-    /// How many bounds of a hundred are at most 1 % above the optimum.
+    /// Returns the percentage of bounds at most 1 % above the optimum.
     fn tight(&self) -> f64 {
         let tight = self.bounds.iter().filter(|of| **of <= 1.01).count();
         100.0 * tight as f64 / self.scenes as f64
     }
 }
 
-/// How the ratios are spread.
+/// Returns the distribution of ratios as text.
 fn spread(of: &mut [f64]) -> String {
     of.sort_by(f64::total_cmp);
     let Some(most) = of.last() else {
@@ -245,7 +244,7 @@ fn with_a_separation_that_binds() {
     assert!(tally.tight() >= 70.0);
 }
 
-/// Relays alike, with two to twelve points of Upsilon within a factor of up to 300.
+/// Draws identical relays, with two to twelve points of Upsilon within a factor of up to 300.
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -280,7 +279,7 @@ fn in_uneven_fields() {
         let link = uneven(&mut rng, relays);
         let mission = of_stochastic_link(&link, 0.0).unwrap();
         let best = link.best();
-        // Two judges, two ways.
+        // Both reference methods agree.
         let other = link.best_apart(0.0);
         assert!(
             (other / best - 1.0).abs() < 1e-5,
@@ -294,7 +293,7 @@ fn in_uneven_fields() {
     assert!(tally.tight() >= 99.0);
 }
 
-/// The same for relays that differ in altitude and power; half of them have to keep apart, or their climbs are as long as hops.
+/// Checks relays of different altitude and power, half with a separation or hop-sized altitudes.
 #[test]
 fn in_uneven_fields_by_relays_that_differ() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(905));
@@ -342,7 +341,7 @@ fn in_uneven_fields_by_relays_that_differ() {
     assert!(tally.near * 100 >= tally.scenes * 88 && tally.tight() >= 80.0);
 }
 
-/// The same by messages, with the leader's prediction and without, and with frames that are lost: one chain, and it keeps its word.
+/// Checks chains by messages, with and without prediction and losses: equal results within the bound.
 #[test]
 fn by_messages() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(904));

@@ -1,6 +1,4 @@
-//! How fast a chain recovers from the loss of one relay, by its length and by which one is lost.
-//!
-//! `cargo test --test recovery -- --nocapture` prints the table of `host-tests/RESULTS.md`.
+//! Time of recovery from a loss, by chain length and relay; prints the table of `host-tests/RESULTS.md`.
 
 use host_tests::fixtures::mission;
 use uav_relay::Instant;
@@ -10,10 +8,10 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// When the relay goes silent: long after the chain has settled.
+/// Time of the loss, s: long after the chain has settled.
 const AT_S: u64 = 60;
 
-/// A chain of `relays` on one radio channel that loses relay `lost`.
+/// Returns a chain of `relays` on one radio channel that loses relay `lost`.
 fn losing(relays: u16, lost: u16) -> Setup {
     let mut setup = Setup::on_shared_channel(mission(relays));
     setup.kills = vec![(lost, Instant::from_millis(1_000 * AT_S))];
@@ -21,7 +19,6 @@ fn losing(relays: u16, lost: u16) -> Setup {
     setup
 }
 
-/// What came of it, and the report of it.
 fn recovered(setup: Setup) -> (Outcome, ChainReport) {
     let mission = setup.mission;
     let outcome = run(setup).unwrap();
@@ -29,7 +26,7 @@ fn recovered(setup: Setup) -> (Outcome, ChainReport) {
     (outcome, report)
 }
 
-/// The one recovery of a run that lost `lost` and settled without it.
+/// Returns the only recovery of a run that lost `lost` and settled without it.
 fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
     let [one] = report.recovery.as_slice() else {
         panic!("{:?}", report.recovery);
@@ -42,7 +39,7 @@ fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
     one.clone()
 }
 
-/// Head, middle and tail.
+/// Returns the first, middle and last relay.
 fn places(relays: u16) -> Vec<(&'static str, u16)> {
     let mut places = vec![
         ("leader", 1),
@@ -79,8 +76,8 @@ fn one_loss_is_noticed_within_15_s_and_costs_six_sweeps_at_most() {
             );
             assert!(noticed <= 15.0, "{name} of {relays}: {noticed}");
             assert!((1..=6).contains(&sweeps), "{name} of {relays}: {sweeps}");
-            // A neighbour beyond is found once it has noticed, too, up to a pulse's period of 2.5 s later; that there is none takes
-            // as long as the silence did.
+            // The next relay has to notice the loss too, up to a renewal period of 2.5 s later; a search for a missing neighbour
+            // takes as long as the silence did.
             let search = if lost == 1 || lost == relays {
                 10.1
             } else {
@@ -95,13 +92,13 @@ fn one_loss_is_noticed_within_15_s_and_costs_six_sweeps_at_most() {
     }
 }
 
-/// When the loss was noticed, from when it happened, s.
+/// Returns the time from the loss to its detection, s.
 fn detected(report: &ChainReport) -> f64 {
     let lost = report.timeline.iter().find(|moment| moment.what == "lost");
     lost.unwrap().at_s - AT_S as f64
 }
 
-/// What the chain that is left agrees on is what a chain of so many agrees on from the start, to the bit.
+/// Checks that the remaining chain agrees, to the bit, with an undisturbed chain of that length.
 #[test]
 fn the_chain_that_is_left_is_as_good_as_a_new_one() {
     for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {
@@ -114,7 +111,6 @@ fn the_chain_that_is_left_is_as_good_as_a_new_one() {
     }
 }
 
-/// Without a quorum the one that is left of two goes on alone.
 #[test]
 fn without_a_quorum_the_last_relay_goes_on() {
     let mut setup = losing(2, 1);
@@ -124,7 +120,7 @@ fn without_a_quorum_the_last_relay_goes_on() {
     assert_eq!(only(&report, 2, 1).view, 1);
 }
 
-/// With tags it is the same chain, after a handshake more.
+/// Checks that authentication changes only the time, by a handshake.
 #[test]
 fn tags_change_nothing_but_the_time() {
     let (bare, _) = recovered(losing(8, 4));

@@ -1,4 +1,4 @@
-//! One relay in a field: Algorithm 3 as corrected, against a dense search in f64.
+//! Corrected Algorithm 3 for one relay in a field, compared with a dense search in f64.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -79,7 +79,7 @@ fn the_algorithm_finds_what_the_reference_finds() {
         let found = stepped(&mission, common, epsilon, 10_000_000).unwrap();
         assert!(found.sir <= best.sir * (1.0 + 1e-5));
         let theirs = link.algorithm3(f64::from(epsilon)).unwrap();
-        // Where it is steep, a place that rounding has moved has another SIR: the step itself is the yardstick.
+        // At a steep point a rounded position has another SIR, so the tolerance is the step itself.
         let off = (f64::from(found.sir) - theirs.sir).abs();
         same += u32::from(off <= 1e-4 * theirs.sir);
         assert!(
@@ -93,7 +93,7 @@ fn the_algorithm_finds_what_the_reference_finds() {
     assert!(same > 400);
 }
 
-/// D = 100 m, h = 10 m, 10 W and 1 W, Upsilon 100 from 90 m on and 0.1 before: the first target that is met is 0.00998.
+/// Checks a field, 0.1 and from 90 m on 100, whose first feasible target, 0.00998, is not the best.
 #[test]
 fn the_first_target_that_is_met_is_not_the_best() {
     let steep = link(100.0, 10.0, 10.0, 1.0, vec![(89.99, 0.1), (90.0, 100.0)]);
@@ -105,7 +105,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
     assert!((found.sir / 0.121_95 - 1.0).abs() < 0.02, "{found:?}");
 }
 
-/// Of the public reference: constant Upsilon of 4, 336 steps of 0.0001 to the target 0.0065 at x = 77.298.
+/// Compares the public reference: constant Upsilon of 4, 336 steps of 0.0001 to 0.0065 at x = 77.298.
 #[test]
 fn a_constant_field_is_as_a_separate_program_has_it() {
     let even = link(100.0, 10.0, 10.0, 1.0, vec![(0.0, 4.0)]);

@@ -1,4 +1,4 @@
-//! Algorithm 4: places in a field of interference, by messages from Rx toward Tx, agreed or measured.
+//! Algorithm 4: positions in a field of interference by messages from Rx toward Tx, configured or measured.
 
 use host_tests::flights::settle;
 use rand::{Rng, RngExt, SeedableRng};
@@ -19,7 +19,7 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
     of_stochastic_link(link, min_separation_m).unwrap()
 }
 
-/// A random link of `relays` alike, with `points` points of Upsilon within a factor of `spread`.
+/// Draws a link of identical relays, with `points` points of Upsilon within a factor of `spread`.
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -29,7 +29,7 @@ fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> Stocha
     };
     let mu_los = log_uniform(rng, 1.0, 1e4);
     let eta = mu_los * log_uniform(rng, 1.0, 1.9);
-    // So that SIRs are about 1.
+    // The unit makes the SIRs about 1.
     let unit = mu_los * d * d / (relay.power_w * (relays * relays) as f64);
     let base = unit * log_uniform(rng, 0.3, 30.0);
     let upsilon = (0..points)
@@ -59,7 +59,7 @@ fn places(outcome: &Outcome) -> Vec<f64> {
         .collect()
 }
 
-/// The closed form of one hop backward, from where it is heard; errors as parts of the hop.
+/// Compares the closed form of one hop backward with the reference; errors are fractions of the hop.
 #[test]
 fn retreats_agree_with_the_reference() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(61));
@@ -94,7 +94,7 @@ fn retreats_agree_with_the_reference() {
     assert!(worst < 1e-6);
 }
 
-/// Where Upsilon is the same everywhere the optimum has a closed form: N 1 to 50, by messages, predicted or not.
+/// Compares chains in an even field with the closed-form optimum: N 1 to 50, with and without prediction.
 #[test]
 fn in_an_even_field_the_optimum_is_found() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(62));
@@ -118,7 +118,7 @@ fn in_an_even_field_the_optimum_is_found() {
     println!("short by at most {short:.1e}, above by at most {above:.1e}; at most {most} sweeps");
 }
 
-/// The paper's schedule takes the very steps that the reference takes.
+/// Compares the paper's fixed step with the steps of the reference.
 #[test]
 fn the_fixed_step_is_the_papers() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(63));
@@ -134,7 +134,7 @@ fn the_fixed_step_is_the_papers() {
         let outcome = settle(setup);
         let target = f64::from(outcome.relays[0].target.unwrap());
         steps += theirs.iterations;
-        // A target that is met or not within the rounding of an f32 may be one step off.
+        // A target within f32 rounding of feasibility may be one step off.
         let off = (target - theirs.gamma).abs();
         let rounding = 2e-7 * link.ceiling();
         assert!(
@@ -147,7 +147,7 @@ fn the_fixed_step_is_the_papers() {
     assert!(steps > 1000);
 }
 
-/// Relays that bring an altitude or a power of their own make the leader's prediction wrong: their answers decide.
+/// Checks relays with own altitudes or powers, whose answers overrule the leader's prediction.
 #[test]
 fn relays_may_differ() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(68));
@@ -207,7 +207,7 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// Least separation is kept, and counts as a limit on the target.
+/// Checks that the separation is kept and limits the target.
 #[test]
 fn relays_keep_their_distance() {
     let mut link = StochasticLink {
@@ -236,7 +236,7 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// The closed loop: relays that were told of an even field measure the true one where they stand, and agree again.
+/// Checks the closed loop: relays configured with an even field measure the true one and agree again.
 #[test]
 fn what_is_measured_takes_the_place_of_what_was_agreed() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(67));

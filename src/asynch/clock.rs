@@ -1,17 +1,16 @@
-//! The time, as an executor has it.
+//! Time and timers of an executor.
 
 use core::future::Future;
 
 use crate::time::Instant;
 
-/// The time and its timers, on whatever the executor has: `embassy-time`, `rtic-monotonics`, a virtual clock.
-///
-/// A delay alone (`embedded-hal-async`'s `DelayNs`) is not enough: a relay is told what time it is.
+/// Time and timers of an executor: `embassy-time`, `rtic-monotonics`, a virtual clock. A delay alone (`embedded-hal-async`'s
+/// `DelayNs`) is not enough, because the relay needs the current time.
 pub trait Clock {
-    /// The time since an epoch of the caller's choosing; never less than before.
+    /// Returns the time since an arbitrary epoch; never decreases.
     fn now(&self) -> Instant;
 
-    /// Completes once it is `at`, at once if it has been. It is dropped before that, and made anew, whenever something else comes
+    /// Completes at time `at`, at once if that has passed. The future is dropped and created anew whenever another event comes
     /// first.
     fn sleep_until(&self, at: Instant) -> impl Future<Output = ()>;
 }

@@ -1,13 +1,13 @@
-//! Whole frames that wait for a port.
+//! Queue of whole frames for a port.
 
 use heapless::Deque;
 
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Room for two frames of full length, beside the one that the port is sending.
+/// Capacity: two frames of full length, beside the one that the port is sending.
 const ROOM: usize = 2 * MAX_FRAME;
 
-/// Frames in the order in which they leave, each with its delimiter.
+/// Queued frames in sending order, each with its delimiter.
 #[derive(Debug)]
 pub(super) struct Frames(Deque<u8, ROOM>);
 
@@ -20,24 +20,24 @@ impl Frames {
         self.0.is_empty()
     }
 
-    /// Whether one more frame of any length fits.
+    /// Returns true if one more frame of any length fits.
     pub(super) fn has_room(&self) -> bool {
         ROOM.saturating_sub(self.0.len()) >= MAX_FRAME
     }
 
-    /// Takes a frame whole, or not at all; whether it did.
+    /// Queues a whole frame; returns false if it does not fit.
     pub(super) fn push(&mut self, frame: &[u8]) -> bool {
         let fits = frame.len() <= ROOM.saturating_sub(self.0.len());
         if fits {
             for &byte in frame {
-                // There is room, as just seen.
+                // The capacity was checked above.
                 let _ = self.0.push_back(byte);
             }
         }
         fits
     }
 
-    /// Moves the first frame into `frame` and says how long it is; 0 if there is none.
+    /// Moves the first frame into `frame` and returns its length; 0 if there is none.
     pub(super) fn pop(&mut self, frame: &mut FrameBuf) -> usize {
         let mut len = 0;
         for place in frame {

@@ -1,4 +1,4 @@
-//! One port: a reader, a writer, the frames that wait for it, and its driver-enable pin.
+//! One port: reader, writer, frame queue, and driver-enable pin.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -19,19 +19,20 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::MAX_FRAME;
 
-/// How long a port that has failed is left alone, in byte times.
+/// Pause after a failure of a port, in byte times.
 const PAUSE: u32 = 128;
 
-/// How long the pin stays high behind the last byte, in byte times: one for the byte that is on the line, one for clocks that differ.
+/// Time for which the pin stays high after the last byte, in byte times: one for the byte on the line, one for clock tolerance.
 const HOLD: u32 = 2;
 
-/// What ends a frame, and all that was left of one.
+/// Delimiter that ends a frame, also one that was cut short.
 const DELIMITER: [u8; 1] = [0];
 
-/// A port's reader and its writer, the frames that wait, and its driver-enable pin if it has one.
+/// Link of a port: its reader and writer, the frame queue, and its driver-enable pin if it has one.
 ///
-/// The pin is high from before the first byte of a frame until the last waiting frame has left, and low otherwise: when the writer's
-/// `flush` says so, or when its bytes have had the time they take, whichever is later. (`flush` of some HALs leaves a FIFO full.)
+/// The pin is high from before the first byte of a frame until the last queued frame has left, and low otherwise. A frame has
+/// left after the writer's `flush` and after the transmission time of its bytes, whichever is later, because `flush` of some HALs
+/// does not empty a FIFO.
 #[derive(Debug)]
 pub struct AsyncLink<R, W, D = NoPin> {
     rx: R,
@@ -39,27 +40,27 @@ pub struct AsyncLink<R, W, D = NoPin> {
     waiting: RefCell<Frames>,
 }
 
-/// The writer's side.
+/// Sending half of a link.
 #[derive(Debug)]
 struct Sender<W, D> {
     tx: W,
     pin: Option<D>,
     byte_time: Duration,
-    /// When every byte that was handed over has left, if each did as soon as it could.
+    /// Earliest time at which all bytes written so far can have left.
     quiet_at: Instant,
-    /// Whether the line may have seen the beginning of a frame and not its end.
+    /// True if the last frame may have been cut short on the line.
     cut: bool,
 }
 
 impl<R: Read, W: Write> AsyncLink<R, W> {
-    /// A link over a reader and a writer at `baud` bit/s, with ten bits a byte.
+    /// Creates a link over a reader and a writer at `baud` bit/s, with 10 bits per byte.
     pub fn new(rx: R, tx: W, baud: u32) -> Self {
         Self::with_pin(rx, tx, baud, None)
     }
 }
 
 impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
-    /// The same with a pin that is high while this relay sends.
+    /// Creates a link with a pin that is high while this relay sends.
     pub fn half_duplex(rx: R, tx: W, baud: u32, pin: D) -> Self {
         Self::with_pin(rx, tx, baud, Some(pin))
     }
@@ -78,7 +79,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// What receives for good, what sends for good, and the frames between the relay and the latter.
+    /// Returns the future that receives, the future that sends, and the queue between the relay and the latter.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -98,13 +99,13 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
 }
 
 impl<R, W, D> AsyncLink<R, W, D> {
-    /// Reader, writer and pin. What was waiting is gone, and the pin stays as it is.
+    /// Returns reader, writer and pin. Queued frames are lost, and the pin keeps its level.
     pub fn release(self) -> (R, W, Option<D>) {
         (self.rx, self.tx.tx, self.tx.pin)
     }
 }
 
-/// Hands the relay what comes in, for good.
+/// Passes received bytes to the relay, forever.
 async fn receive<R: Read>(
     rx: &mut R,
     port: Port,
@@ -115,7 +116,7 @@ async fn receive<R: Read>(
     let mut buffer = [0; READ_LIMIT];
     loop {
         let (read, waited) = watched(rx.read(&mut buffer)).await;
-        // No `await` stands between a byte that was read and the relay.
+        // There is no `await` between reading bytes and passing them to the relay.
         match read {
             Ok(count @ 1..) => {
                 let bytes = buffer.get(..count).unwrap_or_default();
@@ -125,11 +126,11 @@ async fn receive<R: Read>(
                     yield_now().await;
                 }
             }
-            // The end of a stream that may go on.
+            // The stream has ended but may continue.
             Ok(0) => clock.sleep_until(clock.now() + pause).await,
             Err(_) => {
                 relay.count(port, |stats| stats.read_failed(Fault::Other));
-                // One bad byte is no reason to miss the next; a port that only fails must not keep everybody from their work.
+                // Reading continues at once after a single bad byte, but a port that only fails must not block the other tasks.
                 yield_now().await;
                 if !waited {
                     clock.sleep_until(clock.now() + pause).await;
@@ -140,7 +141,7 @@ async fn receive<R: Read>(
 }
 
 impl<W: Write, D: OutputPin> Sender<W, D> {
-    /// Sends what waits, for good.
+    /// Sends queued frames, forever.
     async fn run(
         &mut self,
         port: Port,
@@ -149,7 +150,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         clock: &impl Clock,
         pause: Duration,
     ) -> Infallible {
-        // Low until there is something to say.
+        // The initial state makes the first turn set the pin low.
         let mut high = true;
         let mut frame = [0; MAX_FRAME];
         loop {
@@ -171,12 +172,12 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sends a frame, behind a delimiter if the one before it may have been cut short; whether it could.
+    /// Sends a frame, after a delimiter if the previous one may have been cut short; returns true on success.
     async fn send(&mut self, frame: &[u8], clock: &impl Clock) -> bool {
         if self.cut && !self.write(&DELIMITER, clock).await {
             return false;
         }
-        // Whatever becomes of this future before the last byte is out: the next frame begins with a delimiter.
+        // If this future is dropped before the last byte is written, the next frame starts with a delimiter.
         self.cut = true;
         if !self.write(frame, clock).await {
             return false;
@@ -185,7 +186,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         true
     }
 
-    /// Writes all of these bytes; whether it could.
+    /// Writes all bytes; returns true on success.
     async fn write(&mut self, mut bytes: &[u8], clock: &impl Clock) -> bool {
         while !bytes.is_empty() {
             let begun = clock.now();
@@ -200,7 +201,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         true
     }
 
-    /// Waits until every byte has left, where a pin depends on it.
+    /// Waits until every byte has left, if a pin depends on it.
     async fn flush(&mut self, port: Port, relay: &AsyncRelay<'_>, clock: &impl Clock) {
         if self.pin.is_some() && self.quiet_at > Instant::ZERO {
             if self.tx.flush().await.is_err() {
@@ -211,7 +212,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the pin, if there is one; whether it could. Where it could not, some time has gone by.
+    /// Sets the pin, if there is one; returns true on success. Pauses after a failure.
     async fn drive(
         &mut self,
         high: bool,
@@ -236,7 +237,7 @@ fn is_empty(waiting: &RefCell<Frames>) -> bool {
     waiting.try_borrow().is_ok_and(|waiting| waiting.is_empty())
 }
 
-/// Completes with the length of the first frame that waits, once there is one. Whoever puts it there wakes this task.
+/// Completes with the length of the first queued frame. The task that queues a frame wakes this task.
 fn next<'f>(
     waiting: &'f RefCell<Frames>,
     relay: &'f AsyncRelay<'_>,
@@ -251,7 +252,7 @@ fn next<'f>(
             0 => Poll::Pending,
             len => {
                 if was_full {
-                    // The relay may have more to say.
+                    // The relay may have more frames to send.
                     relay.poke();
                 }
                 Poll::Ready(len)
@@ -260,7 +261,7 @@ fn next<'f>(
     })
 }
 
-/// What comes of `future`, and whether it was waited for: if not, its caller has the executor to give back.
+/// Awaits `future`; returns its output, and true if it was pending at least once. If not, the caller must yield.
 pub(super) async fn watched<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;

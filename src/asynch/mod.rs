@@ -1,38 +1,37 @@
-//! A relay on the asynchronous serial ports of [`embedded_io_async`]: what [`serial`](crate::serial) is for a main loop, for an executor.
+//! A relay on asynchronous serial ports ([`embedded_io_async`]): [`serial`](crate::serial) for an executor.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`clock`] | the time, as an executor has it |
-//! | [`relay`] | a relay that tasks share |
-//! | [`link`] | one port: reader, writer, frames that wait, driver-enable pin |
-//! | `frames` | the frames that wait |
-//! | `autopilot` | with the feature `flight`, the link to an autopilot on a port of its own |
-//! | this one | all of them together: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
+//! | [`clock`] | time and timers of an executor |
+//! | [`relay`] | a relay that several tasks share |
+//! | [`link`] | one port: reader, writer, pending frames, driver-enable pin |
+//! | `frames` | pending frames |
+//! | `autopilot` | with the feature `flight`: link to an autopilot on a port of its own |
+//! | this file | the whole: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One future
-//! `run` never completes. It is spawned as a task, or joined with others; any executor will do, since it wants no more of one than to
-//! be polled when its waker says so. Whatever else has something for the relay, or from it, is another task of the same executor, which
-//! shares the [`AsyncRelay`]: [`with`](AsyncRelay::with) for positions and samples, [`next_event`](AsyncRelay::next_event) for what
-//! happens. The time comes from a [`Clock`] of two functions.
+//! `run` never completes. Spawn it as a task, or join it with other futures; any executor will do that polls it when its waker is
+//! called. Other tasks of the same executor share the [`AsyncRelay`]: [`with`](AsyncRelay::with) for positions and samples,
+//! [`next_event`](AsyncRelay::next_event) for events. The time comes from a [`Clock`] of two functions.
 //!
-//! # Nobody waits for a neighbour
-//! Each port has a reader and a writer of its own, as the halves of an Embassy UART are. A writer whose `write` never completes leaves
-//! the other port, both readers and the relay's timers as they are. Two frames of full length wait for a port beside the one that is
-//! being written; with [`AsyncPair`] what does not fit is dropped and counted in [`SerialStats::dropped`](crate::serial::SerialStats::dropped),
-//! with [`AsyncShared`] it stays in the relay.
+//! # Independent ports
+//! Each port has a reader and a writer of its own, as the halves of an Embassy UART are. A writer whose `write` never completes
+//! does not delay the other port, the readers or the relay's timers. Two frames of full length are queued per port beside the one
+//! being written. With [`AsyncPair`] a frame that does not fit is dropped and counted in
+//! [`SerialStats::dropped`](crate::serial::SerialStats::dropped); with [`AsyncShared`] it stays in the relay.
 //!
-//! Each time the future is polled, a port is read once (64 bytes at most), the relay handles one
-//! timeout, and each writer is handed what waits. What is ready at once gives the executor back before it goes on.
+//! Each poll of the future reads every port once (64 bytes at most), handles one timeout
+//! of the relay, and passes pending frames to the writers. After an operation that was ready at once it yields to the executor.
 //!
-//! # When it is dropped
+//! # Cancellation
 //! `run` may be dropped at any `await`, and called again with the same links.
-//! - *Received bytes*: none waits in it, since a byte goes to the relay before anything else is waited for. Whether a `read` that is
-//!   dropped loses some is the reader's affair; those of Embassy's buffered UARTs do not.
-//! - *Frames*: one that is being written is gone, and the next begins behind a delimiter, so no receiver takes the one for a part of the
-//!   other. Those that wait are still sent. The relay repeats what matters.
-//! - *The pin* stays as it is, and is set by the next `run`.
+//! - *Received bytes*: none are lost in `run`, because they are passed to the relay before the next `await`. Whether a dropped
+//!   `read` loses bytes depends on the reader; Embassy's buffered UARTs do not.
+//! - *Frames*: the frame being written is lost, and the next one starts with a delimiter, so that no receiver joins the two.
+//!   Queued frames are still sent. The relay retransmits what matters.
+//! - *Pin*: it keeps its level until the next `run` sets it.
 //!
-//! A write that fails is tried again in the same way: a delimiter, and the whole frame.
+//! A failed write is retried in the same way: a delimiter, and the whole frame.
 //!
 //! # Example
 //! A relay and a task of the firmware on one executor; the ports stand in for those of a HAL.
@@ -151,7 +150,7 @@ where
     UPin: OutputPin,
     DPin: OutputPin,
 {
-    /// The links toward the transmitter and the receiver, for a relay whose settings say [`Wiring::Pair`](crate::Wiring::Pair).
+    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair): links toward transmitter and receiver.
     pub const fn new(
         upstream: AsyncLink<UR, UW, UPin>,
         downstream: AsyncLink<DR, DW, DPin>,
@@ -162,14 +161,14 @@ where
         }
     }
 
-    /// Moves bytes between the relay and its ports, and handles its timers, for good. The head of [`asynch`](self) says how much work
-    /// that is each time, and what becomes of it when it is dropped.
+    /// Moves bytes between the relay and its ports and handles its timers, forever. The documentation of [`asynch`](self)
+    /// describes the work per poll and the effect of dropping the future.
     pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
         self.run_keeping(relay, clock, &mut |_| {}).await
     }
 
-    /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told it, see
-    /// [`Relay::view_record`].
+    /// Runs like [`run`](Self::run), and calls `keep` between receiving and sending. Use `keep` to persist what must be stored
+    /// before it is sent: see [`Relay::view_record`].
     pub async fn run_keeping(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -180,7 +179,7 @@ where
         let (hears_down, says_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
         let queues = [(Port::Upstream, up), (Port::Downstream, down)];
         let drives = drive(relay, &queues, clock, keep);
-        // In this order: what is read goes into this turn of the relay, and what that says is written at once.
+        // The order matters: bytes read go into this turn of the relay, and its frames are written at once.
         match select5(hears_up, hears_down, drives, says_up, says_down).await {
             Either5::First(never)
             | Either5::Second(never)
@@ -190,32 +189,31 @@ where
         }
     }
 
-    /// The links, for whoever wants their ports back.
+    /// Returns the links, to recover their ports.
     pub fn release(self) -> (AsyncLink<UR, UW, UPin>, AsyncLink<DR, DW, DPin>) {
         (self.upstream, self.downstream)
     }
 }
 
-/// One link to a channel that all neighbours hear: a radio modem, or a half-duplex bus with a driver-enable pin.
-///
-/// Whose turn it is on the channel is the modem's to find out; this crate only keeps relays from repeating in step.
+/// Link to a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable pin. Channel access is
+/// up to the modem; this crate only keeps relays from retransmitting in step.
 #[derive(Debug)]
 pub struct AsyncShared<R, W, Pin = NoPin> {
     channel: AsyncLink<R, W, Pin>,
 }
 
 impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
-    /// A link for a relay whose settings say [`Wiring::Shared`](crate::Wiring::Shared).
+    /// Creates the port of a relay with [`Wiring::Shared`](crate::Wiring::Shared).
     pub const fn new(channel: AsyncLink<R, W, Pin>) -> Self {
         Self { channel }
     }
 
-    /// As [`AsyncPair::run`].
+    /// Runs like [`AsyncPair::run`].
     pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
         self.run_keeping(relay, clock, &mut |_| {}).await
     }
 
-    /// As [`AsyncPair::run_keeping`].
+    /// Runs like [`AsyncPair::run_keeping`].
     pub async fn run_keeping(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -230,13 +228,13 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         }
     }
 
-    /// The link, for whoever wants its port back.
+    /// Returns the link, to recover its port.
     pub fn release(self) -> AsyncLink<R, W, Pin> {
         self.channel
     }
 }
 
-/// Handles the relay's timers and takes its frames, for good.
+/// Handles the relay's timers and queues its frames, forever.
 async fn drive(
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
@@ -262,7 +260,7 @@ async fn drive(
     }
 }
 
-/// One turn of the relay; when it wants the next one.
+/// Runs one turn of the relay; returns the time of the next one.
 fn turn(
     of: &mut Relay,
     now: Instant,
@@ -278,7 +276,7 @@ fn turn(
     let has_room = |(_, queue): &(Port, &RefCell<Frames>)| {
         queue.try_borrow().is_ok_and(|queue| queue.has_room())
     };
-    // A port without room must not hold up the other one, so what is for it is counted and gone.
+    // A port without room must not delay the other one, so a frame for it is counted and dropped.
     while queues.iter().any(has_room)
         && let Some(Transmit { port, len }) = of.poll_transmit(now, &mut frame)
     {

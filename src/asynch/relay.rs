@@ -1,4 +1,4 @@
-//! A relay that several tasks of one executor share: the one that runs its ports, and whoever has something for it.
+//! A relay that several tasks of one executor share: the task that runs its ports, and tasks with inputs.
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
@@ -9,19 +9,19 @@ use crate::event::Event;
 use crate::relay::{Port, Relay};
 use crate::serial::SerialStats;
 
-/// A relay, who is to be woken when it has changed, and what its ports count.
+/// Relay shared by tasks, with the wakers of these tasks and the counters of the ports.
 ///
-/// It is for tasks of one executor, on one core and at one priority: none of them waits for another, since none keeps the relay
-/// across an `await`. What an interrupt has for the relay goes through a channel to such a task.
+/// All tasks must run on one executor, on one core and at one priority. They do not wait for each other, because none holds the
+/// relay across an `await`. An interrupt passes its data through a channel to such a task.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// Whether something has come in since the ports were last looked after.
+    /// True if there has been an input since the last turn.
     changed: Cell<bool>,
-    /// Who runs the ports.
+    /// Waker of the task that runs the ports.
     runner: Cell<Option<Waker>>,
-    /// Who waits for an event.
+    /// Waker of the task that waits for an event.
     listener: Cell<Option<Waker>>,
-    /// Upstream or shared, and downstream.
+    /// Counters of the upstream or shared port, and of the downstream port.
     stats: [Cell<SerialStats>; 2],
 }
 
@@ -35,7 +35,7 @@ impl fmt::Debug for AsyncRelay<'_> {
 }
 
 impl<'a> AsyncRelay<'a> {
-    /// The relay that tasks share from now on.
+    /// Shares `relay` between tasks.
     pub fn new(relay: &'a mut Relay) -> Self {
         Self {
             relay: RefCell::new(relay),
@@ -46,25 +46,21 @@ impl<'a> AsyncRelay<'a> {
         }
     }
 
-    /// Hands the relay to `work`, for a position, a sample or a mission; the ports are looked after once this task waits.
-    /// `None` inside the `work` of another call, which has the relay already: nothing is done then.
-    ///
-    /// Constant work beside that of `work`.
+    /// Passes the relay to `work`, for a position, a sample or a mission; the ports run once this task waits. Returns `None`, and
+    /// does nothing, inside the `work` of another call, which already has the relay. Takes constant time beside that of `work`.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.poke();
         done
     }
 
-    /// Lets `look` at the relay, with no word to its ports: for a setpoint or counters. `None` as with [`with`](Self::with).
+    /// Passes the relay to `look` without waking its ports: for a setpoint or counters. `None` as with [`with`](Self::with).
     pub fn look<R>(&self, look: impl FnOnce(&Relay) -> R) -> Option<R> {
         self.lend(|relay| look(relay))
     }
 
-    /// Completes with the next thing the firmware should know of. One task waits for it at a time; a second takes the place of the
-    /// first. Safe to drop: an event that was not handed out is handed out next.
-    ///
-    /// Constant work each time it is polled.
+    /// Completes with the next event for the firmware. Only one task can wait at a time; a second one replaces the first.
+    /// Dropping the future loses no event. Takes constant time per poll.
     pub fn next_event(&self) -> impl Future<Output = Event> + '_ {
         poll_fn(|cx| {
             let event = self.lend(Relay::poll_event).flatten();
@@ -75,33 +71,33 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// What has been counted at `port`: upstream and shared are one, since no relay has both.
+    /// Returns the counters of `port`. Upstream and shared have the same ones, since no relay has both.
     pub fn stats(&self, port: Port) -> SerialStats {
         self.counters(port).get()
     }
 
-    /// The relay, without a word to who runs the ports.
+    /// Passes the relay to `work` without waking the task that runs the ports.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }
 
-    /// Has the ports looked after again.
+    /// Wakes the task that runs the ports.
     pub(super) fn poke(&self) {
         self.changed.set(true);
         wake(&self.runner);
     }
 
-    /// Whoever waits for an event should look again.
+    /// Wakes the task that waits for an event.
     pub(super) fn tell(&self) {
         wake(&self.listener);
     }
 
-    /// Nothing that has come in so far is left to be looked after.
+    /// Marks all inputs so far as handled.
     pub(super) fn settle(&self) {
         self.changed.set(false);
     }
 
-    /// Completes once something has come in.
+    /// Completes after the next input.
     pub(super) fn changes(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             keep(&self.runner, cx);
@@ -113,7 +109,6 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// Counts at `port`.
     pub(super) fn count(&self, port: Port, count: impl FnOnce(&mut SerialStats)) {
         let counters = self.counters(port);
         let mut stats = counters.get();
@@ -142,7 +137,7 @@ const ZERO: SerialStats = SerialStats {
     unrouted: 0,
 };
 
-/// Keeps whom to wake, who may be there already.
+/// Stores the waker of the current task, unless that is already stored.
 pub(super) fn keep(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));

@@ -1,18 +1,18 @@
-//! Upsilon of a place from the interference powers that a relay measures there.
+//! Estimator of Upsilon at one position from measured interference powers.
 //!
-//! u = I / `I_max` is taken to have a Beta distribution, as in the paper's section on it, and its two shapes follow from the
-//! mean m and the variance v of the samples:
+//! u = I / `I_max` has a Beta distribution, as in the paper, whose shapes follow from the mean m and the variance v of the
+//! samples:
 //!
 //! ```text
 //! w = m (1 - m) / v - 1,    alpha = m w,    beta = (1 - m) w,    Upsilon = (1 + beta / (alpha - 1)) / I_max
 //! ```
 //!
-//! Why the moments and not the largest likelihood: the latter needs two logarithms a sample and digamma functions at the
-//! end, and from alpha = 3 on it is at most 8 % more accurate; at alpha = 1.5 it would be 6 to 28 %. The samples'
-//! mean of 1 / I would need no fit at all, and has an infinite variance for alpha <= 2.
+//! We use moments and not maximum likelihood, because the latter needs two logarithms a sample and digamma functions at the end.
+//! From alpha = 3 on it is at most 8 % more accurate; at alpha = 1.5 it would be 6 to 28 %. The samples' mean of 1 / I would need
+//! no fit, but has an infinite variance for alpha <= 2.
 //!
-//! The standard error is the delta method's: with z1 the error of m in units of sqrt(v) and z2 that of v in units of v,
-//! n Var(z1) = 1, n Cov = skewness and n Var(z2) = 2 + excess kurtosis, those of the fitted Beta distribution; and
+//! The standard error uses the delta method: with z1 the error of m in units of sqrt(v) and z2 that of v in units of v, n Var(z1)
+//! = 1, n Cov = skewness and n Var(z2) = 2 + excess kurtosis, those of the fitted Beta distribution, and
 //!
 //! ```text
 //! d alpha / d z1 = sqrt(v) w + m (1 - 2m) / sqrt(v)        d alpha / d z2 = -m (w + 1)
@@ -20,29 +20,29 @@
 //! d ln(beta / (alpha - 1)) / d z2 = (w + 1) / (w (alpha - 1))
 //! ```
 //!
-//! Upsilon grows without limit as alpha falls to 1, which a derivative does not see. So the error is divided by
-//! 1 - 2 s, s the standard error of alpha over alpha - 1: then two standard errors above the estimate lies what an alpha
-//! two of *its* standard errors lower would make of it, and where that alpha is 1 there is no estimate.
+//! Upsilon grows without limit as alpha falls to 1, which a derivative does not show. So the error is divided by 1 - 2 s, with s
+//! the standard error of alpha over alpha - 1. Two standard errors above the estimate is then the Upsilon of an alpha two of
+//! *its* standard errors lower, and if that alpha is 1 there is no estimate.
 //!
-//! The sums are integers, so no sample is ever too small for the sum it is added to, and the variance does not cancel.
-//! How good all this is: `host-tests/tests/field/estimation.rs`.
+//! The sums are integers, so no sample is too small for its sum, and the variance does not cancel. The accuracy is asserted in
+//! `host-tests/tests/field/estimation.rs`.
 
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// 1 as a fixed-point number: 2^32 samples of it sum to 2^63, and their squares, times their number, to 2^126.
+/// Fixed-point 1: 2^32 samples of it sum to 2^63, and their squares, times their number, to 2^126.
 const ONE: f32 = 2_147_483_648.0;
 
-/// The bits behind the point of such a number.
+/// Fractional bits of the fixed-point numbers.
 const FRACTION: u32 = 31;
 
-/// The smallest mean of I / `I_max` that is resolved: at 1e-6 the steps of the fixed-point numbers are 5e-4 of it.
+/// Smallest mean of I / `I_max` that is resolved: the fixed-point step is 5e-4 of 1e-6.
 const LEAST_MEAN: f32 = 1e-6;
 
-/// What is learned of the interference at one place, sample by sample, without keeping the samples.
+/// Running sums of the interference powers measured at one position; samples are not stored.
 ///
-/// 40 bytes on a Cortex-M4F. For samples that do not depend on one another: of samples taken faster than the interference changes, the
-/// true number is smaller, and the standard error larger than stated.
+/// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, their effective
+/// number is smaller, and the standard error larger than stated.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimator {
@@ -50,13 +50,13 @@ pub struct Estimator {
     squares: u128,
     /// Sum of the samples as parts of `I_max`, in units of 2^-31.
     sum: u64,
-    /// `I_max`, W; 0 if it was refused.
+    /// `I_max`, W; 0 if it was rejected.
     i_max_w: f32,
     accepted: u32,
     rejected: u32,
 }
 
-/// What an [`Estimator`] makes of its samples. Every number is finite.
+/// Result of an [`Estimator`]. Every number is finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
@@ -66,23 +66,23 @@ pub struct Estimate {
     pub beta: f32,
     /// Upsilon = E[1/I], 1/W: 1e-9 to 1e32, so it may be a point of a [`Field`](super::Field).
     pub upsilon_per_w: f32,
-    /// Standard error of `upsilon_per_w`, 1/W, above 0: the truth is within two of them with a chance of about 95 %.
-    ///
-    /// Of the samples alone: what is wrong because the interference has no Beta distribution is not in it.
+    /// Standard error of `upsilon_per_w`, 1/W, above 0: the truth is within two of them with a probability of about 95 %. It
+    /// covers sampling only, not a deviation of the interference from a Beta distribution.
     pub standard_error_per_w: f32,
-    /// The number of samples it rests on.
+    /// Number of samples used.
     pub samples: u32,
 }
 
 impl Estimator {
-    /// The fewest samples an estimate is made from.
+    /// Minimum number of samples of an estimate.
     ///
-    /// With so few and a true alpha below 1.5, an estimate is made mostly where chance made alpha large, and is then too low.
+    /// With so few samples and a true alpha below 1.5, most estimates exist because alpha is overestimated by chance, and are
+    /// too low.
     pub const MIN_SAMPLES: u32 = 100;
 
-    /// No samples yet, of an interference that never exceeds `i_max_w`, W: 1e-30 to 1e6.
+    /// Creates an estimator without samples, for interference that never exceeds `i_max_w`, W: 1e-30 to 1e6.
     ///
-    /// With any other `i_max_w` every sample is rejected and there is never an estimate.
+    /// With any other `i_max_w` it rejects every sample and never gives an estimate.
     pub const fn new(i_max_w: f32) -> Self {
         let known = i_max_w >= 1e-30 && i_max_w <= 1e6;
         Self {
@@ -94,12 +94,11 @@ impl Estimator {
         }
     }
 
-    /// Takes one measured interference power, W, above 0 and at most `I_max`; any other is counted and left out.
+    /// Adds a measured interference power, W, above 0 and at most `I_max`; other values are counted as rejected.
     ///
-    /// That is NaN, the infinities, negative numbers, powers above `I_max`, and 0: it stands for less than the receiver can
-    /// measure, no Beta distribution with alpha > 1 ever yields it, and leaving it out only makes Upsilon smaller. After
-    /// 2^32 - 1 samples all others are left out and not counted. At most 100 instructions on a Cortex-M4F;
-    /// 61 were counted.
+    /// Rejected are NaN, infinities, negative numbers, powers above `I_max`, and 0. A 0 means less than the receiver can measure,
+    /// has probability 0 in a Beta distribution with alpha > 1, and its omission only makes Upsilon smaller. After 2^32 - 1
+    /// samples all others are ignored and not counted. At most 100 instructions on a Cortex-M4F; 61 were counted.
     pub fn push(&mut self, power_w: f32) {
         if self.accepted == u32::MAX {
             return;
@@ -114,33 +113,35 @@ impl Estimator {
         self.squares = self.squares.saturating_add(u128::from(units * units));
     }
 
-    /// Forgets all samples and counts, as when the relay has moved; `I_max` stays.
+    /// Clears all samples and counts, for example after the relay has moved; `I_max` stays.
     pub const fn clear(&mut self) {
         *self = Self::new(self.i_max_w);
     }
 
-    /// How many samples were taken.
+    /// Number of accepted samples.
     pub const fn accepted(&self) -> u32 {
         self.accepted
     }
 
-    /// How many samples were left out: many of them say that `I_max` is too small, or the receiver deaf.
+    /// Number of rejected samples; many of them mean that `I_max` is too small, or that the receiver measures nothing.
     pub const fn rejected(&self) -> u32 {
         self.rejected
     }
 
-    /// What the samples so far say. Constant work, at most 1000 instructions on a Cortex-M4F; 408 were counted.
+    /// Returns the estimate of the samples so far.
     ///
-    /// `None` with fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES); without any spread; where alpha is not above 1 by more than two of its
-    /// own standard errors, as E[1/I] may then be infinite; and where the mean is below 1e-6 `I_max` or Upsilon above 1e32.
-    /// From 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20;
-    /// `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_holds` in
-    /// `host-tests/tests/field/estimation.rs` assert it.
+    /// `None` with fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES), without variance, if alpha is not above 1 by more than two of its standard errors
+    /// (E[1/I] may then be infinite), or if the mean is below 1e-6 `I_max` or Upsilon above 1e32. Constant work, at most 1000
+    /// instructions on a Cortex-M4F; 408 were counted.
+    ///
+    /// With 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20, as asserted
+    /// by `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_holds` in
+    /// `host-tests/tests/field/estimation.rs`.
     pub fn estimate(&self) -> Option<Estimate> {
         let fit = Fit::of(self)?;
         let [skew, kurtosis] = fit.shape();
         let n = self.accepted as f32;
-        // Standard error of what has these derivatives by z1 and z2.
+        // Standard error of a quantity with the derivatives `z1` and `z2`.
         let error = |z1: f32, z2: f32| {
             sqrt((z1 * z1 + 2.0 * z1 * z2 * skew + z2 * z2 * (2.0 + kurtosis)) / n)
         };
@@ -175,9 +176,9 @@ impl Estimator {
     }
 }
 
-/// The Beta distribution that has the mean and the variance of the samples.
+/// Beta distribution with the mean and the variance of the samples.
 struct Fit {
-    /// Mean, and 1 - mean with all its digits.
+    /// Mean, and 1 - mean without cancellation.
     m: f32,
     rest: f32,
     /// Standard deviation.
@@ -192,7 +193,7 @@ impl Fit {
             return None;
         }
         let count = u64::from(samples.accepted);
-        // n^2 times the variance, exactly; that is what cancels where floats are summed.
+        // n^2 times the variance, exactly; in floating point this difference would cancel.
         let square_of_sum = u128::from(samples.sum) * u128::from(samples.sum);
         let spread = (u128::from(count) * samples.squares).checked_sub(square_of_sum)?;
         let n = count as f32;
@@ -206,7 +207,6 @@ impl Fit {
         (w > 0.0).then_some(Self { m, rest, s, w })
     }
 
-    /// Skewness and excess kurtosis.
     fn shape(&self) -> [f32; 2] {
         let Self { m, s, w, .. } = *self;
         let lean = (1.0 - 2.0 * m) / s;
@@ -217,7 +217,6 @@ impl Fit {
     }
 }
 
-/// `part`, 0 to 1, as a fixed-point number, to the nearest.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,34 +1,33 @@
-//! Interference that is known by its distribution alone: how much 1 W of signal is worth against it, place by place.
+//! Interference field: interference that is known by its distribution along x only.
 //!
-//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times
-//! Upsilon(x) = E[1 / I(x)], in 1/W: the one thing about the distribution that a plan needs. A [`Field`] is a table of it
-//! along x. Where I / `I_max` has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; where nothing is known but
-//! measurements, [`estimate::Estimator`] fits one.
+//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times Upsilon(x) = E[1
+//! / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of Upsilon along x. If I / `I_max`
+//! has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; from measurements, [`estimate::Estimator`] fits one.
 
 pub mod estimate;
 mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// The smallest and largest Upsilon of a field, 1/W: interference between 1e9 W and 1e-32 W, far outside what is measured.
+/// Allowed range of Upsilon, 1/W: interference between 1e9 W and 1e-32 W, far outside of what is measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
-/// Upsilon at one place.
+/// Upsilon at one position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FieldPoint {
-    /// Place along the line from Tx (0) to Rx (D), m: -1e7 to 1e7.
+    /// Position along the line from Tx (0) to Rx (D), m: -1e7 to 1e7.
     pub x_m: f32,
     /// Upsilon = E[1/I] there, 1/W: 1e-9 to 1e32.
     pub upsilon_per_w: f32,
 }
 
-/// Why a table of points is no field.
+/// Reason why a table of points is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FieldError {
-    /// There is no point, or more than [`Field::MAX_POINTS`].
+    /// The table has no point, or more than [`Field::MAX_POINTS`].
     Points,
     /// The `x_m` of a point is not within -1e7 to 1e7.
     Place,
@@ -51,7 +50,7 @@ impl core::fmt::Display for FieldError {
 
 impl core::error::Error for FieldError {}
 
-/// Upsilon along x: straight lines between the points of a checked table, and held beyond its ends.
+/// Upsilon along x: linear between the points of a checked table, and constant beyond its ends.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Field {
@@ -61,15 +60,17 @@ pub struct Field {
 }
 
 impl Field {
-    /// The most points a field may have.
+    /// Maximum number of points of a field.
     pub const MAX_POINTS: usize = 1024;
 
-    /// Checks every point. Usable in a constant, where [`Field::new`] turns a mistake into a failed build.
+    /// Creates a field from a table, after checking every point.
+    ///
+    /// Usable in a constant, where [`Field::new`] turns an error into a failed build.
     ///
     /// Work: a few comparisons for each point.
     ///
     /// # Errors
-    /// [`FieldError`] names what is outside its range, for the first point where something is.
+    /// [`FieldError`] names the first value that is outside its range.
     pub const fn try_new(points: &'static [FieldPoint]) -> Result<Self, FieldError> {
         if points.is_empty() || points.len() > Self::MAX_POINTS {
             return Err(FieldError::Points);
@@ -104,11 +105,10 @@ impl Field {
         })
     }
 
-    /// As [`Field::try_new`], for a field that is a constant of the firmware.
+    /// Creates a field that is a constant of the firmware; otherwise as [`Field::try_new`].
     ///
-    /// # Panics
-    /// On a table that is no field: in a `const` that is a failed build, which is what this is for. For numbers that are
-    /// only known at run time use [`Field::try_new`].
+    /// # Panics Panics on an invalid table: in a `const` this is a failed build, as intended. For values known at run time use
+    /// [`Field::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
@@ -117,7 +117,7 @@ impl Field {
     /// ```
     /// use uav_relay::{Field, FieldPoint};
     ///
-    /// // Upsilon = E[1 / I] as it was measured at two places, in 1/W.
+    /// // Upsilon = E[1 / I], measured at two positions, in 1/W.
     /// const FIELD: Field = Field::new(&[
     ///     FieldPoint { x_m: 0.0, upsilon_per_w: 4.0e5 },
     ///     FieldPoint { x_m: 1000.0, upsilon_per_w: 5.0e5 },
@@ -134,36 +134,37 @@ impl Field {
         }
     }
 
-    /// The points as they were given.
+    /// Returns the points of the table.
     pub const fn points(&self) -> &'static [FieldPoint] {
         self.points
     }
 
-    /// The smallest Upsilon anywhere, 1/W: where the interference is worst.
+    /// Returns the smallest Upsilon of the table, 1/W: the worst interference.
     pub const fn smallest(&self) -> f32 {
         self.smallest
     }
 
-    /// The largest Upsilon anywhere, 1/W.
+    /// Returns the largest Upsilon of the table, 1/W.
     pub const fn largest(&self) -> f32 {
         self.largest
     }
 
-    /// Whether Upsilon is the same everywhere: the paper's i.i.d. interference.
+    /// Returns true if Upsilon is the same everywhere: the paper's i.i.d. interference.
     pub const fn is_constant(&self) -> bool {
         !(self.smallest < self.largest)
     }
 
-    /// Upsilon at `x_m`, 1/W, relative error below 4e-7 of the straight line between the two points around it.
+    /// Returns Upsilon at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
     ///
-    /// Any `x_m` has one: the nearest end's beyond the ends, and the first point's for NaN. It is never outside the range
-    /// of the two points. Work: at most eleven comparisons of a binary search, three divisions. The accuracy is asserted by
-    /// `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in `host-tests/tests/field/table.rs`.
+    /// Every `x_m` is valid: beyond the ends it returns that of the end point, and for NaN that of the first point. The result is
+    /// never outside the range of the two points around it. Work: at most eleven comparisons of a binary search, three divisions.
+    /// The accuracy is asserted by `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in
+    /// `host-tests/tests/field/table.rs`.
     pub const fn upsilon(&self, x_m: f32) -> f32 {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// The two points that `x_m` is between, or the one whose Upsilon it has.
+    /// Returns the two points around `x_m`, or the single point whose Upsilon applies.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {
@@ -195,27 +196,25 @@ impl Field {
     }
 }
 
-/// The line from `left` to `right` at `x_m` between them.
 const fn between(left: FieldPoint, right: FieldPoint, x_m: f32) -> f32 {
     let (a, b) = (left.upsilon_per_w, right.upsilon_per_w);
     let step = right.x_m - left.x_m;
-    // Two weights, so that only numbers above zero are added: a + (b - a) t would lose a small b next to a large a.
+    // Two weights, so that only positive numbers are added: a + (b - a) t would lose a small b next to a large a.
     let upsilon = a * ((right.x_m - x_m) / step) + b * ((x_m - left.x_m) / step);
     upsilon.max(a.min(b)).min(a.max(b))
 }
 
-/// Whether a field may have this Upsilon.
 pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
     upsilon_per_w >= UPSILON.0 && upsilon_per_w <= UPSILON.1
 }
 
 impl FieldPoint {
-    /// Upsilon = E[1/I] in 1/W where I / `i_max_w` has a Beta distribution with the shapes `alpha` and `beta`.
+    /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution with shapes `alpha` and `beta`.
     ///
-    /// (alpha + beta - 1) / ((alpha - 1) `I_max`); printed without `I_max`, for I as a part of it. `i_max_w` in W. `None` unless
-    /// alpha > 1 (E[1/I] is infinite otherwise), beta > 0, `i_max_w` > 0, and all three and the result are finite.
-    /// In f64, since next to alpha = 1 an f32 of alpha would already be off; meant for constants, where it costs nothing.
-    /// Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
+    /// (alpha + beta - 1) / ((alpha - 1) `I_max`); the paper prints it without `I_max`, for I relative to it. `i_max_w` in W. `None`
+    /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,
+    /// since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is free. Accuracy:
+    /// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
     pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
         let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
         if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
@@ -229,8 +228,9 @@ impl FieldPoint {
         }
     }
 
-    /// The point at `x_m` metres of a field whose I / `i_max_w` has a Beta distribution there; `None` where
-    /// [`beta_upsilon`](Self::beta_upsilon) has nothing. Constant work.
+    /// Returns a point at `x_m` metres where I / `i_max_w` has a Beta distribution.
+    ///
+    /// `None` where [`beta_upsilon`](Self::beta_upsilon) is. Constant work.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a field refuses what does not fit"

@@ -1,33 +1,34 @@
-//! The line on earth that a mission is flown along, and how fast the drone flies along it.
+//! Line on earth along which a mission is flown, and the drone's speed.
 
 use super::autopilot::carrot::Pace;
 use super::axis::{Axis, AxisError};
 use crate::mission::Mission;
 use crate::sites::Sites;
 
-/// What an autopilot is told along.
+/// Line and speed that an autopilot uses.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// The line from transmitter to receiver.
     pub axis: Axis,
-    /// How fast the drone flies at most.
+    /// Maximum speed of the drone.
     pub pace: Pace,
 }
 
-/// What is wrong with the sites of a mission.
+/// Reason why sites and mission do not fit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CourseError {
-    /// They make no line.
+    /// The sites do not define a line.
     Axis(AxisError),
-    /// They are this far apart along the ground, m, and the mission's distance is another.
+    /// The distance of the sites along the ground, m, differs from the mission's.
     Distance(f64),
 }
 
 impl Course {
-    /// The course of a drone that flies `mission` between `sites`, at `speed_m_s` at most: 0.1 to 20 m/s, or 0 for that of
-    /// [`Pace::default`]. Constant work.
+    /// Returns the course of a drone that flies `mission` between `sites` with a maximum of `speed_m_s`.
+    ///
+    /// `speed_m_s` is 0.1 to 20 m/s, or 0 for that of [`Pace::default`]. Constant work.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -37,13 +38,13 @@ impl Course {
     ///
     /// let site = |lat, lon, amsl| Geodetic::from_degrees(lat, lon, amsl).expect("a place on earth");
     /// let sites = Sites { tx: site(47.40, 8.54, 420.0), rx: site(47.41, 8.55, 431.0) };
-    /// // They are 1 344 m apart, and this mission is over 1 000.
+    /// // The sites are 1 344 m apart, but the mission's distance is 1 000 m.
     /// assert!(matches!(Course::try_new(sites, 5.0, &MISSION), Err(CourseError::Distance(_))));
     /// ```
     ///
     /// # Errors
-    /// [`CourseError`] where the sites make no line, or not the mission's.
-    #[inline(never)] // its stack is given back before the relay needs some
+    /// [`CourseError`] if the sites define no line, or one of another length than the mission's.
+    #[inline(never)] // frees its stack before the relay needs some
     pub fn try_new(sites: Sites, speed_m_s: f32, mission: &Mission) -> Result<Self, CourseError> {
         let axis = Axis::between(sites).map_err(CourseError::Axis)?;
         if !axis.is_of(mission.config().distance_m) {

@@ -1,11 +1,11 @@
-//! From the agreed place to a flying drone: sites on earth, and the autopilot.
+//! Flight: geodetic positions of the agreed place, and the autopilot.
 //!
-//! | module | one idea |
+//! | module | subject |
 //! | --- | --- |
-//! | [`axis`] | the line from transmitter to receiver on earth, and places along it |
-//! | [`course`] | that line for a mission, and how fast it is flown |
-//! | `mavlink` | the bytes that autopilots speak |
-//! | [`autopilot`] | where to fly, who flies, and where the drone is |
+//! | [`axis`] | the line from transmitter to receiver on earth, and positions along it |
+//! | [`course`] | that line for a mission, and the speed along it |
+//! | `mavlink` | MAVLink 2 messages |
+//! | [`autopilot`] | targets for the autopilot, engagement by the pilot, and the drone's position |
 //!
 //! ```
 //! use uav_relay::Placement;
@@ -17,7 +17,7 @@
 //! let axis = Axis::try_new(tx, rx)?;
 //! assert!(axis.is_of(1343.795));
 //!
-//! // 20 m above the straight line between the two grounds, 300 m from the transmitter.
+//! // 20 m above the straight line between the two sites' grounds, 300 m from the transmitter.
 //! let point = axis.point(Placement::on_line(300.0, 20.0)).ok_or("far off")?;
 //! assert_eq!(point.amsl_mm, 442_456);
 //! let back = axis.place(point).ok_or("far off")?;

@@ -1,4 +1,4 @@
-//! The mission that the chain flies, as a relay has told the ground.
+//! Mission of the chain, as a relay has reported it to the ground station.
 
 use crate::wire::upload::Upload;
 
@@ -12,13 +12,13 @@ pub struct FlownMission {
     pub version: u16,
     /// True if the relay flies it; false while it only holds it.
     pub flies: bool,
-    /// Values of the mission. `None` for the one that was loaded before flight, and until the relay has sent them: a firmware older than
-    /// this question sends none.
+    /// Values of the mission. `None` for the one that was loaded before flight, and until the relay has sent them; older firmware
+    /// never sends them.
     pub upload: Option<Upload>,
 }
 
 impl FlownMission {
-    /// Returns true once the values of the mission are known: they were sent, or they are those loaded before flight.
+    /// Returns true once the values of the mission are known: received, or those loaded before flight.
     pub const fn is_known(&self) -> bool {
         self.version == 0 || self.upload.is_some()
     }

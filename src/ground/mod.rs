@@ -1,14 +1,13 @@
-//! The transmitter or the receiver as a node: hands a new mission to the nearest relay that answers, until it is flown, and tells the relays
-//! near by how strong the interference is where it stands.
+//! Ground station: the transmitter or the receiver as a node that uploads missions and reports interference.
 //!
-//! | progress | what comes of the relay asked | what follows |
+//! | progress | state of the polled relay | action |
 //! | --- | --- | --- |
-//! | `Offering` | it holds an older mission, or has not answered | it is asked by a hello every second, and offered the new one in answer to its own hello; after three questions without an answer the next one of the four nearest is |
-//! | `Held` | it holds the new one, and flies another yet | it is asked every second |
-//! | `Adopted` | it flies it, and does not know yet that all relays of its view do | it is asked every second |
-//! | `Flown` | it flies it, and so do all relays of its view; one that is in no view takes part in nothing until it does | done |
-//! | `Refused` | it refuses it, or knows of a relay that does | done: another upload, of a larger version, has to fit |
-//! | `Outdated` | it holds a newer one | done: the upload needs a larger version |
+//! | `Offering` | holds an older mission, or has not answered | send a hello every second, and the mission in reply to the relay's hello; after three unanswered hellos poll the next of the four nearest relays |
+//! | `Held` | holds the new mission, flies another | poll every second |
+//! | `Adopted` | flies the new mission; not all of its view are known to | poll every second |
+//! | `Flown` | all of its view fly the mission; relays outside a view take no part until they do | done |
+//! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
+//! | `Outdated` | holds a newer mission | done: the upload needs a larger version |
 
 mod flown;
 mod levels;
@@ -21,7 +20,6 @@ use levels::Levels;
 
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
-use crate::relay::signed::{greeting, say};
 use crate::sensing::level::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -31,24 +29,25 @@ use crate::view::ViewId;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
-use crate::wire::frame::{self, FrameBuf, FrameError, Header, MAX_FRAME};
+use crate::wire::endpoint::{Endpoint, Sent};
+use crate::wire::frame::{FrameBuf, MAX_FRAME};
 use crate::wire::message::{Hello, Message};
-use crate::wire::session::{Checked, Session};
+use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which another one with its number is believed.
+/// Silence of a relay after which another node with its index is accepted.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
-/// How long an answer is awaited.
+/// Wait for an answer.
 const PATIENCE: Duration = Duration::from_millis(1_000);
 
-/// So many questions without an answer are put to one relay before the next one is asked.
+/// Unanswered questions to one relay before the next relay is polled.
 const QUESTIONS: u8 = 3;
 
-/// The transmitter or the receiver, where it uploads missions or measures the interference; sans-IO, as [`Relay`](crate::Relay) is.
+/// Ground station at the transmitter or the receiver: uploads missions and reports interference; sans-IO.
 ///
-/// After every input call [`poll_transmit`](Self::poll_transmit) until it gives `None`, then wait for a byte or for
-/// [`poll_timeout`](Self::poll_timeout). It takes in anything, and what is not for it has no effect.
+/// After every input call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then wait for a byte or for
+/// [`poll_timeout`](Self::poll_timeout). It accepts any bytes and ignores what is not addressed to it.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -65,7 +64,7 @@ const QUESTIONS: u8 = 3;
 /// let now = Instant::ZERO;
 /// ground.upload(now, upload)?;
 ///
-/// // One turn of its loop.
+/// One turn of the main loop.
 /// ground.handle_bytes(received);
 /// ground.handle_timeout(now);
 /// let mut frame = [0; MAX_FRAME];
@@ -81,54 +80,55 @@ const QUESTIONS: u8 = 3;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Ground {
-    network: u16,
     base: u16,
     end: Side,
     node: u16,
-    /// Relays that may hear it.
+    /// Number of relays in reach.
     within: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the question which mission is flown; 0 while there is none.
+    /// Number of the last question about the flown mission; 0 before any.
     question: u16,
     flown: Option<FlownMission>,
-    /// How far away the relay that is asked is, 1 for the next.
+    /// Distance of the polled relay, 1 for the nearest.
     distance: u16,
     unanswered: u8,
-    /// What that relay holds, once it has said so.
+    /// Mission that the polled relay holds, once it has reported it.
     holds: Option<MissionId>,
-    /// Whether its next hello answers a question.
+    /// True if its next hello answers a question.
     asked: bool,
-    /// The number of the hello that the next offer answers.
+    /// Number of the hello that the next offer answers.
     answer: Option<u16>,
     due: bool,
     again: Option<Instant>,
-    /// Started by the first upload.
+    /// Clock, started by the first upload.
     clock: MonotonicClock,
     levels: Levels,
     deframer: Deframer,
-    session: Session,
-    counter: u32,
+    endpoint: Endpoint,
     stats: Stats,
 }
 
 impl Ground {
-    /// The transmitter (`end` is upstream of the chain) or the receiver (downstream) of relays that were loaded with `base`. The
-    /// epoch in `auth` must be larger at every start, as a relay's.
+    /// Creates a ground station for relays that were loaded with `base`.
+    ///
+    /// `end` is `Upstream` at the transmitter. The epoch in `auth` must be larger at every start.
     pub fn new(base: &Mission, end: Side, network: u16, wiring: Wiring, auth: Auth) -> Self {
         let all = base.relays();
         let reach = match wiring {
             Wiring::Pair => 1,
             Wiring::Shared => CANDIDATES,
         };
+        let node = match end {
+            Side::Upstream => 0,
+            Side::Downstream => all + 1,
+        };
+        let mut endpoint = Endpoint::new(network, node);
+        endpoint.sign(auth, 0, GONE_AFTER);
         Self {
-            network,
             base: digest(base),
             end,
-            node: match end {
-                Side::Upstream => 0,
-                Side::Downstream => all + 1,
-            },
+            node,
             within: reach.min(all),
             upload: None,
             progress: Progress::Idle,
@@ -144,16 +144,14 @@ impl Ground {
             clock: MonotonicClock::new(Instant::ZERO),
             levels: Levels::NONE,
             deframer: Deframer::new(),
-            session: Session::new(auth, 0, GONE_AFTER),
-            counter: 0,
+            endpoint,
             stats: Stats::default(),
         }
     }
 
-    /// Asks the chain which mission it flies, in place of an upload that is under way. [`Ground::flown`] returns the answer.
+    /// Asks the chain which mission it flies; [`Ground::flown`] returns the answer. Ends an upload in progress.
     ///
-    /// The relay that is asked answers with the upload that it holds. A ground that was told only what the relays were loaded with learns
-    /// in this way what earlier uploads have changed.
+    /// The polled relay sends the upload that it holds, so that the ground station learns what earlier uploads have changed.
     pub fn ask_flown(&mut self, now: Instant) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -165,15 +163,15 @@ impl Ground {
         self.start(now);
     }
 
-    /// Returns the mission that the relay asked holds, once it has answered [`Ground::ask_flown`].
+    /// Returns the mission of the polled relay, once it has answered [`Ground::ask_flown`].
     pub const fn flown(&self) -> Option<&FlownMission> {
         self.flown.as_ref()
     }
 
-    /// Uploads `upload` from now on, in place of one that is under way.
+    /// Starts uploading `upload`, in place of an upload in progress.
     ///
     /// # Errors
-    /// [`UploadError::Base`] if it is for relays that were loaded with another mission.
+    /// Returns [`UploadError::Base`] if the upload is for relays that were loaded with another mission.
     pub fn upload(&mut self, now: Instant, upload: Upload) -> Result<(), UploadError> {
         if upload.base() != self.base {
             return Err(UploadError::Base);
@@ -184,7 +182,7 @@ impl Ground {
         Ok(())
     }
 
-    /// Sends the first hello of an upload or of a question.
+    /// Sends the first hello of an upload or a question.
     fn start(&mut self, now: Instant) {
         self.holds = None;
         self.answer = None;
@@ -194,31 +192,32 @@ impl Ground {
         self.again = Some(now + PATIENCE);
     }
 
-    /// Tells the relays near by how strong the interference is here: mean received power, W, over enough time that its relative error is
-    /// that of [`Listen`](crate::Listen), the noise of the receiver in it and the chain's own signals not. On a link to one neighbour that
-    /// is one frame of 23 bytes and a tag, on a shared channel one to each of the four nearest; a relay that is not there, or was switched
-    /// on since, is sent a handshake instead. Nobody answers, and what is lost the next measurement makes up for: to measure once in
-    /// [`Listen::every`](crate::Listen::every) is enough.
+    /// Reports the interference measured here to the relays nearby; returns false if outside 1e-30 to 1e6 W.
     ///
-    /// Whether it was taken: not if it is outside 1e-30 to 1e6 W.
+    /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged long enough
+    /// for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is
+    /// enough.
+    ///
+    /// A link carries one frame of 23 bytes and a tag, a shared channel one to each of the four nearest relays. A relay that is
+    /// absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next one replaces a lost one.
     pub fn measured(&mut self, power_w: f32) -> bool {
         if !is_level(power_w) {
             return false;
         }
         if self.levels.measured(power_w, self.within) {
             for distance in 1..=self.within {
-                self.session.greet(self.at(distance));
+                self.endpoint.greet(self.at(distance));
             }
         }
         true
     }
 
-    /// How far the upload has come.
+    /// Returns the progress of the upload.
     pub const fn progress(&self) -> Progress {
         self.progress
     }
 
-    /// Intact frames to this node that were none of a relay that it may hear, or came before.
+    /// Returns the number of intact frames to this node that were rejected: not from a relay in reach, invalid, or replayed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -227,83 +226,66 @@ impl Ground {
         unknown.saturating_add(untrue).saturating_add(other)
     }
 
-    /// What it has counted of the frames that it sent and that came in, as a relay does. `mission` are relays that were loaded with another
-    /// one, `foreign` frames of another network, `overheard` those to another node, and `crc` all that are damaged.
+    /// Returns the counters of sent and received frames.
+    ///
+    /// `mission` counts relays with another loaded mission, `foreign` other networks, `overheard` frames to other nodes.
     pub const fn stats(&self) -> &Stats {
         &self.stats
     }
 
-    /// The relays that may hear it by their node numbers, the nearest first, and whether each has shown with the key that it is there and can
-    /// read what it is told. One that was switched on again, or has been greeted anew, has not until it answers. Work: four relays at most.
+    /// Returns the node numbers of the relays in reach, nearest first, each with true if its key has been verified.
+    ///
+    /// After a restart or a new handshake a relay is unverified until it answers. Work: four relays at most.
     pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.within).map(|distance| self.at(distance));
-        nodes.map(|node| (node, self.session.knows(node)))
+        nodes.map(|node| (node, self.endpoint.knows(node)))
     }
 
-    /// Takes in bytes, however they are cut; at most one tag for each 19 of them.
+    /// Processes received bytes, split anywhere; checks at most one tag per 19 bytes.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            if let Some(Ok(plain)) = self.deframer.push(byte) {
-                let frame = match frame::open(plain) {
-                    Ok(frame) => frame,
-                    Err(FrameError::Version) => {
-                        bump(&mut self.stats.version);
-                        continue;
-                    }
-                    Err(_) => {
-                        bump(&mut self.stats.crc);
-                        continue;
-                    }
-                };
-                let Header {
-                    network,
-                    sender,
-                    destination,
-                    ..
-                } = frame.header;
-                if network != self.network {
-                    bump(&mut self.stats.foreign);
-                    continue;
-                }
-                if destination != self.node {
+            if let Some(decoded) = self.deframer.push(byte)
+                && let Some(frame) = self.endpoint.open(decoded, &mut self.stats)
+            {
+                let header = frame.header;
+                let distance = header.sender.abs_diff(self.node);
+                if header.destination != self.node {
                     bump(&mut self.stats.overheard);
-                    continue;
-                }
-                let distance = sender.abs_diff(self.node);
-                let near = (1..=self.within).contains(&distance);
-                if !near {
-                    bump(&mut self.stats.misaddressed);
-                    continue;
-                }
-                match self.session.check(self.clock.now(), sender, &frame) {
-                    Checked::Fresh { .. } => match Message::decode(frame.body) {
-                        Ok(Message::Hello(hello)) if hello.mission == self.base => {
-                            bump(&mut self.stats.received);
-                            self.answered(sender, distance, hello);
+                } else if (1..=self.within).contains(&distance) {
+                    let now = self.clock.now();
+                    match self.endpoint.check(now, &frame, &mut self.stats) {
+                        Some(Checked::Fresh { .. }) => {
+                            let message = Message::decode(frame.body);
+                            self.handle_message(header.sender, distance, message.ok());
                         }
-                        Ok(Message::Offer { upload, answer })
-                            if self.is_answer(&upload, answer) =>
-                        {
-                            bump(&mut self.stats.received);
-                            self.told(sender, upload);
-                        }
-                        Ok(Message::Hello(_)) => bump(&mut self.stats.mission),
-                        _ => bump(&mut self.stats.malformed),
-                    },
-                    Checked::Handshake { first } => {
-                        bump(&mut self.stats.handshakes);
-                        self.due |= first && (self.is_under_way() || self.is_asking());
-                        if first {
+                        Some(Checked::Handshake { first: true }) => {
+                            self.due |= self.is_under_way() || self.is_asking();
                             self.levels.owe(distance);
                         }
+                        _ => {}
                     }
-                    Checked::Unproven => bump(&mut self.stats.handshakes),
-                    Checked::Unsigned => bump(&mut self.stats.unsigned),
-                    Checked::Forged => bump(&mut self.stats.forged),
-                    Checked::Replayed | Checked::WentBack => bump(&mut self.stats.replayed),
+                } else {
+                    bump(&mut self.stats.misaddressed);
                 }
             }
         }
+    }
+
+    /// Handles a message of relay `sender`; `None` if it is malformed.
+    fn handle_message(&mut self, sender: u16, distance: u16, message: Option<Message>) {
+        let counter = match message {
+            Some(Message::Hello(hello)) if hello.mission == self.base => {
+                self.answered(sender, distance, hello);
+                &mut self.stats.received
+            }
+            Some(Message::Hello(_)) => &mut self.stats.mission,
+            Some(Message::Offer { upload, answer }) if self.is_answer(&upload, answer) => {
+                self.told(sender, upload);
+                &mut self.stats.received
+            }
+            _ => &mut self.stats.malformed,
+        };
+        bump(counter);
     }
 
     /// Returns true while a question waits for its answer.
@@ -318,7 +300,7 @@ impl Ground {
         self.is_asking() && answer == self.question && upload.base() == self.base
     }
 
-    /// Relay `by` has sent the upload that it holds.
+    /// Records the upload that relay `by` has sent in answer to the question.
     fn told(&mut self, by: u16, upload: Upload) {
         let flies = matches!(&self.flown, Some(flown) if flown.by == by && flown.flies && flown.version == upload.version());
         self.flown = Some(FlownMission {
@@ -331,11 +313,11 @@ impl Ground {
         self.again = None;
     }
 
-    /// Relay `by` has answered a question by a hello; where it holds an upload, that follows.
+    /// Handles a hello of relay `by` that answers the question; an upload that the relay holds follows.
     fn answered_question(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
-        // A mission that is refused need not be the one held: then the upload that follows says which is.
+        // A refused mission need not be the one that the relay holds: the upload that follows shows which it holds.
         if hello.refused && self.flown.is_some() {
             return;
         }
@@ -352,7 +334,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Relay `by` has said what it holds.
+    /// Handles a hello of relay `by`, which reports the mission that it holds.
     fn answered(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_asking() {
             return self.answered_question(by, distance, hello);
@@ -361,7 +343,7 @@ impl Ground {
         let mission_id = upload.id();
         self.unanswered = 0;
         self.distance = distance;
-        // What it refuses it does not hold, and what is refused may be another mission.
+        // A relay does not hold a refused mission, which may be another one than this upload.
         let is_refused = hello.refused && hello.holds == mission_id;
         let holds = if hello.refused && !is_refused {
             MissionId {
@@ -379,7 +361,8 @@ impl Ground {
                 version: hello.holds.version,
             }
         } else if holds < mission_id {
-            // An offer is answered, too: only a question leads to one, or the two would not come to an end.
+            // A relay also answers an offer with a hello. Only an answer to a question causes an offer, otherwise the exchange
+            // would not end.
             if core::mem::take(&mut self.asked) {
                 self.answer = Some(hello.nonce);
                 self.due = true;
@@ -396,7 +379,7 @@ impl Ground {
         } else {
             Progress::Held { by }
         };
-        // What is over stays over, though another relay has not heard of it yet.
+        // A final state does not change, even if another relay is not up to date.
         if self.is_under_way() || !is_under_way(progress) {
             self.progress = progress;
         }
@@ -410,7 +393,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Asks again, or the next relay, if it is time to. Constant work.
+    /// Sends the next question, to the same relay or the next one, if it is due. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if self.again.is_none_or(|again| again > now) {
@@ -426,19 +409,18 @@ impl Ground {
             } else {
                 1
             };
-            // It may have been switched on again, and know nothing of this node.
-            self.session.greet(self.to());
+            // The relay may have restarted and not know this node.
+            self.endpoint.greet(self.to());
         }
         self.due = true;
         self.again = Some(now + PATIENCE);
     }
 
-    /// The relay that is asked.
     fn to(&self) -> u16 {
         self.at(self.distance)
     }
 
-    /// The relay that far away.
+    /// Returns the relay at `distance`.
     fn at(&self, distance: u16) -> u16 {
         match self.end {
             Side::Upstream => distance,
@@ -446,34 +428,26 @@ impl Ground {
         }
     }
 
-    /// When [`Ground::handle_timeout`] is to be called at the latest; `None` once there is nothing left to do.
+    /// Returns the latest time of the next [`Ground::handle_timeout`] call; `None` once there is nothing left to do.
     pub fn poll_timeout(&self) -> Option<Instant> {
         Some(self.clock.external(self.again?))
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
     pub fn poll_transmit(&mut self, frame: &mut [u8; MAX_FRAME]) -> Option<usize> {
-        if self.counter == u32::MAX {
+        if self.endpoint.is_exhausted() {
             return None;
         }
-        let mut header = Header {
-            network: self.network,
-            sender: self.node,
-            destination: 0,
-            counter: self.counter,
-        };
-        let len = self.next(&mut header, frame)?;
-        self.counter += 1;
-        bump(&mut self.stats.sent);
-        Some(len)
+        Some(self.next(frame)?.len)
     }
 
-    fn next(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
-        if let Some(len) = greeting(&mut self.session, header, frame) {
-            return Some(len);
+    fn next(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
+        let handshake = self.endpoint.transmit_handshake(frame, &mut self.stats);
+        if handshake.is_some() {
+            return handshake;
         }
         if !core::mem::take(&mut self.due) {
-            return self.next_level(header, frame);
+            return self.next_level(frame);
         }
         let to = self.to();
         let loaded = MissionId {
@@ -482,7 +456,7 @@ impl Ground {
         };
         let id = self.upload.map_or(loaded, |upload| upload.id());
         let older = self.holds.is_some_and(|holds| holds < id);
-        let answer = self.answer.filter(|_| older && self.session.knows(to));
+        let answer = self.answer.filter(|_| older && self.endpoint.knows(to));
         let message = if let (Some(upload), Some(answer)) = (self.upload, answer) {
             self.answer = None;
             Message::Offer { upload, answer }
@@ -506,18 +480,18 @@ impl Ground {
                 nonce: if asks { self.question } else { 0 },
             })
         };
-        say(&mut self.session, to, &message, header, frame)
+        self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Tells the next relay of the level; a handshake goes to one that could not read it.
-    fn next_level(&mut self, header: &mut Header, frame: &mut FrameBuf) -> Option<usize> {
+    /// Sends the report to the next relay, or a handshake if that relay could not read it.
+    fn next_level(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.levels.take(self.within)?;
         let message = Message::Level {
             mission: self.base,
             power_w,
         };
         let to = self.at(distance);
-        say(&mut self.session, to, &message, header, frame)
+        self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 }
 

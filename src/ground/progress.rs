@@ -1,43 +1,43 @@
-//! How far an upload has come.
+//! Progress of an upload.
 
 use crate::view::ViewId;
 
-/// How far an upload has come.
+/// Progress of an upload.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Progress {
-    /// There is nothing to upload.
+    /// Idle: there is no upload.
     #[default]
     Idle,
-    /// No relay is known to hold it.
+    /// The mission is offered; no relay is known to hold it.
     Offering,
-    /// A relay holds it: the others are being asked.
+    /// A relay holds the mission; the ground station polls until the chain flies it.
     Held {
         /// Node number of the relay.
         by: u16,
     },
-    /// A relay flies it, and not all of its view are known to.
+    /// A relay flies the mission, but not all relays of its view are known to.
     Adopted {
         /// Node number of the relay.
         by: u16,
     },
-    /// All relays of a view of the chain fly it. A relay that is not in the view takes part in nothing until it does.
+    /// The mission is active in all relays of a view. Relays outside the view take no part until they fly it, too.
     Flown {
-        /// Node number of the relay that says so.
+        /// Node number of the relay that reports it.
         by: u16,
-        /// The latest view of the chain that it has heard of.
+        /// Latest view known to that relay.
         view: ViewId,
-        /// Relays that fly it: that relay, and all of its view beyond it.
+        /// Number of relays that fly the mission: that relay and all of its view beyond it.
         relays: u16,
     },
-    /// A relay refuses it: there is no line on earth for it, or it leaves that relay's own geofence. The chain does not fly it.
+    /// A relay refuses the mission: no line on earth, or outside that relay's own geofence. The chain does not fly it.
     Refused {
-        /// Node number of the relay that says so: it refuses it, or one beyond it does.
+        /// Node number of the relay that reports it: it refuses the mission, or a relay beyond it does.
         by: u16,
     },
     /// The chain has a newer mission.
     Outdated {
-        /// Its version.
+        /// Version of the newer mission.
         version: u16,
     },
 }

@@ -1,9 +1,9 @@
-//! Which incarnation of the neighbour a message is from.
+//! Association: the incarnation of the neighbour that a message belongs to.
 //!
-//! Each side numbers its association with the other at random, and a message counts only if it bears the sender's number and echoes the
-//! receiver's. The owner's number goes with the first number that echoes it; the follower takes a new number whenever it
-//! takes up another of the owner's. So two numbers go together once, and what was said in an earlier one cannot count in a
-//! later one, however late it comes.
+//! Each side numbers its association with the other one at random, and a message counts only if it has the sender's number and
+//! echoes the receiver's. The owner pairs its number with the first number that echoes it; the follower takes a new number
+//! whenever it accepts another one of the owner's. So a pair of numbers is used once, and a late message of an earlier
+//! association cannot count in a later one.
 
 use super::config::GuardConfig;
 use super::fence::{Fence, HoldReason};
@@ -12,16 +12,16 @@ use crate::jitter::Jitter;
 use crate::place::Placement;
 use crate::side::Side;
 
-/// So many messages of another association in a row are of a new one, not late ones of an old.
+/// Number of messages of another association in a row that show a new one, not late messages of an old one.
 const STRAYS: u8 = 3;
 
-/// Reminders, of one a second, after which a request to halt that is not repeated is forgotten.
+/// Reminders, one per second, after which a halt request that is not repeated expires.
 const HALT_REMINDERS: u8 = 15;
 
-/// Reminders after which a place that is not repeated is forgotten.
+/// Reminders after which a position that is not repeated expires.
 const SEEN_REMINDERS: u8 = 15;
 
-/// An association that this relay has left, until the neighbour has begun anew.
+/// Association that this relay has left, until the neighbour starts a new one.
 #[derive(Clone, Copy, Debug)]
 struct Parting {
     own: u16,
@@ -29,37 +29,37 @@ struct Parting {
     due: bool,
 }
 
-/// An association with the neighbour on one side.
+/// Association with the neighbour on one side.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "flags of the messages, each for itself"
 )]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Association {
-    /// The neighbour, 0 for none.
+    /// Node number of the neighbour, 0 for none.
     pub(super) node: u16,
-    /// The number of this relay's association.
+    /// Number of this relay's association.
     pub(super) own: u16,
-    /// The neighbour's, as it goes with `own`; 0 for none.
+    /// Number of the neighbour's association, paired with `own`; 0 for none.
     pub(super) heard: u16,
     /// Messages of other associations in a row.
     strays: u8,
-    /// Whether there is something to tell.
+    /// True if a message is pending.
     pub(super) due: bool,
-    /// True if the neighbour passed on that the chain is to open, and if it was last told so.
+    /// True if the neighbour forwarded a request to open the chain; and the last such request sent to it.
     pub(super) opens: bool,
     told_open: bool,
-    /// Reminders until the neighbour's request to halt is forgotten, 0 for none.
+    /// Reminders until the neighbour's halt request expires, 0 for none.
     halt_left: u8,
-    /// True while the neighbour is told to halt.
+    /// True while a halt request is sent to the neighbour.
     told_halt: bool,
-    /// The neighbour's number of the association that it has left, 0 for none: it is counted as absent.
+    /// Number of the association that the neighbour has left, 0 for none: the neighbour is absent, that is not flown.
     absent: u16,
-    /// What this relay still has to say of the one that it has left itself.
+    /// Pending notice of the association that this relay has left.
     parting: Option<Parting>,
-    /// Place along x that the neighbour told last, in whichever association, m; NaN before that.
+    /// Last x received from the neighbour, in any association, m; NaN before the first.
     seen_m: f32,
-    /// Reminders until that place is forgotten.
+    /// Reminders until that x expires.
     seen_left: u8,
 }
 
@@ -83,18 +83,17 @@ impl Association {
         }
     }
 
-    /// Whether nobody is there that this relay could agree with: the chain ends, or the neighbour is not flown.
+    /// Returns true without a flown neighbour: the chain ends here, or the neighbour is absent.
     pub(super) const fn is_none(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
 
-    /// Takes the place along x that a message of the neighbour tells.
+    /// Stores the x of a neighbour's message.
     pub(super) const fn see(&mut self, x_m: f32) {
         (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns how far this relay was reported beyond the place that the neighbour told last, m: along x for the neighbour upstream, against
-    /// x for the one downstream. NaN if either is unknown.
+    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m, or NaN.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -104,7 +103,7 @@ impl Association {
         }
     }
 
-    /// Returns the place along x that the neighbour told last, m; NaN if that is not known or was forgotten.
+    /// Returns the neighbour's last x, m; NaN if it is unknown or expired.
     pub(super) const fn seen_m(&self) -> f32 {
         if self.seen_left == 0 {
             f32::NAN
@@ -113,39 +112,38 @@ impl Association {
         }
     }
 
-    /// Returns true if this relay was reported on the wrong side of the place that the neighbour told last.
+    /// Returns true if this relay was reported on the wrong side of the neighbour's last x.
     pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay was reported on its own side of the place that the neighbour told last.
+    /// Returns true if this relay was reported on its own side of the neighbour's last x.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
-    /// Whether the neighbour is not flown.
     pub(super) const fn is_absent(&self) -> bool {
         self.absent != 0
     }
 
-    /// The neighbour has left the association of that number, and may be anywhere.
+    /// Marks the neighbour as absent: it has left the association of that number, and may be anywhere.
     pub(super) const fn miss(&mut self, association: u16) {
         self.absent = association;
     }
 
-    /// From now on the neighbour's number is that one: whoever was absent is back.
+    /// Accepts the neighbour's association number; an absent neighbour is back.
     pub(super) const fn meet(&mut self, association: u16) {
         self.heard = association;
         self.absent = 0;
     }
 
-    /// Whether a message says that the neighbour has left this association. The number it echoes is not used after that, so what is said of it
-    /// again is of an earlier one.
+    /// Returns true if a message states that the neighbour has left this association. The echoed number is not used again, so a
+    /// repetition of the message belongs to an earlier association.
     pub(super) const fn is_left(&self, fence: &Fence) -> bool {
         fence.says(Fence::RELEASED) && fence.echo == self.own
     }
 
-    /// Leaves it: the next one, which has to say so where the neighbour may count on this one.
+    /// Returns the next association after this relay has left this one, with a notice if the neighbour relies on this one.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = Parting {
             own: self.own,
@@ -162,7 +160,7 @@ impl Association {
         }
     }
 
-    /// The next one, whatever was said in this one. What it has still to say of one that it left before it says.
+    /// Returns the next association; a pending notice of an earlier one is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
             parting: self.parting,
@@ -170,8 +168,8 @@ impl Association {
         }
     }
 
-    /// Whether a message is of an association that this relay, or the neighbour, has left. The neighbour is told again until it has begun
-    /// anew.
+    /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. The notice is repeated
+    /// until the neighbour starts a new association.
     pub(super) fn is_over(&mut self, fence: &Fence) -> bool {
         if let Some(parting) = &mut self.parting {
             let left = fence.association == parting.heard;
@@ -179,7 +177,7 @@ impl Association {
             if left && fence.says(Fence::RELEASED) || !left && is_new {
                 self.parting = None;
             } else {
-                // It still counts on that one, or on an earlier one.
+                // The neighbour still relies on that association, or on an earlier one.
                 parting.heard = fence.association;
                 parting.due = true;
             }
@@ -190,7 +188,7 @@ impl Association {
         fence.association == self.absent
     }
 
-    /// Whether the neighbour has still to be told that this relay has left; it is told again.
+    /// Schedules a pending notice again; returns true if there is one.
     pub(super) const fn remind(&mut self) -> bool {
         if let Some(parting) = &mut self.parting {
             parting.due = true;
@@ -198,7 +196,7 @@ impl Association {
         self.parting.is_some()
     }
 
-    /// What there is to tell of the association that this relay has left.
+    /// Returns the notice that this relay has left its association, if it is due.
     pub(super) fn part(&mut self) -> Option<Fence> {
         let parting = self.parting.as_mut()?;
         core::mem::take(&mut parting.due).then(|| Fence {
@@ -207,7 +205,6 @@ impl Association {
         })
     }
 
-    /// Whether a message is of this association.
     pub(super) const fn knows(&mut self, association: u16, echo: u16) -> bool {
         let known = association == self.heard && echo == self.own;
         if known {
@@ -216,7 +213,7 @@ impl Association {
         known
     }
 
-    /// A message of this association, but for what is of the fence.
+    /// Returns a message of this association without the fields of the fence.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own,
@@ -233,21 +230,21 @@ impl Association {
         }
     }
 
-    /// Takes from a message of this association whether the chain is to open. It is answered if the neighbour has not received the last
-    /// of that.
+    /// Takes the open request from a message of this association. A reply is due if the neighbour has not received the last
+    /// request of this relay.
     pub(super) const fn hear_open(&mut self, fence: &Fence) {
         self.opens = fence.says(Fence::OPENS);
         self.due |= fence.says(Fence::ECHO_OPENS) != self.told_open;
     }
 
-    /// Passes on that the chain is to open.
+    /// Forwards a request to open the chain, or its end.
     pub(super) const fn pass_open(&mut self, opens: bool) {
         self.due |= self.told_open != opens;
         self.told_open = opens;
     }
 
-    /// Takes from any message of the neighbour whether the chain is to halt. A request is withdrawn by a relay that is in order on its
-    /// other side (`is_placed`): one that was rebooted does not know yet what it had requested.
+    /// Takes the halt request from any message of the neighbour. A request is only withdrawn by a relay that is in order on its
+    /// other side (`is_placed`), because a rebooted one does not know its earlier request.
     pub(super) const fn hear_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.says(Fence::HALTS) {
             self.halt_left = HALT_REMINDERS;
@@ -256,30 +253,28 @@ impl Association {
         }
     }
 
-    /// Returns true while the neighbour requests a halt.
     pub(super) const fn requests_halt(&self) -> bool {
         self.halt_left > 0
     }
 
-    /// Passes on that the chain is to halt.
+    /// Forwards a halt request, or its end.
     pub(super) const fn pass_halt(&mut self, halts: bool) {
         self.due |= self.told_halt != halts;
         self.told_halt = halts;
     }
 
-    /// Returns true while the neighbour is told to halt.
     pub(super) const fn tells_halt(&self) -> bool {
         self.told_halt
     }
 
-    /// Counts a reminder: a request to halt, and a place, that was not repeated for long is forgotten.
+    /// Counts a reminder: a halt request, and a position, that is not repeated expires.
     pub(super) const fn age(&mut self) {
         self.halt_left = self.halt_left.saturating_sub(1);
         self.seen_left = self.seen_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay that is not flown, or has just begun, and so is in no association: its place, and a halt that it
-    /// passes on.
+    /// Returns the message of a relay without an association, not flown or just started: its position, and a halt request to
+    /// forward.
     pub(super) fn tell_alone(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.parting.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -292,29 +287,28 @@ impl Association {
         })
     }
 
-    /// One more message of another association; whether they are too many to be late ones.
+    /// Counts a message of another association; returns true if they are too many to be late ones.
     pub(super) const fn stray(&mut self) -> bool {
         self.strays = self.strays.saturating_add(1);
         self.strays >= STRAYS
     }
 }
 
-/// Where a relay that fell silent may still hover, as a limit of this relay's own x.
+/// Limit of this relay's x because of a lost relay that may still hover, and an obstacle that is not flown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Of the lost relays the nearest node, and the limit, m.
+    /// Nearest lost node, and the limit, m.
     lost: Option<(u16, f32)>,
-    /// Where along x this relay may be no farther than the separation from it, and has not been beyond since, m: only where the two are
-    /// across the line keeps them apart. Not a number where that is over.
+    /// x from which on a relay that was lost nearby is at least the separation away, m; until then only its position across the
+    /// line may separate the two. NaN if there is none.
     near_m: f32,
-    /// True if a lost relay was out of order with this one when it was heard last.
+    /// True if a lost relay was out of order with this one at its last message.
     disordered: bool,
-    /// The relay that told last that it is not flown, and the place at which it was reported.
+    /// Relay that reported last that it is not flown, and its reported position.
     unflown: Option<(u16, Placement)>,
 }
 
 impl KeepOut {
-    /// Nothing there.
     pub(super) const fn none() -> Self {
         Self {
             lost: None,
@@ -324,13 +318,11 @@ impl KeepOut {
         }
     }
 
-    /// The limit, m.
     pub(super) fn limit_m(&self) -> Option<f32> {
         self.lost.map(|(_, limit_m)| limit_m)
     }
 
-    /// One more relay, `node`, may hover so that this one may not go beyond `limit_m`; which node is nearer and which limit
-    /// tighter depends on the side.
+    /// Adds a lost relay, `node`, with the limit `limit_m`. The side determines the nearer node and the tighter limit.
     #[inline(never)] // called from both sides
     pub(super) fn raise(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
@@ -340,7 +332,7 @@ impl KeepOut {
         });
     }
 
-    /// `node` speaks for itself: all that are lost are it, or beyond it.
+    /// Removes lost relays at or beyond `node`, which has sent a message.
     pub(super) fn spoken(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -354,8 +346,8 @@ impl KeepOut {
         }
     }
 
-    /// Takes from a message of the neighbour that it is not flown, and where it was reported. A message that bears the number of the
-    /// association that the two have since is late.
+    /// Takes a message that the neighbour is not flown, with its reported position. One of the current association is late, and
+    /// ignored.
     pub(super) fn see(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.heard;
         if fence.says(Fence::RELEASED) && fence.says(Fence::UNPLACED) && !is_late {
@@ -363,18 +355,18 @@ impl KeepOut {
         }
     }
 
-    /// The neighbour is flown.
+    /// Removes the obstacle: the neighbour is flown.
     pub(super) const fn flies(&mut self) {
         self.unflown = None;
     }
 
-    /// Returns what holds along another line: the place of a drone that is not flown is not known along it.
+    /// Returns the keep-out for another line, along which the position of a drone that is not flown is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
     }
 
-    /// Returns the reason for a limit, or a wait, at this side: `otherwise`, unless the neighbour `node` has told that it is not flown.
+    /// Returns `otherwise` as the reason for a limit or a wait, or that the neighbour `node` is not flown.
     pub(super) fn reason(&self, node: u16, otherwise: HoldReason) -> HoldReason {
         if self.unflown.is_some_and(|(unflown, _)| unflown == node) {
             HoldReason::NotFlown
@@ -383,17 +375,15 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if a drone that is not flown is in the way of this relay to its agreed place.
+    /// Returns true if a drone that is not flown blocks this relay's path to its agreed position.
     pub(super) fn bars(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
         ways.is_some_and(|(from, to)| self.way(from, to, &own.config) != to)
     }
 
-    /// Returns the part of the way from `from` to `to` that does not come nearer than the separation to the drone that is not flown, or no
-    /// nearer than `from` is.
-    ///
-    /// Along x the way ends before that drone, unless the two are the separation apart across the line. Within the separation along x only
-    /// moves across the line that lead away from it are left.
+    /// Returns the part of the path from `from` to `to` that keeps the separation from a drone that is not flown. If `from` is
+    /// closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the separation
+    /// apart across the line. Within the separation along x only moves across the line away from the drone remain.
     pub(super) fn way(&self, from: Placement, to: Placement, config: &GuardConfig) -> Placement {
         let Some((_, drone)) = self.unflown else {
             return to;
@@ -417,8 +407,8 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// The first setpoint is `x_m`: whoever was lost before was never heard, and may hover anywhere beyond, from `near_m` on the
-    /// separation apart.
+    /// Limits relays lost before the first setpoint `x_m`: never heard, they may hover anywhere beyond, at the separation from
+    /// `near_m` on.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -426,23 +416,22 @@ impl KeepOut {
         }
     }
 
-    /// The relay that was lost last was nearer than the separation, or may have been, unless this one is at `near_m` or beyond.
+    /// Marks the last lost relay as possibly closer than the separation, until this relay reaches `near_m`.
     pub(super) const fn near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
-    /// Returns the place along x from which on the relay that was lost last is the separation away, m; NaN if it is.
+    /// Returns the x from which on the last lost relay is the separation away, m; NaN if it already is.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
 
-    /// Whether that may still be so.
+    /// Returns true while the last lost relay may be closer than the separation.
     pub(super) const fn is_near(&self) -> bool {
         !self.near_m.is_nan()
     }
 
-    /// Takes whether this relay is beyond a limit, by `is_beyond`. Once it has gone off to the separation from a relay on `side` that was
-    /// lost near by, it stays at least so far away.
+    /// Ends that state if this relay is beyond `near_m` by `is_beyond`; it then stays at least that far away.
     pub(super) fn part(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -455,17 +444,28 @@ impl KeepOut {
         }
     }
 
-    /// A relay that is out of order with this one is lost.
+    /// Marks that a lost relay is out of order with this one.
     pub(super) const fn disorder(&mut self) {
         self.disordered = true;
     }
 
-    /// Returns true while a lost relay may be on the wrong side of this one: then no way along x leads away from it.
+    /// Returns true while a lost relay may be on the wrong side, so that no path along x leads away from it.
     pub(super) const fn is_disordered(&self) -> bool {
         self.disordered
     }
 
     pub(super) const fn clear(&mut self) {
         *self = Self::none();
+    }
+
+    /// Keeps clear of relays at `side` that were never heard and may hover anywhere beyond `limit_m`, until any of them has sent
+    /// a message.
+    pub(super) fn expect(&mut self, side: Side, limit_m: f32, separation_m: f32) {
+        let (nearest, near_m) = match side {
+            Side::Upstream => (0, limit_m + separation_m),
+            Side::Downstream => (u16::MAX, limit_m - separation_m),
+        };
+        self.lost = Some((nearest, limit_m));
+        self.near_m = near_m;
     }
 }

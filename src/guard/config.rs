@@ -1,4 +1,4 @@
-//! The box that no setpoint leaves, and what else is set before flight.
+//! Configuration of the guard: geofence, separation and delays.
 
 use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::place::{CrossSection, Placement};
@@ -8,32 +8,32 @@ use crate::without_quorum::WithoutQuorum;
 
 use super::fence::is_place;
 
-/// Default time that a relay may fly away from a new setpoint: the stopping time of the autopilot link's default pace.
+/// Default `lag`: stopping time of the autopilot link's default pace.
 const LAG: Duration = Duration::from_millis(9_800);
 
-/// Greatest distance from the box, m in each coordinate, at which a relay may begin.
+/// Maximum distance from the geofence, m in each coordinate, at which a relay may start.
 pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
-/// Where setpoints may be.
+/// Geofence of the setpoints.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geofence {
-    /// The least x, m from Tx: -1e7 to `most_x_m`.
+    /// Smallest x, m from Tx: -1e7 to `most_x_m`.
     pub least_x_m: f32,
-    /// The largest x, m: to 1e7.
+    /// Largest x, m: to 1e7.
     pub most_x_m: f32,
-    /// The least y, m from the line: -1e7 to `most_y_m`.
+    /// Smallest y, m from the line: -1e7 to `most_y_m`.
     pub least_y_m: f32,
-    /// The largest y, m: to 1e7.
+    /// Largest y, m: to 1e7.
     pub most_y_m: f32,
-    /// The least altitude, m: -1e7 to `most_altitude_m`.
+    /// Lowest altitude, m: -1e7 to `most_altitude_m`.
     pub least_altitude_m: f32,
-    /// The largest altitude, m: to 1e7.
+    /// Highest altitude, m: to 1e7.
     pub most_altitude_m: f32,
 }
 
 impl Geofence {
-    /// Whether `place` is in the box.
+    /// Returns true if `place` is inside.
     pub fn contains(&self, place: Placement) -> bool {
         (self.least_x_m..=self.most_x_m).contains(&place.x_m)
             && (self.least_y_m..=self.most_y_m).contains(&place.y_m)
@@ -41,30 +41,30 @@ impl Geofence {
     }
 }
 
-/// What a guard is told before flight.
+/// Configuration of a guard, set before flight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
-    /// The box that no setpoint leaves.
+    /// Geofence that no setpoint leaves.
     pub fence: Geofence,
-    /// How far apart relays are kept, m: 0 to 1e5; the same on all relays.
+    /// Minimum distance between relays, m: 0 to 1e5; the same on all relays.
     pub separation_m: f32,
     /// Number of relays of the mission, 1 to 1000; the same on all relays.
     pub relays: u16,
-    /// How far off its setpoint a relay may be reported that hovers there, m in each coordinate: 0 to 1e3. This much is taken from the separation at
-    /// each of two relays.
+    /// Maximum deviation of a hovering relay's reported position from its setpoint, m in each coordinate: 0 to 1e3. It reduces
+    /// the separation by this much at each of two relays.
     pub hover_m: f32,
-    /// Time after `Guard::steer` gave a setpoint within which the relay flies toward it: the way of the setpoint to
-    /// the flight controller, and the time to stop from the greatest speed. With the autopilot link it is
+    /// Time after `Guard::steer` within which the relay flies toward the new setpoint: the latency to the flight controller plus
+    /// the stopping time from maximum speed. With the autopilot link it is
     /// [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
 }
 
 impl GuardConfig {
-    /// Those of a mission: its separation, its distance, and its band of altitudes, widened to the one that this relay holds.
+    /// Returns the configuration for a mission: its separation, distance, and altitude band including the profile's altitude.
     ///
-    /// Where relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the box needs
-    /// [room](Self::with_room_for) for that: they go no farther than it.
+    /// If relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the geofence needs
+    /// [room](Self::with_room_for) for that, because it limits them.
     ///
     /// `hover_m` is 0 and `lag` 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of the default pace.
     ///
@@ -95,7 +95,7 @@ impl GuardConfig {
         }
     }
 
-    /// The same with a box that has room for relays that leave the line without a quorum.
+    /// Returns the configuration with a geofence that has room for relays that leave the line without a quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.fence;
@@ -106,7 +106,7 @@ impl GuardConfig {
         self
     }
 
-    /// Whether every number is within its range.
+    /// Returns true if every number is within its range.
     pub fn is_valid(&self) -> bool {
         let fence = &self.fence;
         is_place(fence.least_x_m)
@@ -123,7 +123,7 @@ impl GuardConfig {
             && (0.0..=1e3).contains(&self.hover_m)
     }
 
-    /// Returns the place in the box that is nearest to `place`.
+    /// Returns the position in the geofence that is nearest to `place`.
     #[inline(never)] // called from several places
     pub(super) fn cut(&self, place: Placement) -> Placement {
         let fence = &self.fence;
@@ -137,7 +137,7 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the place nearest to `place` that is no farther outside the box than `before`.
+    /// Returns the position nearest to `place` that is no farther outside of the geofence than `before`.
     pub(super) fn cut_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.fence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -155,7 +155,7 @@ impl GuardConfig {
         }
     }
 
-    /// Returns true if a relay may begin at `place`: near enough to the box that no number is too large to be exact.
+    /// Returns true if a relay may start at `place`: so close to the geofence that all numbers are exact enough.
     pub(super) fn may_begin_at(&self, place: Placement) -> bool {
         let (near, box_place) = (BEGIN_WITHIN_M, self.cut(place));
         (place.x_m - box_place.x_m).abs() <= near
@@ -163,8 +163,8 @@ impl GuardConfig {
             && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
-    /// Where node `node`, which is to be at `x_m`, waits while the chain is open: places in order stay in order, and come to be the
-    /// separation apart wherever the relays of the mission fit the box so.
+    /// Returns the x of node `node` while the chain is open, for the agreed `x_m`. The order is kept, and the positions are the
+    /// separation apart if the mission's relays fit into the geofence so.
     #[inline(never)] // called from several places
     pub(super) fn open_place(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.fence.least_x_m;
@@ -176,13 +176,13 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.fence.most_x_m)
     }
 
-    /// How far apart along x two relays have to be at least that are at `one` and `other` across the line, m.
+    /// Returns the minimum distance along x of two relays at `one` and `other` across the line, m.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// What rounding may make of a place, m: four steps of an f32 at the far end of the box.
+    /// Returns the maximum rounding error of a position, m: four steps of an f32 at the far end of the geofence.
     pub(super) fn rounding(&self) -> f32 {
         4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
     }

@@ -1,54 +1,54 @@
-//! What two neighbours tell each other about the fence between them, and why a relay may not get on.
+//! Fence message between two neighbours, and reasons for a hold.
 
 use crate::place::CrossSection;
 
-/// What a relay tells a neighbour about the fence between them. It is a state, not a step: it may be lost, come twice, late, or
-/// in another order.
+/// Message of a relay to a neighbour about the fence between them.
+///
+/// It is a state, not a step: it may be lost, duplicated, delayed or reordered.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fence {
-    /// Number of the sender's present talk with this neighbour, never 0.
+    /// Number of the sender's association with this neighbour, never 0.
     pub association: u16,
-    /// The number of the receiver's as the sender has heard it, 0 for none.
+    /// Last number received from the destination's association, 0 for none.
     pub echo: u16,
-    /// From the owner: number of the fence, 0 before the first. From the follower: of the newest fence it has heard of.
+    /// Owner: number of the fence, 0 before the first. Follower: number of the newest fence received.
     pub number: u16,
-    /// From the owner: where the fence is. From the follower: the low end of its own stretch. m along x, -1e7 to 1e7.
+    /// Owner: x of the fence. Follower: low end of its reachable interval. m, -1e7 to 1e7.
     pub x_m: f32,
-    /// Where the sender is to be in the end, m along x, -1e7 to 1e7.
+    /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
-    /// Where the sender flies across the line, or is on its way to, m: both -1e7 to 1e7.
+    /// Position of the sender across the line, or the one it flies to, m: both -1e7 to 1e7.
     pub across: CrossSection,
-    /// From the owner: how far before the fence it stays, m along x, 0 to 1e5. Where that is less than the separation, the
-    /// follower stays where it is across the line.
+    /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
+    /// must not move across the line.
     pub apart_m: f32,
-    /// What else it says: the sum of those of [`STILL`](Self::STILL) to [`UNPLACED`](Self::UNPLACED) that hold.
+    /// Sum of the flags [`STILL`](Self::STILL) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
 }
 
-/// No place is farther than this from Tx, m.
+/// Maximum distance of a position from Tx, m.
 const FARTHEST_M: f32 = 1e7;
 
 impl Fence {
-    /// The sender has arrived where it flies across the line.
+    /// Flag: the sender has arrived at its position across the line.
     pub const STILL: u8 = 1;
-    /// From the follower: it agrees to `apart_m` of the newest fence.
+    /// Flag of the follower: it agrees to `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
-    /// The sender, or a relay beyond it, has to move across the line and needs the separation along x for that.
+    /// Flag: the sender, or a relay beyond it, has to move across the line, and needs the separation along x for that.
     pub const OPENS: u8 = 4;
-    /// The same as the sender has last heard it from the receiver.
+    /// Flag: echo of the last [`OPENS`](Self::OPENS) received from the destination.
     pub const ECHO_OPENS: u8 = 8;
-    /// The sender has left this association: it does not fly to its setpoints any more, or did not for a time. Places and the number of
-    /// the fence mean nothing.
+    /// Flag: the sender has left this association, because it does not fly to its setpoints, or did not for a time. Positions and
+    /// the number of the fence are not valid.
     pub const RELEASED: u8 = 16;
-    /// The sender, or a relay beyond it, is not in order with its neighbours: all relays stay where they are. It is told again every
-    /// second, and holds in whichever association.
+    /// Flag: the sender, or a relay beyond it, is not in order with its neighbours, so all relays hold their positions. It is
+    /// repeated every second, and valid in any association.
     pub const HALTS: u8 = 32;
-    /// The place shows the order only, and grants nothing. From the follower: it is not in order with its neighbour downstream. With
-    /// [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is the place reported last.
+    /// Flag: the position shows the order only, and grants nothing. Of the follower: it is not in order with its neighbour
+    /// downstream. With [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
-    /// Returns a message that has no places and no flags.
     pub(super) const fn without_place(association: u16, echo: u16) -> Self {
         Self {
             association,
@@ -66,7 +66,7 @@ impl Fence {
         self.flags & flag != 0
     }
 
-    /// Whether its numbers are within their ranges.
+    /// Returns true if all numbers are within their ranges.
     pub fn is_valid(&self) -> bool {
         let CrossSection { y_m, altitude_m } = self.across;
         let places = [self.x_m, self.target_m, y_m, altitude_m];
@@ -77,27 +77,27 @@ impl Fence {
     }
 }
 
-/// Reason that keeps a relay from the place agreed on.
+/// Reason that keeps a relay from its agreed position.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
     /// The neighbour has not agreed to a fence yet.
     Unheard,
-    /// The neighbour is on the wrong side of this relay along the line, or too near along it to be certain: neither moves.
+    /// The neighbour is on the wrong side of this relay along the line, or too close along it for certainty: neither moves.
     Order,
-    /// The two are to be closer along x than they may come yet, by where they are across the line.
+    /// The agreed distance along x is less than allowed, given the current positions across the line.
     Close,
-    /// A relay that fell silent may still hover there.
+    /// A lost relay may still hover there.
     Lost,
-    /// The neighbour is not flown, and is in the way or has not made room.
+    /// The neighbour is not flown, and blocks the path or has not made room.
     NotFlown,
-    /// The neighbour has not made room, for five seconds or more.
+    /// The neighbour has not made room for at least five seconds.
     Pending,
-    /// Another relay of the chain is not in order with its neighbours: all stay where they are.
+    /// Another relay of the chain is not in order with its neighbours, so all relays hold their positions.
     Halted,
 }
 
-/// Whether it is a number that may be a place along x, m; not so for NaN.
+/// Returns true if `x_m` is a valid position along x, m; false for NaN.
 pub(super) fn is_place(x_m: f32) -> bool {
     x_m.abs() <= FARTHEST_M
 }

@@ -1,4 +1,4 @@
-//! The fence upstream, which the neighbour places.
+//! Fence upstream, which the neighbour places.
 
 use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
@@ -6,27 +6,27 @@ use super::own::Own;
 use crate::jitter::Jitter;
 use crate::side::Side;
 
-/// A fence is newer than another one if its number is less than this ahead.
+/// Maximum forward distance of fence numbers plus one; a fence is newer than another one below it.
 const AHEAD: u16 = 0x8000;
 
-/// This relay's side of the fence toward Tx.
+/// Follower's state of a fence: the one toward Tx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence heard of, 0 before the first.
+    /// Number of the newest fence received, 0 before the first.
     number: u16,
-    /// Where it is, m.
+    /// x of the newest fence, m.
     fence_m: f32,
-    /// How far before it the neighbour asked to stay, m; infinite for the separation.
+    /// Step requested by the owner, m; infinite for the separation.
     asked_m: f32,
-    /// What of that this relay has agreed to, m.
+    /// Step that this relay has agreed to, m.
     taken_m: f32,
-    /// Where the neighbour is to be, m.
+    /// Agreed x of the neighbour, m.
     target_m: f32,
-    /// Whether this relay has cleared a fence.
+    /// True once this relay has cleared a fence.
     clear: bool,
-    /// Whether the owner was told that the newest fence has been cleared.
+    /// True if the owner was informed that the newest fence has been cleared.
     told: bool,
 }
 
@@ -45,7 +45,7 @@ impl FenceFollower {
         }
     }
 
-    /// Another neighbour, 0 for none.
+    /// Replaces the neighbour; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.disorder();
@@ -54,15 +54,15 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Begins anew; where this relay may go because of the neighbour so far stays as a keep_out, and that is nowhere if it was
-    /// never heard.
+    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`. If that neighbour was never
+    /// heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.is_none() {
-            // As far as this relay has come, not as far as it was asked to.
+            // The limit is where this relay has come to, not where it was requested to go.
             let limit_m = self.least(own).min(own.reachable.at_m);
             let separation_m = own.config.separation_m;
-            // What may be missing where the neighbour was allowed to come nearer than the separation, or was never heard.
+            // Possible shortfall, if the neighbour was allowed closer than the separation, or was never heard.
             let missing_m = separation_m - self.asked_m.min(self.taken_m).min(separation_m);
             keep_out.raise(Side::Upstream, self.association.node, limit_m + missing_m);
             if missing_m > 0.0 {
@@ -79,8 +79,8 @@ impl FenceFollower {
         };
     }
 
-    /// This relay is not flown any more: it begins anew, and tells the neighbour so. What it had to keep to says nothing of where it is from
-    /// now on.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. Its limits do not apply to
+    /// manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -89,7 +89,7 @@ impl FenceFollower {
         };
     }
 
-    /// Places are along another line: it begins anew, and what it knows of who is lost is that there is somebody.
+    /// Starts a new association along another line; of lost relays it only keeps that there are some.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -98,8 +98,8 @@ impl FenceFollower {
         };
     }
 
-    /// The neighbour is not flown any more: this relay stays where it is toward it. It is otherwise free if the two were known to be in
-    /// order.
+    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it. If the two were in order, it is otherwise
+    /// free.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -116,7 +116,7 @@ impl FenceFollower {
         let is_placed = !fence.says(Fence::RELEASED) && fence.number != 0;
         self.association.hear_halt(fence, is_placed);
         self.keep_out.see(&self.association, fence);
-        // With a number it is the place of a fence, which may be far from its owner.
+        // With a fence number the x is that of the fence, which may be far from its owner.
         if fence.says(Fence::UNPLACED) || !fence.says(Fence::RELEASED) && fence.number == 0 {
             self.association.see(fence.x_m);
         }
@@ -124,7 +124,7 @@ impl FenceFollower {
             if self.association.is_left(fence) {
                 self.release(fence.association, own, jitter);
             }
-            // A relay that is in no association needs no answer.
+            // A relay without an association needs no reply.
             self.association.due |= !fence.says(Fence::UNPLACED);
             return;
         }
@@ -135,7 +135,7 @@ impl FenceFollower {
             self.renew(own, jitter);
             self.association.heard = fence.association;
         }
-        // It is answered in any case: it may have been said again because an answer was lost.
+        // Always reply, since the message may be repeated because a reply was lost.
         self.association.due = true;
         if !self.association.knows(fence.association, fence.echo) {
             return;
@@ -154,7 +154,7 @@ impl FenceFollower {
         }
     }
 
-    /// How far back this relay may go, m; above where it is, it is asked to go there.
+    /// Returns the smallest allowed x, m; above the current setpoint, it is a request to go there.
     #[inline(never)] // called from several places
     pub(super) fn least(&self, own: &Own) -> f32 {
         let granted = match (self.association.is_none(), self.number) {
@@ -165,27 +165,27 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Whether this relay may move across the line as far as this side is concerned.
+    /// Returns true if this side allows a move across the line.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
         (self.association.is_none() || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
     }
 
-    /// Whether this relay has to stay where it is across the line, since that may keep the two apart.
+    /// Returns true if this relay must not move across the line, because its position there may separate the two.
     pub(super) fn is_held(&self, own: &Own) -> bool {
         self.asked_m < own.config.separation_m
     }
 
-    /// Whether the neighbour may have been too near since it was switched on.
+    /// Returns true if the neighbour may have been too close since the start.
     pub(super) const fn is_tight(&self) -> bool {
         self.is_agreed() && !self.clear
     }
 
-    /// Whether the two are to be closer along x than the separation.
+    /// Returns true if the agreed positions are closer along x than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.is_agreed() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to what the neighbour asked, if with `downstream_m` on the other side its two neighbours stay the separation apart.
+    /// Agrees to the requested step if, with `downstream_m` on the other side, the two neighbours stay the separation apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.asked_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -194,7 +194,7 @@ impl FenceFollower {
         }
     }
 
-    /// How near the neighbour upstream may come at most, m, as far as the one downstream is concerned.
+    /// Returns how close the neighbour upstream may come at most, m, for the limits downstream.
     pub(super) const fn taken_m(&self) -> f32 {
         if self.keep_out.is_near() || self.is_agreed() && !self.clear {
             0.0
@@ -203,23 +203,23 @@ impl FenceFollower {
         }
     }
 
-    /// Whether nobody is there, or whoever is has found this relay beyond it: before, it announces no fence.
+    /// Returns true without a neighbour, or if the neighbour has found this relay beyond it; before, it announces no fence.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered() && (self.association.is_none() || self.is_agreed())
     }
 
-    /// Returns true if the neighbour upstream has told that it is beyond this relay.
+    /// Returns true if the neighbour upstream has reported that it is beyond this relay.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         self.keep_out.is_disordered()
             || !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
     }
 
-    /// Whether a fence was heard of.
+    /// Returns true if a fence was received.
     pub(super) const fn is_agreed(&self) -> bool {
         self.number != 0
     }
 
-    /// After a report: the owner waits to hear that the newest fence has been cleared.
+    /// Updates the state after a report: the owner waits for the news that the newest fence has been cleared.
     pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
         if self.is_agreed() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -227,8 +227,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest x at which the neighbour upstream may be, or any relay beyond it that is not the separation below it yet, m, until
-    /// this relay has cleared the first fence: then all of them are below this relay.
+    /// Returns the highest x of the neighbour upstream and relays beyond it that are not yet the separation below it, m. It
+    /// applies until this relay has cleared the first fence: then all of them are below this relay.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)
@@ -237,8 +237,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message, with `low_m` as the place that counts. A relay that is not `placed`, in order with its neighbour
-    /// downstream, has one only for a request.
+    /// Returns the pending message, with `low_m` as the valid x. A relay that is not `placed`, that is in order with its
+    /// neighbour downstream, only sends a halt request.
     pub(super) fn tell(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.tells_halt());
         if self.association.node == 0 || !is_due {

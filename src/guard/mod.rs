@@ -1,87 +1,86 @@
-//! Motion guard: keeps relays apart while they fly from one agreed set of places to the next, whatever is lost or late between them.
+//! Motion guard: keeps relays apart while they fly to new agreed positions, even if messages are lost or late.
 //!
-//! Relays stand in order along x. As a rule neighbours are the separation apart *along x*, and then so are all relays, whatever they do
-//! across the line. Two relays that are agreed beside or above each other come closer along x once both have arrived across the line; what
-//! they are apart across the line then counts. Two relays with one between them stay the separation apart along x in any case, so no
-//! relay has to know more than its neighbours. Places that do not allow that are approached as far as they can be, and
-//! [`Guard::hold_reason`] says so.
+//! Relays are in order along x. Normally neighbours are the separation apart *along x*, and then so are all relays, whatever they
+//! do across the line. Two relays whose agreed positions are beside or above each other come closer along x once both have
+//! arrived across the line; their distance across the line then counts. Two relays with one between them always stay the
+//! separation apart along x, so no relay needs more information than its neighbours'. Positions that do not allow that are
+//! approached as far as possible, and [`Guard::hold_reason`] reports it.
 //!
-//! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays a *step* before it; the relay
-//! downstream, the *follower*, stays at it or beyond.
+//! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays a *step* before it;
+//! the relay downstream, the *follower*, stays at it or beyond.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`config`] | the geofence of setpoints, and other settings |
-//! | `own` | the relay's own setpoint and place across the line |
+//! | [`config`] | geofence of setpoints, and other settings |
+//! | `own` | the relay's own setpoint and position across the line |
 //! | `reachable` | the interval along x in which the relay may be, by its reports and setpoints |
-//! | `association` | the incarnation of the neighbour that a message belongs to, and requests that relays pass on |
+//! | `association` | the incarnation of the neighbour that a message belongs to, and requests that relays forward |
 //! | `owner` | the fence downstream, which this relay places |
 //! | `follower` | the fence upstream, which the neighbour places |
 //!
 //! # Rules
 //!
-//! *Own interval*: from the lowest to the highest x at which the relay may be, wherever it stops on its way. *In order*: the follower is
-//! beyond the owner along x. Reports are off by up to `hover_m`: two relays whose reports are within twice that along x are in order only if
-//! they are the separation apart across the line, so that they may pass each other.
+//! *Own interval*: from the lowest to the highest x at which the relay may be, wherever it stops on its way. *In order*: the
+//! follower is beyond the owner along x. Reports have an error of up to `hover_m`. Two relays whose reports are within twice that
+//! along x are in order only if they are the separation apart across the line, so that they may pass each other.
 //!
-//! | | rule | so that |
+//! | | rule | purpose |
 //! | --- | --- | --- |
-//! | 1 | The follower never lowers its setpoint below the newest fence that it has received, and flies up to that fence if it is below. | its promise holds |
-//! | 2 | It tells the newest fence that it has received, and the low end of its own interval, or what it counts on downstream (rule 3) if that is lower: relays that are in order but for the error of their reports may add up. | a relay is known to be beyond all that are upstream |
-//! | 3 | The owner counts on the lowest of that low end, if told together with the newest fence, and every fence announced since. | no message under way lets the follower come nearer than it is counted on |
-//! | 4 | The owner never raises its setpoint to less than the step before what it counts on. | the two intervals are the step apart |
-//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has been cleared already |
-//! | 6 | As far as 5 allows, the fence goes halfway between the two agreed places, and half the step on. | both can reach their places |
-//! | 7 | The first fence is the separation beyond the owner's own interval, and beyond what the fence upstream of it leaves to that one's owner. Other fences, and moves across the line, begin when the follower has cleared it. | a start that is too close is opened first, and no relay sinks onto another |
-//! | 8 | The first setpoint is the place reported last, side and altitude included, even outside the geofence. It stays until both neighbours are known to be in order: the follower has told that it is beyond the owner, the owner has announced a fence. A relay tells the one neighbour a place that counts only once it is in order with the other one. | nothing is granted before the order is known, after a start as after a reboot or a new link |
-//! | 9 | Nothing lapses with time: the last limit of a neighbour that is replaced or starts anew stays until it speaks for itself, or [`Guard::forget`]; if it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
-//! | 10 | With a fence the owner tells the step that it asks for. From a step below the separation until the next one that is the separation, neither moves across the line: the owner from asking on, the follower from receiving on. | the place across the line that the follower told stays true |
-//! | 11 | The step is the separation. It becomes less when the follower has told, together with the newest fence, that it has arrived across the line, where, and that it agrees: then it is the largest of what is asked for, of what the two places across the line leave to be kept along x, and of what rule 12 asks for. The owner announces a larger one only once it is that far before what it counts on. | the two are the separation apart in space |
-//! | 12 | The steps upstream and downstream of a relay add up to the separation at least: it agrees to no smaller one upstream before, and takes no smaller one downstream after. | relays that are not neighbours are the separation apart along x |
-//! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour that is to be close, has the chain *open*: it tells both sides, and every relay passes that on. Then all go to places in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
-//! | 14 | From a neighbour that fell silent within the separation along x this relay goes off to the separation, and does not move across the line before, nor comes back nearer; nor where it never heard the neighbour, or had not cleared the first fence, before it has gone as far. Where the neighbour was out of order with it, it stays where it is. | the place of the silent one still counts |
-//! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and says so until the neighbour has begun anew; flown again it begins as after a start. Meanwhile it tells the place at which it was reported, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 off to the separation); if the two were in order it is otherwise free, until it receives a new association, but for the place that was told last: until the neighbour is flown again, is linked anew or is forgotten, it does not go past that place along x nor nearer to it than the separation, unless the two are the separation apart across the line, and within the separation along x it moves across the line only away from it. A relay that is on its way stops where it was reported. | no relay counts on a drone that is flown by hand, and none comes nearer to it or flies through it |
-//! | 16 | A relay that is out of order with a neighbour, or not in order with both for three reminders and not seen to be so by the places of those that are not flown, has the chain *halt*: it tells both sides at every reminder, and every relay passes that on, also one that is not flown. A relay that halts on its way stops where it was reported last. A request that is not repeated for 15 reminders is forgotten. | no relay flies into a drone that was given back, or has started, at a wrong place |
+//! | 1 | The follower never lowers its setpoint below the newest fence received, and flies up to that fence if it is below. | its promise holds |
+//! | 2 | It reports the number of the newest fence received, and the low end of its own interval, or the x it relies on downstream (rule 3) if that is lower, because relays in order but for the error of their reports may add up. | a relay is known to be beyond all relays upstream |
+//! | 3 | The owner relies on the lowest of that low end, if reported together with the newest fence, and every fence announced since. | no message in transit lets the follower come nearer than relied on |
+//! | 4 | The owner never raises its setpoint to less than the step before the x it relies on. | the two intervals are the step apart |
+//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has already been cleared |
+//! | 6 | As far as rule 5 allows, the fence is halfway between the two agreed positions plus half the step. | both can reach their positions |
+//! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, start when the follower has cleared it. Until a relay has cleared the first fence upstream, each of its fences downstream is also the separation beyond the highest x that the fence upstream leaves to its owner. | a start that is too close is opened first, and no relay descends onto another |
+//! | 8 | The first setpoint is the last reported position, with side and altitude, even outside of the geofence. It remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
+//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
+//! | 10 | With a fence the owner sends the step that it requests. From a step below the separation until the next one that equals it, neither moves across the line: the owner from its request on, the follower from its reception on. | the follower's reported position across the line remains valid |
+//! | 11 | The step is the separation. It becomes smaller when the follower has reported, together with the newest fence, that and where it has arrived across the line, and that it agrees. Then it is the largest of the requested step, of the distance along x that the two positions across the line still require, and of the step by rule 12. The owner announces a larger one only once it is that far before the x it relies on. | the two are the separation apart in space |
+//! | 12 | The steps upstream and downstream of a relay add up to at least the separation: it agrees to a smaller step upstream, and takes one downstream, only as far as the sum allows. | relays that are not neighbours are the separation apart along x |
+//! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour whose agreed position is close, requests an *open* chain on both sides, and every relay forwards the request. Then all fly to positions in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
+//! | 14 | From a neighbour that became silent within the separation along x this relay moves away to the separation; before, it does not move across the line, and later it does not come back nearer. The same applies if it never heard the neighbour, or had not cleared the first fence. If the neighbour was out of order with it, it holds its position. | the position of the silent relay still counts |
+//! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and repeats that until the neighbour has started a new one; when flown again it begins as after a start. Meanwhile it sends its reported position, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 away to the separation). If the two were in order, it is otherwise free until it receives a new association, except near the last position sent: until the neighbour is flown again, linked again or forgotten, it does not pass that position along x nor come nearer to it than the separation, unless the two are the separation apart across the line, and within the separation along x it moves across the line only away from it. A relay on its way stops where it was reported. | no relay relies on a drone that is flown by hand, and none comes nearer to it or flies through it |
+//! | 16 | A relay that is out of order with a neighbour requests a *halt* of the chain; so does one that is not in order with both for three reminders, unless the positions of relays that are not flown show the order. It sends the request to both sides at every reminder, and every relay forwards it, also one that is not flown. A relay that halts on its way stops where it was last reported. A request that is not repeated for 15 reminders expires. | no relay flies into a drone that was given back, or started, at a wrong position |
 //!
-//! Where places are along another line from one moment to the next ([`Guard::leave_line`]), a relay has no setpoint and begins as after a
-//! start, once it has stopped. A neighbour that speaks along another line is not heard: it is counted on as before, where it was, and the
-//! relay does not move before both neighbours speak along the new line. Relays that the new line puts out of order stay where they are.
+//! If the line changes ([`Guard::leave_line`]), a relay has no setpoint and begins as after a start, once it has stopped.
+//! Messages of a neighbour that uses another line are ignored: this relay relies on its earlier ones, and does not move before
+//! both neighbours use the new line. Relays that the new line puts out of order hold their positions.
 //!
 //! # Why the order along x suffices
 //!
-//! Let all neighbours be in order. A pair of neighbours less than the separation apart only parts: the owner's setpoint does not rise
-//! (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays the separation apart. So no gap between
-//! neighbours ever falls below the lesser of the separation and the gap at the start, nor does a sum of gaps: that is the distance along x
-//! of any two relays. Until a relay's two gaps are the separation, it does not move across the line. So no two relays come nearer in
-//! space than the lesser of the separation and their distance at the start, less what their places are off by.
-//! `cargo test --test guard anywhere` flies it.
+//! Let all neighbours be in order. A pair of neighbours closer than the separation only moves apart: the owner's setpoint does
+//! not rise (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays the separation apart. So no
+//! gap between neighbours ever falls below the smaller of the separation and the gap at the start, nor does a sum of gaps, which
+//! is the distance along x of any two relays. Until both gaps of a relay are the separation, it does not move across the line. So
+//! no two relays come nearer in space than the smaller of the separation and their distance at the start, minus the errors of
+//! their positions. `cargo test --test guard anywhere` tests it.
 //!
-//! # Why everybody arrives
+//! # Why all relays arrive
 //!
-//! Let the places agreed on be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for
-//! its owner to come down, and that relay waits only for the fence upstream, if that has to be lowered, too: the first of them
-//! waits for nobody, and so, one after the other, all come down. In the same way all that have to be raised are, from the
-//! receiver's end. Then every relay finds its place between its fences. Fences go along with the flight, so that is one
-//! flight's time and a few messages a relay at the worst.
+//! Let the agreed positions be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for its
+//! owner to come down, and that relay waits only for the fence upstream, if that has to be lowered too. The first of them waits
+//! for none, and so all come down, one after the other. In the same way all that have to be raised are, from the receiver's end.
+//! Then every relay finds its position between its fences. Fences move along with the flight, so that takes one flight's time and
+//! a few messages per relay at worst.
 //!
-//! Where neighbours are to be closer along x, the same holds of the places in an open chain, so each relay gets to move across the line,
-//! and none needs that again before the next agreement. Then the steps become what they are to be, and the same holds of the places
-//! agreed on.
+//! If neighbours are to be closer along x, the same is true for the positions in an open chain, so each relay can move across the
+//! line, and none needs that again before the next agreement. Then the steps take their final values, and all arrive.
 //!
-//! # What is not promised
+//! # Limitations
 //!
-//! - Hovering off the reported place by up to [`GuardConfig::hover_m`] takes as much from the separation at either relay, and as
-//!   much again each time that one is rebooted before a fence has opened what is missing. What a relay hovers off across the line counts
-//!   where the two are within the separation along x.
-//! - A relay says nothing before it has both a place to go to and a report of where it is: until then nobody moves toward it.
-//! - A drone in its pilot's hands is the pilot's affair: its neighbours only come no nearer, to the place that they have received last, which is told
-//!   every second while it changes and every four seconds else. Relays that are not its neighbours do not know it, and may fly past it. A drone that is given back at a wrong place
-//!   stays there, and the chain halts around it; a drone that is just flying past needs some seconds for that. A drone that is given back
-//!   in motion overshoots as far as its autopilot takes to stop it.
-//! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and stays where it is until that one is
-//!   flown or is linked around.
-//! - A relay that is rebooted has forgotten whom it was linked to: it has to begin with the neighbours of the mission and be
-//!   linked around those that are silent, so that rule 9 holds it back.
+//! - A deviation from the reported position of up to [`GuardConfig::hover_m`] reduces the separation by as much at either relay,
+//!   and again each time that one is rebooted before a fence has restored the shortfall. Deviations across the line count if the
+//!   two are within the separation along x.
+//! - A relay sends nothing before it has both an agreed position and a report; until then no neighbour moves toward it.
+//! - The pilot is responsible for a drone in manual control. Its neighbours only come no nearer to the last position received,
+//!   which is sent every second while it changes and otherwise every four seconds. Other relays do not know it, and may fly past
+//!   it. A drone that is given back at a wrong position stays there, and the chain halts around it; for a drone that is just
+//!   flying past this takes some seconds. A drone that is given back in motion overshoots by its autopilot's stopping distance.
+//! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and holds its position until that one
+//!   is flown or is replaced as a neighbour.
+//! - A rebooted relay does not know its earlier neighbours: it has to start with those of the mission, and silent ones have to be
+//!   replaced by `link`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
 #![cfg_attr(
@@ -120,41 +119,41 @@ use own::Own;
 use owner::FenceOwner;
 use reachable::ReachableInterval;
 
-/// One relay's guard: where it was agreed to be goes in, where it is safe to fly now comes out.
+/// Guard of one relay: computes safe setpoints on the way to the agreed position.
 ///
-/// Feed it with [`commit`](Self::commit), [`position`](Self::position), [`hear`](Self::hear), [`link`](Self::link); after each,
-/// call [`steer`](Self::steer), fly to what it gives, then send what [`poll`](Self::poll) has to say. Every call does some hundred
-/// operations and two square roots at most, none depends on the length of the chain.
+/// Call [`commit`](Self::commit), [`position`](Self::position), [`hear`](Self::hear) and [`link`](Self::link) with new inputs.
+/// After each call [`steer`](Self::steer), fly to its result, then send the messages of [`poll`](Self::poll). Every call takes at
+/// most some hundred operations and two square roots, independent of the length of the chain.
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
     own: Own,
     jitter: Jitter,
     born: Instant,
-    /// Before the first setpoint: where the relay was reported last.
+    /// Last reported position before the first setpoint.
     found: Option<Placement>,
-    /// Whether the relay flies to its setpoints.
+    /// True if the relay flies to its setpoints.
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
-    /// True while this relay has the whole chain halt: it is out of order with a neighbour, or not in order for some reminders.
+    /// True while this relay requests a halt: it is out of order with a neighbour, or not in order for some reminders.
     disorder: bool,
-    /// Reminders in a row at which this relay was not in order.
+    /// Reminders in a row without order.
     waits: u8,
-    /// Reminders so far.
     reminders: u8,
     refused: u32,
 }
 
-/// Reminders from one message of a relay that is not flown to the next.
+/// Reminders between two messages of a relay that is not flown.
 const ALONE_EVERY: u8 = 4;
 
 /// Reminders in a row without order after which the whole chain halts.
 const MOST_WAITS: u8 = 3;
 
 impl Guard {
-    /// A guard that starts at `now` between `neighbours`, toward Tx and toward Rx, as the mission has them; `None` where the chain ends.
+    /// Creates a guard that starts at `now` between the mission's `neighbours`, toward Tx and toward Rx.
     ///
-    /// `config` has to be valid ([`GuardConfig::is_valid`]); `seed` has to differ from relay to relay and from start to start.
+    /// `None` in `neighbours` is an end of the chain. `config` must be valid ([`GuardConfig::is_valid`]); `seed` must differ from
+    /// relay to relay and from start to start.
     pub fn new(config: GuardConfig, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
         let [upstream, downstream] = neighbours.map(Option::unwrap_or_default);
         let mut jitter = Jitter::new(seed);
@@ -173,7 +172,7 @@ impl Guard {
         }
     }
 
-    /// The chain has agreed that this relay shall be at `place`. It is cut to the box.
+    /// Sets the agreed position, limited to the geofence.
     pub fn commit(&mut self, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
@@ -183,15 +182,15 @@ impl Guard {
         self.owner.association.due = true;
     }
 
-    /// Whether `place` is where the relay is on its way to, or is.
+    /// Returns true if `place`, limited to the geofence, is the current agreed position.
     pub fn is_for(&self, place: Placement) -> bool {
         self.own.target == Some(self.own.config.cut(place))
     }
 
-    /// The flight controller has found that the relay was at `place` at time `at`: when that was measured, not when it was read.
+    /// Takes a position report of the flight controller, measured at time `at`.
     ///
-    /// The first setpoint is a place reported since the start, altitude and side included, even outside the box; nothing farther than
-    /// [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) from the box.
+    /// The first setpoint is a position reported since the start, with altitude and side, even outside of the geofence, but
+    /// within [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
     pub fn position(&mut self, at: Instant, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
@@ -206,10 +205,10 @@ impl Guard {
         }
     }
 
-    /// Whether the relay flies to its setpoints from `now` on; whether that is news. Until this says otherwise it does.
+    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. It is `true` at the start.
     ///
-    /// While it does not there is no setpoint, and both neighbours are told that it may be anywhere. Flown again it begins as after a
-    /// start: with the next place that is reported.
+    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere. Flown again,
+    /// the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;
@@ -225,10 +224,10 @@ impl Guard {
         true
     }
 
-    /// Places are along another line from now on, and what was said of the one before is void: this relay begins as after a start, with the
-    /// first place that is reported once it has stopped. At `now`, or if that is `None` when it was switched on.
+    /// Changes the line: earlier positions and messages are void, and the relay begins as after a start.
     ///
-    /// Who fell silent may hover anywhere beyond where this relay is, as after a start.
+    /// It starts with the first position reported once it has stopped, after `now`, or after the start if that is `None`. Lost
+    /// relays may hover anywhere beyond this relay, as after a start.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
             self.born = self.born.max(now + self.own.config.lag);
@@ -242,12 +241,14 @@ impl Guard {
         self.owner.leave_line(&mut self.jitter);
     }
 
-    /// No setpoint leaves `fence` from now on. Whoever is outside comes back with the next one.
+    /// Changes the geofence. A relay outside of it returns with the next setpoint.
     pub fn set_box(&mut self, fence: Geofence) {
         self.own.config.fence = fence;
     }
 
-    /// What node `from` at `side` says. What is out of range is counted, what is of an earlier association or of another node ignored.
+    /// Handles a message of node `from` at `side`.
+    ///
+    /// A message out of range is counted, one of an earlier association or of another node is ignored.
     pub fn hear(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);
@@ -263,10 +264,10 @@ impl Guard {
         }
     }
 
-    /// From now on `neighbour` is the one at `side`, `None` if the chain ends here. The same one again changes nothing.
+    /// Sets the neighbour at `side`, `None` at the end of the chain; no effect if it is the current one.
     ///
-    /// The one before may still hover: this relay keeps clear of it until [`forget`](Self::forget), or until it, or one between,
-    /// is linked and has spoken.
+    /// The previous neighbour may still hover: this relay keeps clear of it until [`forget`](Self::forget), or until it, or a
+    /// node between, is linked and has sent a message.
     pub fn link(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -280,17 +281,29 @@ impl Guard {
         }
     }
 
-    /// Relays that fell silent at `side` are no longer there: they have landed, or were taken away.
-    pub fn forget(&mut self, side: Side) {
-        match side {
-            Side::Upstream => self.follower.keep_out.clear(),
-            Side::Downstream => self.owner.keep_out.clear(),
+    /// Removes the limits of lost relays at `side`, which have landed or were removed.
+    ///
+    /// `others` states that the chain has more relays at that side. This relay then keeps clear of them, as of a neighbour that it
+    /// has not heard after a start, until it has heard one of them.
+    pub fn forget(&mut self, side: Side, others: bool) {
+        let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
+        let (is_heard, limit_m, keep_out) = match side {
+            Side::Upstream => (
+                self.follower.is_agreed(),
+                low_m,
+                &mut self.follower.keep_out,
+            ),
+            Side::Downstream => (self.owner.is_heard(), high_m, &mut self.owner.keep_out),
+        };
+        keep_out.clear();
+        if others && !is_heard {
+            keep_out.expect(side, limit_m, self.own.config.separation_m);
         }
     }
 
-    /// Moves the setpoint as far as is granted by now, and gives it; `None` before there is a place to go to and a report.
+    /// Moves the setpoint as far as currently granted, and returns it; `None` before there is an agreed position and a report.
     ///
-    /// `now` is when the setpoint is handed on: the relay flies toward it [`GuardConfig::lag`] later.
+    /// `now` is the time at which the setpoint is passed on: the relay flies toward it within [`GuardConfig::lag`].
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.own.target?;
         let Some(before) = self.own.setpoint else {
@@ -320,17 +333,17 @@ impl Guard {
         let mut least = self.follower.least(own);
         let mut most = self.owner.most(own, apart);
         if !own.is_across() {
-            // A relay that has to move across the line goes off from one that fell silent near by.
+            // A relay that has to move across the line first moves away from one that became silent nearby.
             least = least.max(self.follower.keep_out.near_m());
             most = most.min(self.owner.keep_out.near_m());
         }
         let x_m = own.goal_m().max(least).min(most);
-        // Whatever the limits ask for: toward a neighbour only as far as it has granted, back never beyond what was promised.
+        // Independent of requests: toward a neighbour only as far as granted, and back never beyond what was promised.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
         let moves = is_ordered && !own.halted;
         let x_m = if moves { x_m } else { before.x_m };
         let across = if clear && moves { target } else { before };
-        // A relay outside the box comes back as far as its limits allow, and goes no farther out.
+        // A relay outside of the geofence returns as far as its limits allow, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
         let next = own.config.cut_toward(wanted, before);
         let from = own.way_begins(before);
@@ -345,7 +358,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Who has come up to the limit that a lost neighbour leaves is as far from it as it has to be.
+    /// Ends the state near a lost neighbour once this relay has reached the required distance.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
@@ -356,7 +369,7 @@ impl Guard {
             .part(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Whether the chain is to open, which each relay passes on away from whoever needs it.
+    /// Updates the open state of the chain, and forwards requests away from the relay that needs it.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let waits = !clear && !own.is_across();
@@ -375,8 +388,8 @@ impl Guard {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and a neighbour, or its two neighbours, are known not to be in order. Each of the two may be taken to be in
-    /// order with this relay, though only by the error of the reports, and the two may not pass each other.
+    /// Returns true if this relay and a neighbour, or its two neighbours, are known to be out of order. Each neighbour may be in
+    /// order with this relay by the error of the reports only, although the two are not with each other.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -384,7 +397,7 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if this relay is on its own side of both neighbours, by what they told or by the places at which they were reported.
+    /// Returns true if this relay is on its own side of both neighbours, by their messages or by their reported positions.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -400,7 +413,7 @@ impl Guard {
         self.own.halt(halted || !is_ordered, now);
     }
 
-    /// Passes on requests to halt, and returns true if there are any.
+    /// Forwards halt requests; returns true if there are any.
     fn pass_halt(&mut self) -> bool {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         let (upstream, downstream) = (up.requests_halt(), down.requests_halt());
@@ -409,12 +422,12 @@ impl Guard {
         self.disorder || upstream || downstream
     }
 
-    /// Where it is safe to fly, as [`steer`](Self::steer) gave it last.
+    /// Returns the last setpoint of [`steer`](Self::steer).
     pub const fn setpoint(&self) -> Option<Placement> {
         self.own.setpoint
     }
 
-    /// The next thing to tell a neighbour: on which side, to which node, what.
+    /// Returns the next message to a neighbour: its side, its node number and the message.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         for (side, association) in [(Side::Upstream, up), (Side::Downstream, down)] {
@@ -453,7 +466,7 @@ impl Guard {
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
-    /// Has everything told again that may have been lost, and says whether there was anything. To be called every second or so.
+    /// Schedules all messages again that may have been lost; returns true if there are any. Call it about every second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
         self.waits = if begun && !self.is_ordered() {
@@ -467,7 +480,7 @@ impl Guard {
         let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         self.own.age();
-        // A relay that is in no association tells its place less often, unless it moves.
+        // A relay without an association sends its position less often, unless it moves.
         self.reminders = self.reminders.wrapping_add(1);
         let speaks = begun || self.own.has_moved() || self.reminders.is_multiple_of(ALONE_EVERY);
         up.due |= follower && (speaks || up.tells_halt());
@@ -478,7 +491,7 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Whether the setpoint is the agreed place, cut to the box, and the relay was reported to be there since.
+    /// Returns true if the setpoint is the agreed position, limited to the geofence, and the relay was reported there since.
     pub fn is_there(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -493,9 +506,9 @@ impl Guard {
         }
     }
 
-    /// Returns what keeps this relay from its place on `side`, by what was received so far; `None` if nothing does, or no place is agreed.
+    /// Returns the reason that keeps this relay from its position on `side`; `None` if there is none, or no agreed position.
     ///
-    /// While a new agreement spreads it may be about places of the one before. While the relay is not flown only
+    /// While a new agreement spreads it may refer to positions of the previous one. While the relay is not flown only
     /// [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
@@ -521,7 +534,7 @@ impl Guard {
             .or_else(|| self.pending(side))
     }
 
-    /// Returns the reason for a setpoint that has stood for long on its way toward `side`.
+    /// Returns the reason for a setpoint that has not moved toward `side` for long.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {
@@ -540,7 +553,7 @@ impl Guard {
         waits.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
-    /// Inputs that were refused: not a number, or out of range. It stays at its maximum.
+    /// Number of rejected inputs: not a number, or out of range. It saturates.
     pub const fn refused(&self) -> u32 {
         self.refused
     }

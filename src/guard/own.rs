@@ -1,4 +1,4 @@
-//! The relay itself: where it is to be, where it was told to fly, where it may be by now.
+//! State of the relay itself: agreed position, setpoint and reachable positions.
 
 use super::config::GuardConfig;
 use super::reachable::ReachableInterval;
@@ -6,35 +6,31 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Instant;
 
-/// Reminders, of one a second, after which a setpoint that stands short of the agreed place is reported.
+/// Reminders, one per second, after which a setpoint short of the agreed position is reported.
 const MOST_STANDS: u8 = 5;
 
-/// What both fences go by.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
     pub(super) config: GuardConfig,
-    /// The number of its node.
     node: u16,
-    /// Where it was agreed to be, inside the box.
+    /// Agreed position, inside the geofence.
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
-    /// When the setpoint changed across the line.
+    /// Time of the last change of the setpoint across the line.
     turned: Instant,
-    /// Whether it has arrived there across the line.
+    /// True once the relay has arrived there across the line.
     pub(super) still: bool,
-    /// Whether the chain is to open, by what is known here.
+    /// True if the chain is to open, as far as known here.
     pub(super) open: bool,
-    /// True while this relay stays where it is, because it or another one is not in order with its neighbours.
+    /// True while this relay holds its position, because it or another one is not in order with its neighbours.
     pub(super) halted: bool,
-    /// Place reported last.
     pub(super) reported: Option<Placement>,
-    /// Place told last while it was not flown.
+    /// Last position sent while not flown.
     pub(super) told: Placement,
-    /// Reminders since the setpoint changed last.
+    /// Reminders since the last change of the setpoint.
     stands: u8,
-    /// Last setpoint at which this relay arrived, or the one that it began with. It is on its way from there, so it stops no farther
-    /// outside the box than that.
+    /// Last setpoint at which this relay arrived, or its first one. It is on its way from there, so it stops no farther outside.
     left: Placement,
 }
 
@@ -57,7 +53,6 @@ impl Own {
         }
     }
 
-    /// The next setpoint.
     pub(super) fn go(&mut self, setpoint: Placement, now: Instant) {
         if self.across() != setpoint.cross_section() {
             self.turned = now;
@@ -69,7 +64,7 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the place from which this relay goes on: on its way to `setpoint` it may stop as far along x as it was reported.
+    /// Returns the start of the next path: on its way to `setpoint` the relay may stop as far along x as it was reported.
     pub(super) fn way_begins(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -82,13 +77,12 @@ impl Own {
         setpoint.cross_section().at(x_m)
     }
 
-    /// Counts a reminder.
     pub(super) const fn age(&mut self) {
         self.stands = self.stands.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has stood for some reminders although the agreed place is farther on toward `side`, or across the line
-    /// unless this side is `clear` for that.
+    /// Returns true if the setpoint has not moved for some reminders, although the agreed position is farther toward `side`, or
+    /// across the line unless this side is `clear` for that.
     pub(super) fn waits(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -101,7 +95,7 @@ impl Own {
         self.stands >= MOST_STANDS && wants
     }
 
-    /// Returns true if it was reported elsewhere than it has told its neighbours while it is not flown.
+    /// Returns true if the relay, while not flown, was reported away from the position that it has sent.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.told.cross_section())
@@ -109,7 +103,7 @@ impl Own {
         })
     }
 
-    /// It is not flown to its setpoints any more, or again: there is none, and it may be anywhere.
+    /// Clears the setpoint, since the relay is no longer flown to setpoints, or is again; it may be anywhere.
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
@@ -117,7 +111,7 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Halts the relay, or ends that. A relay that halts on its way stops where it was reported last: its own stretch holds that place.
+    /// Starts or ends a halt. A relay that halts on its way stops where it was last reported, which is in its reachable interval.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;
@@ -137,13 +131,12 @@ impl Own {
         }
     }
 
-    /// Begins with the setpoint `place`.
     pub(super) fn begin(&mut self, place: Placement, now: Instant) {
         self.left = place;
         self.go(place, now);
     }
 
-    /// It was at `place` at time `at`: across the line it has arrived if that was long enough after it was told to go there.
+    /// Takes a report; the relay has arrived across the line if `at` is long enough after the last change there.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag
             && self.is_near(place.cross_section(), self.across());
@@ -152,34 +145,31 @@ impl Own {
         }
     }
 
-    /// Whether `is` is `to_be` but for what a relay hovers off.
+    /// Returns true if `is` equals `to_be` within the hover error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
     }
 
-    /// Where it was told to fly across the line.
     pub(super) fn across(&self) -> CrossSection {
         self.setpoint.unwrap_or_default().cross_section()
     }
 
-    /// Whether that is where it is to be.
+    /// Returns true if the setpoint across the line is the agreed one.
     pub(super) fn is_across(&self) -> bool {
         self.target
             .is_none_or(|target| target.cross_section() == self.across())
     }
 
-    /// Where it was agreed to be, m along x.
     pub(super) fn target_m(&self) -> f32 {
         self.target.unwrap_or_default().x_m
     }
 
-    /// Where it is to be for now, m along x.
     pub(super) fn goal_m(&self) -> f32 {
         self.goal_of(self.node, self.target_m())
     }
 
-    /// Where `node` is to be for now that was agreed to be at `target_m`.
+    /// Returns the current goal of `node` along x, m, for its agreed `target_m`.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
             self.config.open_place(node, target_m)
@@ -188,7 +178,7 @@ impl Own {
         }
     }
 
-    /// Whether places with this step between them are closer along x than the separation.
+    /// Returns true if positions with this step are closer along x than the separation.
     pub(super) fn is_close(&self, step_m: f32) -> bool {
         step_m < self.config.separation_m - self.config.rounding()
     }

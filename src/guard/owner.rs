@@ -1,4 +1,4 @@
-//! The fence downstream, which this relay places.
+//! Fence downstream, which this relay places.
 
 use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
@@ -7,29 +7,29 @@ use crate::jitter::Jitter;
 use crate::place::CrossSection;
 use crate::side::Side;
 
-/// This relay's side of the fence toward Rx.
+/// Owner's state of a fence: the one toward Rx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
     /// Number of the newest fence, 0 before the first.
     number: u16,
-    /// Where it is, m; infinite before the first.
+    /// x of the newest fence, m; infinite before the first.
     fence_m: f32,
-    /// How far before it this relay asked to stay, m; infinite for the separation.
+    /// Requested step, m; infinite for the separation.
     asked_m: f32,
-    /// How far it does since the neighbour agreed, where nothing else asks for more.
+    /// Step since the neighbour agreed, m, unless another limit is larger.
     granted_m: f32,
-    /// What the neighbour is counted on to stay at or beyond, m; without end before it has spoken.
+    /// Smallest x at which the neighbour stays for certain, m; negative infinity before its first message.
     counted_m: f32,
-    /// Where it is to be, m.
+    /// Agreed x of the neighbour, m.
     target_m: f32,
-    /// Where it flies across the line, and whether it has arrived there.
+    /// Neighbour's position across the line, and true if it has arrived there.
     across: CrossSection,
     still: bool,
-    /// Whether it has heard of the newest fence.
+    /// True if the neighbour has received the newest fence.
     answered: bool,
-    /// Whether it has cleared the first fence.
+    /// True once the neighbour has cleared the first fence.
     clear: bool,
 }
 
@@ -51,7 +51,7 @@ impl FenceOwner {
         }
     }
 
-    /// Another neighbour, 0 for none.
+    /// Replaces the neighbour; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.disorder();
@@ -60,8 +60,8 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Begins anew; where this relay may go because of the neighbour so far stays as a keep_out, and that is nowhere if it was
-    /// never heard.
+    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`. If that neighbour was never
+    /// heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.is_none() {
@@ -79,8 +79,8 @@ impl FenceOwner {
         };
     }
 
-    /// This relay is not flown any more: it begins anew, and tells the neighbour so. What it had to keep to says nothing of where it is from
-    /// now on.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. Its limits do not apply to
+    /// manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -89,7 +89,7 @@ impl FenceOwner {
         };
     }
 
-    /// Places are along another line: it begins anew, and what it knows of who is lost is that there is somebody.
+    /// Starts a new association along another line; of lost relays it only keeps that there are some.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -98,8 +98,8 @@ impl FenceOwner {
         };
     }
 
-    /// The neighbour is not flown any more: this relay stays where it is toward it. It is otherwise free if the two were known to be in
-    /// order.
+    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it. If the two were in order, it is otherwise
+    /// free.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -112,17 +112,17 @@ impl FenceOwner {
         }
     }
 
-    const fn is_heard(&self) -> bool {
+    pub(super) const fn is_heard(&self) -> bool {
         self.association.heard != 0
     }
 
-    /// Whether nobody is there, or whoever is stands beyond this relay.
+    /// Returns true without a neighbour, or if the neighbour is beyond this relay.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.is_none() || self.is_heard() && self.is_beyond(own))
     }
 
-    /// Returns true if the neighbour downstream has told that it is not beyond this relay, in this association or in none.
+    /// Returns true if the neighbour downstream has reported that it is not beyond this relay, with or without an association.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
@@ -133,11 +133,10 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the neighbour is known to be beyond this relay along x.
-    ///
-    /// Reported places are off by up to `hover_m` each. Before the first fence is cleared, two relays whose reports are nearer than
-    /// that along x are in order only if they may pass each other: the separation apart across the line. A pair that has been in order may
-    /// have moved by that error once more at each of the two since then, each time that one halts or is rebooted.
+    /// Returns true if the neighbour is known to be beyond this relay along x. Each report has an error of up to `hover_m`.
+    /// Before the first fence is cleared, two relays whose reports are closer than that along x are in order only if they may
+    /// pass each other, that is the separation apart across the line. A pair that was in order may since have moved by that error
+    /// once more at each relay, each time that one halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.across(), self.across) <= 0.0;
@@ -149,8 +148,7 @@ impl FenceOwner {
         self.counted_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x at which this relay, or any relay beyond it that is not in order with it but for the error of the reports, may
-    /// be, m.
+    /// Returns the lowest x, m, of this relay and relays beyond it that are in order only by the error of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
@@ -161,14 +159,13 @@ impl FenceOwner {
         }
     }
 
-    /// How far this relay stays from what the neighbour is counted on, m, where the follower has allowed the one upstream `taken_m`.
+    /// Returns this relay's distance from `counted_m`, m; `taken_m` is the distance that the follower allows the relay upstream.
     pub(super) fn apart(&self, own: &Own, taken_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.granted_m.max(separation_m - taken_m).min(separation_m)
     }
 
-    /// How far it is from the one downstream at least, m: nothing is known while one that is lost may be nearer than the separation, or
-    /// before the first fence is cleared.
+    /// Returns the minimum distance to the relay downstream, m; 0 near a lost one, and before the first fence is cleared.
     pub(super) fn kept(&self, own: &Own, taken_m: f32) -> f32 {
         let is_open = self.association.is_none() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -178,7 +175,7 @@ impl FenceOwner {
         }
     }
 
-    /// Whether the places across the line have to stay, since they may keep the two apart.
+    /// Returns true if the positions across the line must not change, because they may separate the two.
     pub(super) fn holds(&self, own: &Own) -> bool {
         self.asked_m.min(self.granted_m) < own.config.separation_m
     }
@@ -194,7 +191,7 @@ impl FenceOwner {
             if self.association.is_left(fence) {
                 self.release(fence.association, own, jitter);
             }
-            // A relay that is in no association needs no answer.
+            // A relay without an association needs no reply.
             self.association.due |= !fence.says(Fence::UNPLACED);
             return;
         }
@@ -231,7 +228,7 @@ impl FenceOwner {
         }
     }
 
-    /// How far this relay may go, m, if it is to stay `apart` from the neighbour.
+    /// Returns the largest allowed x, m, at the distance `apart` from the neighbour.
     #[inline(never)] // called from several places
     pub(super) fn most(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (self.association.is_none(), self.is_beyond(own)) {
@@ -242,28 +239,28 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Whether this relay may move across the line as far as this side is concerned.
+    /// Returns true if this side allows a move across the line.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
         (self.association.is_none() || self.clear) && !self.holds(own) && !self.keep_out.is_near()
     }
 
-    /// Whether the neighbour may have been too near since it was switched on.
+    /// Returns true if the neighbour may have been too close since the start.
     pub(super) const fn is_tight(&self) -> bool {
         self.is_heard() && !self.clear
     }
 
-    /// Whether the two are to be closer along x than the separation.
+    /// Returns true if the agreed positions are closer along x than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.is_heard() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Whether there is nothing that the neighbour still has to hear of, or to do.
+    /// Returns true if the neighbour has received and cleared the newest fence.
     pub(super) fn is_agreed(&self) -> bool {
         self.clear && self.answered && self.counted_m >= self.fence_m
     }
 
-    /// How far before the fence this relay would best stay, m: less than the separation only if both have arrived across the line and
-    /// are to be that close.
+    /// Returns the best step, m. Below the separation only if both have arrived across the line and the agreed positions are that
+    /// close.
     fn best_apart(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -275,15 +272,14 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Where the fence may be best now, m, if there is to be one, and how far this relay would stay before it; and whether it is there
-    /// for good.
+    /// Returns the best current x of the fence, m, its step, and true if that is final; `None` if there may be no fence.
     #[inline(never)] // called from several places
     fn wish(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.is_heard() || !self.is_beyond(own) {
             return None;
         }
         let best = self.best_apart(own);
-        // More than now only if it has come so far.
+        // A larger step only if this relay is already that far away.
         let now_m = self.counted_m - own.reachable.high_m + own.config.rounding();
         let ask = if best > self.granted_m.max(now_m) {
             self.asked_m
@@ -291,15 +287,16 @@ impl FenceOwner {
             best
         };
         let nearest = own.reachable.high_m + self.apart(own, taken_m).max(ask);
+        let nearest = nearest.max(upstream_m + own.config.separation_m);
         if !self.clear {
-            return Some((nearest.max(upstream_m + own.config.separation_m), ask, true));
+            return Some((nearest, ask, true));
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
         let goal = 0.5 * (own.goal_m() + other_m + best);
         Some((goal.max(nearest), ask, goal >= nearest))
     }
 
-    /// After the setpoint has moved: a fence that gets where it stays is told at once, what is under way only when reminded.
+    /// Schedules a message after a move of the setpoint: at once for a final fence, otherwise at the next reminder.
     pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
         if let Some((x_m, ask, last)) = self.wish(own, taken_m, upstream_m) {
             let stays = last || own.reachable.is_still();
@@ -312,7 +309,7 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (ask - asked).abs() > 0.0
     }
 
-    /// What there is to tell. It is here that the fence moves, if it may: what nobody is told costs no number.
+    /// Returns the pending message. The fence only moves here, so that an unsent fence uses no number.
     pub(super) fn tell(
         &mut self,
         own: &Own,

@@ -1,13 +1,12 @@
-//! Where the relay may be along x: on its way between where it was reported and what it was told to fly to.
+//! Reachable interval: the x at which the relay may be between its last report and its setpoints.
 //!
-//! A relay that is told to turn flies on for a while, but never beyond what it was told before: there it could have stopped. So it may
-//! be anywhere between where it was reported and all the setpoints of the [`lag`](GuardConfig::lag) before that report.
+//! A relay that is told to turn flies on for a while, but never beyond its earlier setpoints, where it could have stopped. So it
+//! may be anywhere between its reported x and all setpoints within the [`lag`](GuardConfig::lag) before that report.
 
 use crate::time::Instant;
 
 use super::config::GuardConfig;
 
-/// From one x to another one, m.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Span {
     low_m: f32,
@@ -30,35 +29,31 @@ impl Span {
     }
 }
 
-/// The relay's own stretch, m along x.
+/// Reachable interval of the relay, m along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
-    /// The setpoint.
     pub(super) at_m: f32,
-    /// The low end.
     pub(super) low_m: f32,
-    /// The high end.
     pub(super) high_m: f32,
-    /// When the setpoint became what it is.
+    /// Time of the last change of the setpoint.
     changed: Instant,
-    /// All setpoints since then, and since when.
+    /// Span of all setpoints since `since`.
     late: Span,
     since: Instant,
-    /// Those before that may still have had an effect at the last report.
+    /// Span of earlier setpoints that may still have had an effect at the last report.
     before: Span,
-    /// Of when that was.
     reported: Instant,
-    /// Whether a report has come that the first setpoint had its effect on.
+    /// True once a report shows the effect of the first setpoint.
     known: bool,
 }
 
 impl ReachableInterval {
-    /// Before the first setpoint.
+    /// Returns the interval before the first setpoint.
     pub(super) const fn unknown(now: Instant) -> Self {
         Self::at(0.0, now)
     }
 
-    /// The first setpoint. Until it is in effect, the relay may be on its way to another one of before the start.
+    /// Returns the interval for the first setpoint. Until it takes effect, the relay may be on its way to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             at_m: x_m,
@@ -84,7 +79,7 @@ impl ReachableInterval {
         }
     }
 
-    /// A new setpoint: the relay may go on to the last one for a while, and then turns here.
+    /// Takes a new setpoint: the relay may first fly on toward the last one, and then turn.
     pub(super) fn go(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.at_m).abs() > 0.0 {
             self.at_m = x_m;
@@ -94,7 +89,7 @@ impl ReachableInterval {
         }
     }
 
-    /// A report of time `at`: the relay is between here and what it was told of late.
+    /// Takes a report of time `at`: the relay is between there and its recent setpoints.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
         let hovers = (x_m - self.at_m).abs() <= config.hover_m + config.rounding();
         let here = Span::at(if hovers { self.at_m } else { x_m });
@@ -115,12 +110,11 @@ impl ReachableInterval {
         }
     }
 
-    /// Whether anything can be promised.
     pub(super) const fn is_known(&self) -> bool {
         self.known
     }
 
-    /// Whether the relay has arrived at its setpoint.
+    /// Returns true if the relay has arrived at its setpoint.
     pub(super) fn is_still(&self) -> bool {
         self.known && self.high_m <= self.low_m
     }

@@ -1,4 +1,4 @@
-//! Parameters of a mission as plain numbers: interference, altitudes, what a relay brings along; and the error that names one that is refused.
+//! Parameters of a mission as plain numbers, and the error that names a rejected one.
 
 use crate::channel::Channel;
 use crate::field::Field;
@@ -7,13 +7,13 @@ use crate::place::{CrossSection, Station};
 /// Value of [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Two steps of an f32 just below the distance, as a part of it: relays that all gather at its end still stand apart.
+/// Two f32 steps just below the distance, as a fraction of it: positions this far apart near Rx remain distinct.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// What rounding may take from a step between two places, as a part of the distance.
+/// Maximum rounding error of a step between two positions, as a fraction of the distance.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
-/// The parameters of a mission, as plain numbers; [`Mission::try_new`](crate::Mission::try_new) checks them.
+/// Parameters of a mission; [`Mission::try_new`](crate::Mission::try_new) checks them.
 ///
 /// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
 /// altitude is height above the ground.
@@ -24,29 +24,29 @@ pub struct MissionConfig {
     pub relays: u16,
     /// Distance D from transmitter to receiver, m: 1 to 1e6.
     pub distance_m: f32,
-    /// Least distance between two relays, m: 0 to 1e5.
+    /// Minimum distance between two relays, m: 0 to 1e5.
     pub min_separation_m: f32,
     /// Transmit power of the ground transmitter, W: 1e-6 to 1e6.
     pub tx_power_w: f32,
-    /// What every relay holds that was given nothing of its own.
+    /// Altitude and power of every relay without a profile of its own.
     pub common: Profile,
-    /// The altitudes that methods which choose altitudes may choose from, within 0.1 to 1e5; `common.altitude_m` is one of them.
+    /// Altitudes for methods that choose altitudes, within 0.1 to 1e5; includes `common.altitude_m`.
     pub band: Band,
-    /// The room beside the line that the joint method may use: y within -1e5 to 1e5, 0 among them.
+    /// Lateral range y for the joint method, within -1e5 to 1e5; includes 0.
     pub lateral: Band,
     /// Path loss of the three kinds of link.
     pub channel: Channel,
-    /// What degrades the hops.
+    /// Interference on the hops.
     pub interference: Interference,
-    /// Noise power at the input of every receiver, W: 0 to 1, and at most 1e12 times what of the interferer arrives a metre from it. 0 is
-    /// the paper's receiver; with any other number what is called SIR is the SINR, signal over interference and noise.
+    /// Noise power at the input of every receiver, W: 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
+    /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// How close to the best SIR is close enough, relative: 1e-6 to 0.1.
+    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
 }
 
 impl MissionConfig {
-    /// Whether that many relays are allowed, and fit.
+    /// Checks the number of relays, and that they fit into the distance.
     pub(super) const fn room(&self) -> Result<(), MissionError> {
         if self.relays < 1 || self.relays > MAX_RELAYS {
             return Err(MissionError::Relays);
@@ -59,7 +59,7 @@ impl MissionConfig {
     }
 }
 
-/// Which parameter of a [`MissionConfig`](crate::MissionConfig) was refused, and its range.
+/// Parameter of a [`MissionConfig`](crate::MissionConfig) that is rejected, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -70,7 +70,7 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays, `min_separation_m` (and a rounding of 5e-7 `distance_m`) apart, are longer than `distance_m`.
+    /// The relays with `min_separation_m` (plus a rounding of 5e-7 `distance_m`) between them need more than `distance_m`.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -84,7 +84,7 @@ pub enum MissionError {
     InterfererPower,
     /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
     InterfererPlace,
-    /// `noise_w` is not within 0 to 1, or is above 1e12 times what of the interferer arrives a metre from it.
+    /// `noise_w` is not within 0 to 1, or above 1e12 times the interferer's power received at 1 m.
     Noise,
     /// The crate was built without its feature `field`.
     Field,
@@ -128,52 +128,50 @@ impl core::error::Error for MissionError {}
 pub struct Interferer {
     /// Transmit power, W.
     pub power_w: f32,
-    /// Place along the line from Tx (0) to Rx (D), m; before Tx or beyond Rx too.
+    /// Position along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
     pub x_m: f32,
     /// Distance from that line, m: to its right above 0, to its left below.
     pub y_m: f32,
 }
 
 impl Interferer {
-    /// Whether it is of a power that is taken.
     pub(super) const fn is_powered(&self) -> bool {
         within(self.power_w, 1e-6, 1e9)
     }
 
-    /// Whether it is at a place that is taken.
     pub(super) const fn is_placed(&self) -> bool {
         within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
     }
 
-    /// Whether all its numbers are within their ranges.
+    /// Returns true if all values are within their ranges.
     pub const fn is_valid(&self) -> bool {
         self.is_powered() && self.is_placed()
     }
 }
 
-/// What degrades the hops.
+/// Interference on the hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Interference {
-    /// One transmitter at a known place.
+    /// Single transmitter at a known position.
     Source(Interferer),
-    /// Interference that is only known as a distribution along x.
+    /// Interference that is known as a distribution along x only.
     Field(Field),
-    /// One transmitter, and nobody knows where. Until the relays have found it ([`crate::Settings::listen`]) they spread evenly.
+    /// Single transmitter at an unknown position. Relays spread evenly until they find it ([`crate::Settings::listen`]).
     Unknown,
 }
 
-/// Which way the places of a chain are worked out, one relay after the other, and hence who begins.
+/// Order in which the positions of a chain are computed; it determines the leader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// From relay 1 on: Algorithm 1, where an interferer is known. The SIR of a hop tells where its *receiver* may stand.
+    /// Relay 1 first (Algorithm 1), with an interferer. The SIR of a hop determines the position of its *receiver*.
     TowardRx,
-    /// From relay N on: Algorithm 4, in a field. Where the receiver stands, its interference tells where the *sender* may.
+    /// Relay N first (Algorithm 4), in a field. The interference at the receiver determines the position of the *sender*.
     TowardTx,
 }
 
-/// What a relay may choose from: altitudes, or distances to the side.
+/// Range of altitudes or of lateral offsets that a relay may choose from.
 ///
 /// ```
 /// use uav_relay::Band;
@@ -185,17 +183,17 @@ pub enum Heading {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {
-    /// The lowest, m.
+    /// Lower limit, m.
     pub least_m: f32,
-    /// The highest, m: at least `least_m`.
+    /// Upper limit, m: at least `least_m`.
     pub most_m: f32,
 }
 
 impl Band {
-    /// No room to the side: relays stay in the vertical plane through transmitter and receiver, as in the paper.
+    /// Lateral range 0: relays stay in the vertical plane through transmitter and receiver, as in the paper.
     pub const NONE: Self = Self::at(0.0);
 
-    /// The band that is a single number.
+    /// Returns the band of a single value.
     pub const fn at(at_m: f32) -> Self {
         Self {
             least_m: at_m,
@@ -203,7 +201,7 @@ impl Band {
         }
     }
 
-    /// The number in it that is nearest to `at_m`.
+    /// Returns the value in the band that is nearest to `at_m`.
     pub const fn nearest(self, at_m: f32) -> f32 {
         if at_m >= self.most_m {
             self.most_m
@@ -214,28 +212,28 @@ impl Band {
         }
     }
 
-    /// From the lowest to the highest, m.
+    /// Width of the band, m.
     pub const fn span_m(self) -> f32 {
         self.most_m - self.least_m
     }
 
-    /// Whether there is nothing to choose.
+    /// Returns true if the band has a single value.
     pub const fn is_single(self) -> bool {
         !(self.least_m < self.most_m)
     }
 
-    /// Whether it is a band of altitudes: in order, and within 0.1 to 1e5.
+    /// Returns true if the limits are in order and within 0.1 to 1e5.
     pub(super) const fn is_of_altitudes(self) -> bool {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
     }
 
-    /// Whether it is room beside the line: in order, within -1e5 to 1e5, and the line itself in it.
+    /// Returns true if the limits are in order, within -1e5 to 1e5, and include 0.
     pub(super) const fn is_room_beside(self) -> bool {
         within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
 }
 
-/// What one relay brings along: its altitude and its transmit power.
+/// Altitude and transmit power of one relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Profile {
@@ -246,12 +244,12 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Whether both numbers are within their ranges.
+    /// Returns true if both values are within their ranges.
     pub const fn is_valid(&self) -> bool {
         within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
     }
 
-    /// The relay that flies at this altitude right above the line.
+    /// Returns a relay with this profile right above the line.
     pub const fn on_line(self) -> Station {
         Station {
             at: CrossSection::on_line(self.altitude_m),
@@ -260,7 +258,6 @@ impl Profile {
     }
 }
 
-/// Whether `value` is a number in [`least`, `most`].
 pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
     value >= least && value <= most
 }

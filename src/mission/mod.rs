@@ -1,9 +1,9 @@
 //! The mission: everything the relays agree on before flight, validated once.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `config` | its parameters as plain numbers, and which of them was refused |
-//! | `validated` | a mission whose parameters have been checked, and what follows of them |
+//! | `config` | the parameters as plain numbers, and the error that names a rejected one |
+//! | `validated` | a mission with checked parameters, and quantities derived from them |
 
 mod config;
 #[cfg(test)]

@@ -12,7 +12,6 @@ pub(crate) const fn interferer() -> Interferer {
     }
 }
 
-/// The paper's multi-hop scenario with `relays` relays.
 pub(crate) fn paper(relays: u16) -> MissionConfig {
     MissionConfig {
         relays,
@@ -82,7 +81,7 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
         ),
         (
             |c, v| {
-                // Loud enough that noise of 1 W is no more than a part of it.
+                // Interference strong enough that 1 W of noise is a fraction of it.
                 with_source(c, |source| source.power_w = 1e9);
                 c.noise_w = v;
             },
@@ -132,7 +131,7 @@ fn noise_that_leaves_nothing_of_the_interferer_is_refused() {
         })
         .map(|_| ())
     };
-    // eta is 7e13: 1e12 times what arrives a metre from a microwatt is 1.4e-8 W.
+    // eta is 7e13: 1e12 times the power received at 1 m from a microwatt is 1.4e-8 W.
     assert_eq!(with(1e-8), Ok(()));
     assert_eq!(with(2e-8), Err(MissionError::Noise));
 }

@@ -1,7 +1,6 @@
-//! A mission whose parameters have been checked, and what is asked of it.
+//! Mission with checked parameters, and quantities derived from them.
 //!
-//! Of a mission follow the power ratios of its hops, the least steps between its relays, and a mission with the interference that the relays have
-//! found, or with none known.
+//! Derived are the power ratios of the hops, the minimum steps between relays, and missions for an estimated interferer.
 
 use super::config::{
     FINEST_STEP, Heading, Interference, Interferer, MissionConfig, MissionError, ROUNDING, within,
@@ -12,31 +11,32 @@ use crate::root::sqrt;
 use crate::sensing::belief::{Belief, Spread};
 use crate::wire::digest::digest;
 
-/// A validated mission, with what is derived from it once.
+/// Validated mission, with precomputed derived quantities.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// What a relay's transmit power is worth on a drone-to-drone hop, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
+    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
     /// `Upsilon_max` / `mu_los`.
     pub(super) relay_gain_per_w: f64,
-    /// What it is worth on the last hop, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta. With
-    /// noise, of the interference and the noise at Rx together.
+    /// Gain of a relay on the last hop per watt, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) /
+    /// eta. With noise, of the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// N eta / `p_MSI`, 1/m^2: the noise over what of the interferer arrives at a relay a metre from it; 0 without noise and in a field.
+    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m; 0 without noise and in a field.
     pub(super) noise_at_a_metre: f32,
 }
 
-/// The most that noise may be, as a part of what of the interferer arrives at a relay a metre from it: with more nothing of the
-/// interferer would be left to an f32.
+/// Maximum noise relative to the interferer's power received at 1 m: above it the interferer would be lost in f32 rounding.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
-    /// The most relays a mission may have; addresses on the wire are 12 bits wide.
+    /// Maximum number of relays of a mission; addresses on the wire are 12 bits wide.
     pub const MAX_RELAYS: u16 = super::config::MAX_RELAYS;
 
-    /// Checks every parameter. Usable in a constant, where [`Mission::new`] turns a mistake into a failed build.
+    /// Creates a mission after checking every parameter.
+    ///
+    /// Usable in a constant, where [`Mission::new`] turns an error into a failed build.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -114,7 +114,7 @@ impl Mission {
                 if noise_at_a_metre > MOST_NOISE {
                     return Err(MissionError::Noise);
                 }
-                // I + N at Rx in place of I, as parts of I.
+                // (I + N) / I at Rx.
                 let louder = 1.0 + noise * channel.mu_nlos() * squared / p_msi;
                 (
                     tx_power_w as f64 / p_msi,
@@ -143,10 +143,10 @@ impl Mission {
         })
     }
 
-    /// As [`Mission::try_new`], for a mission that is a constant of the firmware.
+    /// Creates a mission that is a constant of the firmware; otherwise as [`Mission::try_new`].
     ///
-    /// [`Channel::from_db`](crate::Channel::from_db) is no function of a constant; [`Channel::new`](crate::Channel::new), which takes the losses
-    /// as factors, 10^(dB / 10), is:
+    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant; [`Channel::new`](crate::Channel::new), which
+    /// takes the losses as factors, 10^(dB / 10), can:
     ///
     /// ```
     /// use uav_relay::channel::AirGround;
@@ -173,7 +173,7 @@ impl Mission {
     /// assert_eq!(MISSION.relays(), 5);
     /// ```
     ///
-    /// A number out of range is a failed build:
+    /// A value out of range fails the build:
     ///
     /// ```compile_fail,E0080
     /// # use uav_relay::channel::AirGround;
@@ -199,9 +199,8 @@ impl Mission {
     /// # assert_eq!(MISSION.relays(), 0);
     /// ```
     ///
-    /// # Panics
-    /// On a parameter outside its range: in a `const` that is a failed build, which is what this is for. For numbers that
-    /// are only known at run time use [`Mission::try_new`].
+    /// # Panics Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at
+    /// run time use [`Mission::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
@@ -222,14 +221,14 @@ impl Mission {
         }
     }
 
-    /// The parameters as they were given.
+    /// Returns the parameters.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }
 
     /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
     ///
-    /// It detects mistakes, not attacks: two different missions have the same digest once in 65 536.
+    /// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
     pub fn digest(&self) -> u16 {
         digest(self)
     }
@@ -239,12 +238,12 @@ impl Mission {
         self.config.relays
     }
 
-    /// What degrades the hops.
+    /// Interference on the hops.
     pub const fn interference(&self) -> &Interference {
         &self.config.interference
     }
 
-    /// The interferer, where there is one; where nobody knows it, one far away, which is the same everywhere.
+    /// Returns the interferer; `None` in a field. An unknown one is replaced by one far away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -253,7 +252,7 @@ impl Mission {
         }
     }
 
-    /// The field, where there is one.
+    /// Returns the field, if there is one.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
             Interference::Field(field) if cfg!(feature = "field") => Some(field),
@@ -261,7 +260,7 @@ impl Mission {
         }
     }
 
-    /// The field as the receivers hear it, with their noise, where there is one.
+    /// Returns the field with receiver noise, if there is one.
     pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
             Some(field) => Some(field.in_noise(self.config.noise_w)),
@@ -269,13 +268,14 @@ impl Mission {
         }
     }
 
-    /// nu = N eta / `p_MSI`, 1/m^2: the noise over what of the interferer arrives at a relay a metre from it; 0 without noise and in a
-    /// field, whose noise is in its Upsilon.
+    /// nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m.
+    ///
+    /// 0 without noise and in a field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
         self.noise_at_a_metre
     }
 
-    /// Which way the places are worked out.
+    /// Order in which the positions are computed.
     pub const fn heading(&self) -> Heading {
         match self.field() {
             None => Heading::TowardRx,
@@ -283,7 +283,7 @@ impl Mission {
         }
     }
 
-    /// The relay that works out its place first, and begins the passes: 1, or N in a field.
+    /// Relay that computes its position first and starts the passes: 1, or N in a field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -291,7 +291,7 @@ impl Mission {
         }
     }
 
-    /// The relay that comes after `index` on a pass; `None` after the last.
+    /// Returns the relay after `index` in a pass; `None` after the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -300,7 +300,7 @@ impl Mission {
         }
     }
 
-    /// The same mission with another number of relays.
+    /// Returns the same mission with another number of relays.
     ///
     /// # Errors
     /// [`MissionError::Relays`] or [`MissionError::TooManyForDistance`].
@@ -315,7 +315,6 @@ impl Mission {
         }
     }
 
-    /// The same mission, whose relays may stand as close as they like.
     pub(crate) const fn unseparated(&self) -> Self {
         let config = MissionConfig {
             min_separation_m: 0.0,
@@ -326,21 +325,21 @@ impl Mission {
 }
 
 impl Mission {
-    /// What multiplies the inverse interference of a place ([`crate::sir::quiet`]) on the first hop: `p_t` / `p_MSI`, in a field
-    /// `p_t` `Upsilon_max` / eta.
+    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR: `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
+    /// eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// What multiplies it on a hop that a relay of `power_w` watts feeds: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field
-    /// `p_u` `Upsilon_max` / `mu_los`.
+    /// Gain of a hop from a relay of `power_w` watts: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` /
+    /// `mu_los`.
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// K of the last hop, m^2: SIR at the receiver = K / squared distance to the relay of `power_w` watts that feeds it.
+    /// K of the last hop, m^2: the SIR at the receiver is K / squared distance to the relay of `power_w` watts.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -350,12 +349,12 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// What the last hop's K is worth against the first hop's gain, m^2: (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2).
+    /// Last hop's K over the first hop's gain, m^2: (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2).
     pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 
-    /// Power that Tx's signal has at a relay whose squared distance is `squared_m2`, W.
+    /// Received power of Tx's signal at a relay with the squared distance `squared_m2`, W.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -367,8 +366,7 @@ impl Mission {
 }
 
 impl Mission {
-    /// The least step in x between neighbours that are `across_squared` m^2 apart across the line: what keeps the separation
-    /// asked for.
+    /// Returns the minimum step in x that keeps the separation of neighbours `across_squared` m^2 apart across the line.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -377,25 +375,23 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
-    /// The same with room for rounding.
+    /// Returns [`Mission::least_step`] plus a margin for rounding.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// The last place on its way that leaves the relays after `index` room to stand `min_separation_m` apart, m.
-    ///
-    /// `across_squared` is how far apart across the line two neighbours among them may be, m^2: that much they need not be along
-    /// x.
+    /// Returns the last x in pass order that leaves the relays after `index` their minimum separation, m. `across_squared` is the
+    /// maximum squared distance across the line between two neighbours among them, m^2; it reduces the steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// The same where whoever comes after may stand as close as they like.
+    /// Returns the last x in pass order if the relays after `index` need no separation, m.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// How many relays come after `index` on the way of a pass.
+    /// Number of relays after `index` in pass order.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -403,12 +399,12 @@ impl Mission {
         })
     }
 
-    /// The last place of relay `index` toward Rx that leaves those after it their separation, m.
+    /// Returns the largest x of relay `index` that leaves the relays between it and Rx their separation, m.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// The same where those may stand as close as they like.
+    /// Returns the largest x of relay `index` if those relays need no separation, m.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -418,7 +414,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// What a step between two that must be `least` apart takes with its rounding, m.
+    /// Returns the minimum step of two relays `least` apart, plus a margin for rounding, m.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {
@@ -437,11 +433,11 @@ impl Mission {
     }
 }
 
-/// A hop half as long as the others.
+/// Gain factor that makes a hop half as long as the others.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// The interferer, where it is known and not one that stands for none.
+    /// Returns the interferer if it is known.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -449,10 +445,10 @@ impl Mission {
         }
     }
 
-    /// The same mission, whose interference is `own` or what is believed instead.
+    /// Returns the mission with the interference of `belief`, or with `own` if that refers to the mission.
     ///
     /// # Errors
-    /// [`MissionError`] where what is believed is out of range.
+    /// [`MissionError`] if the estimated interference is out of range.
     pub(crate) fn believing(
         &self,
         own: Interference,
@@ -486,17 +482,16 @@ impl Mission {
     }
 }
 
-/// What takes the place of an interferer that nobody knows: one so far away that it is the same everywhere, (X - x)^2 + Y^2 to 1e-7.
+/// Substitute for an unknown interferer, so far away that (X - x)^2 + Y^2 is constant to 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,
     y_m: 1e7,
 };
 
-/// One over the square of its distance.
 const FAR_AWAY: f64 = 1e-14;
 
-/// The gains of a mission that knows nothing, of relays of `power_w`: on every hop SIR = (D / d)^2, so that the best places are even ones.
+/// Gains for an unknown interferer with relays of `power_w`: SIR = (D / d)^2 on every hop, so equal hops are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -1,4 +1,4 @@
-//! What a relay is and flies, as every layer is handed it, and what a layer asks of the others.
+//! Shared state that every layer receives, and the effects of a layer on the others.
 
 use super::circulation::Path;
 use super::timing::{longest_lease, tenths};
@@ -17,34 +17,33 @@ use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, between, digest};
 
-/// The relay as a member of its chain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// The mission that it flies, with as many relays as are in the view.
+    /// Active mission, with the number of relays of the view.
     pub(crate) mission: Mission,
-    /// What that mission says of the interference, whatever is believed.
+    /// Interference of the active mission, independent of the current estimate.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
-    /// Its own node number, from 1 next to Tx.
+    /// Node number, from 1 next to Tx.
     pub(crate) node: u16,
-    /// Relays of the mission as it was loaded.
+    /// Number of relays of the mission as loaded before flight.
     pub(crate) all: u16,
-    /// The digest of that.
+    /// Digest of the mission as loaded.
     pub(crate) digest: u16,
-    /// The distance of that, m.
+    /// Distance of the mission as loaded, m.
     #[cfg(feature = "upload")]
     pub(crate) loaded_m: f32,
-    /// The altitudes of that, m.
+    /// Altitudes of the mission as loaded, m.
     #[cfg(feature = "upload")]
     loaded_band: Band,
-    /// The mission that it flies.
+    /// Identifier of the active mission.
     pub(crate) active: MissionId,
-    /// The sites of that, if it has its own: then places are along the line between these.
+    /// Sites of the active mission if it has its own; positions are then along the line between them.
     #[cfg(feature = "upload")]
     sites: Option<Sites>,
-    /// The view accepted last.
+    /// Last accepted view.
     pub(crate) view: ViewId,
-    /// Its place in the view, from 1 next to Tx.
+    /// Index in the view, from 1 next to Tx.
     pub(crate) index: u16,
 }
 
@@ -70,31 +69,31 @@ impl Member {
         }
     }
 
-    /// The sites of the mission that it flies, if it has its own.
+    /// Returns the sites of the active mission, if it has its own.
     #[cfg(feature = "upload")]
     pub(crate) const fn sites(&self) -> Option<Sites> {
         self.sites
     }
 
-    /// What is loaded has none, and nothing else is flown.
+    /// Returns `None`: without uploads no mission has sites of its own.
     #[cfg(not(feature = "upload"))]
     #[expect(clippy::unused_self, reason = "as with uploads")]
     pub(crate) const fn sites(&self) -> Option<Sites> {
         None
     }
 
-    /// It flies a mission between `sites` from now on; whether places are along another line.
+    /// Sets the sites of the active mission; returns true if they differ, so that positions are void.
     #[cfg(feature = "upload")]
     pub(crate) fn fly_between(&mut self, sites: Option<Sites>) -> bool {
         core::mem::replace(&mut self.sites, sites) != sites
     }
 
-    /// The digest of the line that its places are along.
+    /// Returns the digest of the line of this relay's positions.
     pub(crate) fn line(&self) -> u16 {
         between(self.digest, self.sites())
     }
 
-    /// The box that its settings ask for, if they ask for a guard: it goes along with the distance between other sites.
+    /// Returns the configured geofence, if any; it grows with the line of a mission with its own sites.
     #[cfg(feature = "upload")]
     pub(crate) fn geofence(&self) -> Option<Geofence> {
         let mut fence = self.settings.guard?.fence;
@@ -105,11 +104,10 @@ impl Member {
         Some(fence)
     }
 
-    /// Returns what is wrong where a relay that flies `config` could be sent outside of the box of its settings. With sites of its own
-    /// the box is as much longer as the line.
+    /// Checks a mission with `config` against the configured geofence; the error names the limit exceeded.
     ///
-    /// The room of a mission is the same at all relays. So that they decide alike, the box counts without what it was widened by to the
-    /// altitude that this relay alone holds.
+    /// The length of a mission with sites of its own (`sited`) is not limited. All relays must decide alike, so an altitude limit
+    /// that was extended to this relay's own altitude is replaced by that of the loaded mission.
     #[cfg(feature = "upload")]
     pub(crate) fn encloses(&self, config: &MissionConfig, sited: bool) -> Result<(), LineError> {
         let Some(guard) = self.settings.guard else {
@@ -143,7 +141,7 @@ impl Member {
         }
     }
 
-    /// Its place from the leader on, from 1, and how many there are, while nothing was counted.
+    /// Returns the position from the leader, from 1, and the number of relays, before any view change.
     pub(crate) const fn place_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -152,13 +150,13 @@ impl Member {
         (place, self.all)
     }
 
-    /// The digest that passes bear in the view agreed on.
+    /// Returns the digest of passes in the accepted view.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
     }
 }
 
-/// The altitudes of a mission, m: its band, and the one that the relays have in common.
+/// Returns the altitudes of a mission, m: its band, extended to the relays' common altitude.
 #[cfg(feature = "upload")]
 fn altitudes_of(config: &MissionConfig) -> Band {
     let common_m = config.common.altitude_m;
@@ -168,16 +166,16 @@ fn altitudes_of(config: &MissionConfig) -> Band {
     }
 }
 
-/// What every layer is handed.
+/// State that every layer receives.
 #[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// The newest mission that the relay holds.
+    /// Newest mission that this relay has stored.
     pub(crate) latest: MissionId,
-    /// Whether nobody comes after it on a pass.
+    /// True if this relay has no next relay on a pass.
     pub(crate) end: bool,
-    /// For how long what was agreed on may be held elsewhere.
+    /// Remaining time of other relays' leases.
     pub(crate) held: Held,
 }
 
@@ -190,29 +188,26 @@ impl<'a> Context<'a> {
         &self.member.settings
     }
 
-    /// Its place among the relays of the view, 1 next to Tx.
     pub(crate) const fn index(&self) -> u16 {
         self.member.index
     }
 
-    /// The digest that the passes of the view bear.
     pub(crate) const fn digest(&self) -> u16 {
         self.member.pass_digest()
     }
 
-    /// Whether the joint method is asked for, and has something to choose.
+    /// Returns true if the joint method is selected and has a choice of cross-sections.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());
         cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
     }
 
-    /// The longest that anything is held, in tenths of a second.
+    /// Returns the maximum duration of a lease, in tenths of a second.
     pub(crate) fn longest_lease(&self) -> u16 {
         tenths(longest_lease(self.settings()))
     }
 
-    /// Whether passes begin here.
     pub(crate) fn leads(&self) -> bool {
         self.index() == self.mission().leader()
     }
@@ -249,12 +244,12 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Whether a neighbour may stand at `place`.
+    /// Returns true if `place` is between Tx and Rx along x.
     pub(crate) fn is_between(&self, place: Placement) -> bool {
         (0.0..=self.mission().config().distance_m).contains(&place.x_m)
     }
 
-    /// The altitudes that this relay may choose from, when it holds `altitude_m`.
+    /// Returns the allowed altitudes, m, of this relay at `altitude_m`.
     pub(crate) fn band(&self, altitude_m: f32) -> Band {
         if self.settings().hold_altitude {
             Band::at(altitude_m)
@@ -264,60 +259,59 @@ impl<'a> Context<'a> {
     }
 }
 
-/// What a layer asks of the others, or has them know.
+/// Effects of one layer on the others.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Effects {
-    /// A message was of something that is over.
+    /// A stale message was ignored.
     pub(crate) stale: bool,
-    /// A message had come before.
+    /// A duplicate was received.
     pub(crate) repeated: bool,
-    /// A message is sent again for want of an answer.
+    /// A message is retransmitted.
     pub(crate) resent: bool,
-    /// A pass, or a proposal, begins here.
+    /// A pass or a proposal starts at this relay.
     pub(crate) began: bool,
     /// The chain has agreed on a target.
     pub(crate) converged: bool,
-    /// No target can be met.
+    /// The leader has found no feasible target.
     pub(crate) infeasible: bool,
     /// A new view is needed.
     pub(crate) view_needed: bool,
-    /// What was agreed on is not held any more.
+    /// The lease has expired.
     pub(crate) lapsed: bool,
-    /// The neighbour onward, or the one back, was there at that time or later.
+    /// Time at or after which the next relay, or the previous one, was alive.
     pub(crate) heard_onward: Option<Instant>,
     pub(crate) heard_back: Option<Instant>,
-    /// A proposal is under way: no pass goes on until it is decided.
+    /// A proposal is outstanding, and no pass continues before its decision.
     pub(crate) view_proposed: bool,
-    /// It came from the neighbour before, or begins here.
+    /// Origin of that proposal.
     pub(crate) proposed_by: Option<Proposer>,
-    /// The neighbour toward the leader is to be asked for a view.
+    /// A request for a view is due to the neighbour toward the leader.
     pub(crate) ask: bool,
-    /// What came of a proposal.
     pub(crate) decided: Option<Decided>,
-    /// Something else is believed of the interference.
+    /// The interference estimate has changed.
     pub(crate) believes: bool,
-    /// What is heard of it is not of one source.
+    /// The measurements do not fit a single source.
     pub(crate) unclear: bool,
-    /// The node that hears something else than all the others.
+    /// Node whose measurements do not fit those of the others.
     pub(crate) off: Option<u16>,
 }
 
-/// What came of a proposal.
+/// Decision on a proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Decided {
-    /// The view proposed, of so many relays; its places are not to be taken for so many tenths of a second.
+    /// Accepted: a view of `relays` relays, whose positions may be used in `lease_left` tenths of a second.
     Granted { relays: u16, lease_left: u16 },
-    /// An earlier view, of others perhaps: the next one follows it.
+    /// Superseded: an earlier view was decided, which the leader's next proposal follows.
     Earlier,
-    /// They are too few.
+    /// Rejected: no quorum.
     Refused,
 }
 
-/// Who hands a proposal to a relay.
+/// Origin of a proposal at this relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Proposer {
     Itself,
@@ -350,7 +344,7 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// It cannot be taken part in: a new view is needed.
+    /// Effects of a message that cannot be joined: a new view is needed.
     pub(crate) const FOREIGN: Self = Self {
         stale: true,
         view_needed: true,

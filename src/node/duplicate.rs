@@ -1,56 +1,56 @@
 //! Duplicate index: another node uses this relay's node number, and at most one of the two may have a setpoint.
 //!
-//! Each start has a *claim number*, drawn from the seed of `Relay::new`: 30 bits. Without a key it is sent in a Claim to a neighbour; the
-//! other node with this number receives that directly, or as the neighbour's echo. It names the claim
-//! number that its sender has received last: only a claim that names this relay's is known not to be from before this relay was switched on.
-//! With a key the claim number is where the lower half of
-//! the nonces begins: handshakes carry it, and neighbours show the largest nonce that they have received. Of two claims the larger epoch is
-//! the larger, then the larger claim number. A relay is *active* or *passive*: a passive relay has no setpoint, takes part in nothing and
-//! sends nothing but claims.
+//! Each start has a 30-bit *claim number*, drawn from the seed of `Relay::new`. Without a key it is sent in a Claim message to a
+//! neighbour; the other node with this index receives the claim directly, or as the neighbour's echo. A claim names the claim
+//! number that its sender has received last: only a claim that names this relay's number is known to have been sent after this
+//! relay's start. With a key, the lower half of the nonces starts at the claim number: handshakes carry it, and neighbours show
+//! the largest nonce that they have received. The larger epoch makes the larger claim, then the larger claim number. A relay is
+//! *active* or *passive*: a passive relay has no setpoint, takes part in nothing and sends only claims.
 //!
 //! | state | event | action | next state |
 //! | --- | --- | --- | --- |
-//! | any | own claim, or a frame with a tag of its own, received | none: an echo of its own radio | same |
+//! | any | own claim, or frame with a tag of its own, received | none: an echo of its own radio | same |
 //! | any | claim of another node received, the first for twice `dead_after` | `Event::IndexTaken` | same |
-//! | active | other frame under its own number, no key | send a claim, and 8 more every four `hop_time`; an echo of its own was received within `probe_after`: none | active |
+//! | active | other frame with its own index received, no key | send a claim, and 8 more every four `hop_time`; none if an echo of its own was received within `probe_after` | active |
 //! | active | smaller claim, or one that does not name its own | send a claim, and 32 more every four `hop_time` while the other node is not known to be passive | active |
 //! | active | claim of a passive node | send a claim | active |
-//! | active | larger claim of the same epoch, it has held a place since before it first received the other node, and its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
-//! | active | larger claim otherwise | discard its agreed place | passive |
-//! | active | 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after`, on links, no key | send a claim | active |
+//! | active | larger claim of the same epoch; it has held a position since before it first received the other node; its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
+//! | active | larger claim otherwise | drop its agreed position | passive |
+//! | active | on links, no key: 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after` | send a claim | active |
+//! | active | on a shared channel, with a key: one message of each lease renewal sent | send a handshake after it | active |
 //! | passive | every quarter of `probe_after`, no key | send a claim with the flag passive | passive |
-//! | active, on a shared channel, with a key | one message of each pulse sent | send a handshake after it | active |
-//! | passive | claim of an active node, or other frame under its own number | restart the timer | passive |
-//! | passive | handshake of a neighbour that shows the nonce of the other node | none: the neighbour may not know yet that it is gone | passive |
-//! | passive | timer of twice `dead_after`, and up to an eighth more by chance, expired | leave the view; ask for another one | active |
-//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; leave the view; ask for another one | active |
+//! | passive | claim of an active node, or other frame with its own index received | restart the timer | passive |
+//! | passive | handshake of a neighbour that shows the nonce of the other node | none: the neighbour may not know yet that the node is gone | passive |
+//! | passive | timer of twice `dead_after`, and a random part of up to an eighth more, expired | leave the view; request a new one | active |
+//! | passive | its firmware reports that the other node is gone | raise its claim number above the other one; leave the view; request a new one | active |
 //!
 //! Claims are sent at most once in four `hop_time`.
 //!
 //! # Safety
+//! A relay becomes passive as soon as it receives a larger claim, and the order of claims is total. If two active nodes exchange
+//! claims, the one with the smaller claim therefore becomes passive, unless it raises its claim number; since it does so only
+//! once, the exchange ends after three claims. Only a relay that had a position before it first received the other node raises
+//! its number. It therefore keeps its position when a copy of it is switched on later, although that copy may have been placed in
+//! a new view meanwhile.
 //!
-//! A relay becomes passive as soon as it receives a larger claim, and the order of claims is total. Of two active nodes that exchange claims
-//! the one with the smaller claim thus becomes passive, unless it raises its claim number; since it does so once, the exchange ends after
-//! three claims. Only a relay that had a place before it first received the other node raises it, so it keeps its place when a copy of it
-//! is switched on later, although that copy may have been placed in a new view meanwhile.
+//! With a key, only a handshake with the right tag counts as a claim, and no other frame with this relay's index is answered. A
+//! replayed handshake has no effect: one of this relay has an older epoch or its own claim number, and one of another node is
+//! still true or superseded by a larger claim. A message with its own index cannot be verified, because its tag covers nonces
+//! that only its two ends know: it raises the event and restarts the timer of a passive relay, but makes no relay passive. The
+//! neighbours apply the same order: they accept the larger nonce, and show it to the node that sends the smaller one. Once the
+//! node of the larger nonce has been silent for `dead_after` they forget it, and accept the next one.
 //!
-//! With a key, only a handshake with the right tag counts as a claim, and nothing else that bears this relay's number is answered. A recorded
-//! handshake has no effect: those of this relay have an older epoch or its own claim number, and those of another node are true or have been
-//! overtaken by a larger claim. A message under its own number cannot be checked, because its tag covers nonces that only its two ends
-//! know: it raises the event and restarts the timer of a passive relay, and makes no relay passive.
-//! The neighbours apply the same order: they believe the larger nonce, and show it to the node that sends the smaller one. Once the node of the
-//! larger nonce is silent for `dead_after` they forget it, and believe the next one.
-//!
-//! Two nodes with one number can call views of one identifier, for different members. So a relay that becomes active takes nothing of its
-//! view, its lease and its proposal along, as after a restart with the record of its votes; no relay takes part in a pulse before it has
-//! agreed on its place in the view; and a decision that does not follow the views that a relay knows makes it ask for a later one.
+//! Two nodes with one index can propose views with the same identifier for different members. Therefore a relay that becomes
+//! active drops its view, lease and proposal, as after a restart with its vote record; no relay takes part in a lease renewal
+//! before it has agreed on its position in the view; and a decision that does not follow the views known to a relay makes it
+//! request a later one.
 
 use crate::jitter::Jitter;
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant};
 use crate::wire::message::Claim;
 
-/// What a frame under this relay's own number says of its sender.
+/// Sender of a frame that bears this relay's own index.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
     /// The frame is this relay's own.
@@ -64,74 +64,74 @@ pub(crate) enum Sender {
 /// The claim of another node to this relay's number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
-    /// Claim number.
     pub(crate) number: u32,
-    /// True if it is of a newer epoch than this relay, else it is of the same.
+    /// True if it is of a newer epoch than this relay; false if it is of the same epoch.
     pub(crate) newer_epoch: bool,
     /// True if its sender is passive.
     pub(crate) passive: bool,
-    /// True if it was made since this relay was switched on: it names this relay's claim, or a key proves it.
+    /// True if it was sent after this relay's start: it names this relay's claim, or a key proves it.
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a lease sets in its claim number to keep its place.
+/// Bit that a relay with a lease sets in its claim number to keep its position.
 pub(crate) const RAISED: u32 = 1 << 31;
 
-/// Time from the start to the first claim; each interval is twice the one before.
+/// Time from the start to the first claim; each further interval is twice the previous one.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start to the claims that nothing else causes: a hundred relays have agreed by `align` by then.
+/// Time from the start to the first unprompted claims: by then, a hundred relays have agreed by `align`.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Longest of these intervals.
+/// Maximum interval between unprompted claims, before they continue every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Claims after a claim of an active node, [`least_interval`] apart.
+/// Number of claims after a claim of an active node, [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Claims after another frame under this relay's number, as far apart.
+/// Number of claims after another frame with this relay's index, [`least_interval`] apart.
 const QUESTIONS: u8 = 8;
 
-/// Least time from one claim to the next: those of two relays and their echoes leave a channel room for other frames.
+/// Returns the minimum interval between claims: the claims of two relays and their echoes leave room on the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Time from one claim of a passive relay to the next: many fit into the time after which it becomes active.
+/// Returns the interval between claims of a passive relay: many fit into the time after which it becomes active.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
 
-/// Claims of this relay to its number, and what is known of another node that uses it.
+/// Claims of this relay to its index, and the other node that uses it.
 #[derive(Clone, Debug)]
 pub(crate) struct DuplicateIndex {
     number: u32,
     /// Largest claim number of another node of this epoch.
     rival: u32,
-    /// The one received last.
+    /// Claim number received last.
     heard: u32,
-    /// Time when another node with this number was received last, and whether this relay had a place when it was received first.
+    /// Time when another node with this index was received last, and true if this relay had a position when it was received
+    /// first.
     contest: Option<(Instant, bool)>,
-    /// Times when a duplicate of its own index, and of a neighbour's, was last observed.
+    /// Times when a duplicate of the own index, and of a neighbour's, was last observed.
     observed: [Option<Instant>; 2],
     /// Time when this relay last received a frame of its own.
     echoed: Option<Instant>,
     /// Time when a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim that nothing else causes, and the interval that follows it.
+    /// Time of the next unprompted claim, and the interval that follows it.
     next_claim: Option<Instant>,
     interval: Duration,
-    /// Claims left that are sent because of an active node of this number.
+    /// Remaining claims because of an active node with this index.
     defences: u8,
-    /// Time before which no other claim is sent.
+    /// Earliest time of the next claim.
     quiet_until: Instant,
     claim_due: bool,
-    /// True once new sessions are due, with the present claim number.
+    /// True once new sessions are due, with the current claim number.
     sessions_due: bool,
     jitter: Jitter,
 }
 
-/// Whose index is used by two nodes.
+/// Index that two nodes use.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Duplicated {
     Own,
@@ -162,12 +162,11 @@ impl DuplicateIndex {
         duplicate
     }
 
-    /// Claim number of this relay.
     pub(crate) const fn number(&self) -> u32 {
         self.number
     }
 
-    /// Records that an index is used by two nodes; returns true if that should be reported.
+    /// Records that two nodes use an index; returns true if that should be reported.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -183,7 +182,7 @@ impl DuplicateIndex {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
-    /// Returns whose claim to this relay's number `claim` is.
+    /// Returns the sender of `claim` to this relay's index.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         if claim.number | RAISED == self.number | RAISED {
             return Sender::Itself;
@@ -196,12 +195,11 @@ impl DuplicateIndex {
         })
     }
 
-    /// Claim number of another node that was received last; 0 for none.
     pub(crate) const fn heard(&self) -> u32 {
         self.heard
     }
 
-    /// Returns true if this relay had a place before it received the other node, which it receives now.
+    /// Returns true if this relay had a position before it received the other node, which it receives now.
     fn held_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -210,7 +208,7 @@ impl DuplicateIndex {
         held && has_lease
     }
 
-    /// Handles a frame under this relay's number; returns true if the relay becomes passive.
+    /// Handles a frame with this relay's index; returns true if the relay becomes passive.
     pub(crate) fn hear(
         &mut self,
         now: Instant,
@@ -269,7 +267,7 @@ impl DuplicateIndex {
             self.sessions_due = true;
             self.defend(now, rival, settings);
             if settings.auth.is_some() {
-                // No frame that is played back has this effect again.
+                // A replayed frame does not have this effect again.
                 self.defences = QUESTIONS;
                 self.announce(now, settings);
             }
@@ -282,7 +280,7 @@ impl DuplicateIndex {
         true
     }
 
-    /// Schedules a claim unless one was sent just now.
+    /// Schedules a claim unless one was sent recently.
     fn claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);
@@ -306,9 +304,8 @@ impl DuplicateIndex {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Begins the claims that nothing else causes, without a key, and those of a defence.
-    ///
-    /// On one channel for all, which every unasked frame loads, the other node is received directly, by whatever it sends.
+    /// Starts the unprompted claims on links without a key, and those of a defence. On a shared channel, which every unprompted
+    /// frame loads, the other node is received directly, by whatever it sends.
     fn announce(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -325,7 +322,7 @@ impl DuplicateIndex {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns the claim number that all sessions have to begin anew with, if they have to.
+    /// Returns the claim number with which all sessions must restart, if that is due.
     #[cfg(feature = "auth")]
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
@@ -363,7 +360,7 @@ impl DuplicateIndex {
         self.announce(now + AFTER_START, settings);
     }
 
-    /// Forgets the other node, which is gone; returns true if the relay becomes active.
+    /// Removes the other node, which is gone; returns true if the relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {
@@ -411,7 +408,7 @@ mod tests {
         }
     }
 
-    /// A claim that was on its way when the relay was switched off and on is of its last start: nothing has answered this one.
+    /// A claim that was sent before this relay's restart names its previous claim number, so it does not answer this start.
     #[test]
     fn a_claim_that_does_not_answer_this_start_is_answered_and_has_no_other_effect() {
         let settings = Settings::default();
@@ -427,7 +424,7 @@ mod tests {
             assert!(!duplicate.hear(at(1), sender, has_lease, &settings));
             assert!(duplicate.poll_claim() && !duplicate.is_passive());
             assert_eq!((duplicate.number(), duplicate.heard()), (own, own + 9));
-            // Its sender is there, and answers.
+            // Its sender is present and answers.
             let answer = Claim {
                 heard: own,
                 ..before
@@ -440,7 +437,7 @@ mod tests {
         }
     }
 
-    /// The rows of the state table for claims: of every order, lease, epoch and state of the other node.
+    /// Checks the rows of the state table for claims: every order, lease, epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();
@@ -479,7 +476,7 @@ mod tests {
         }
     }
 
-    /// Two relays that hold a lease, whichever has the larger claim, come to one that is active within three claims.
+    /// Checks that of two relays that hold a lease only one is active after at most three claims.
     #[test]
     fn a_relay_that_was_placed_after_it_received_the_other_one_does_not_raise_its_claim() {
         let settings = Settings::default();
@@ -574,7 +571,7 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// One that has heard of an active node claims its number for four seconds, or until that is passive.
+    /// Checks that a relay claims its index for four seconds after a claim of an active node, or until that node is passive.
     #[test]
     fn a_number_is_defended_for_four_seconds_or_until_the_other_is_passive() {
         let settings = Settings::default();
@@ -608,7 +605,7 @@ mod tests {
         assert!(duplicate.hear(at(0), Sender::Rival(larger), false, &settings));
         assert!(!duplicate.hear(at(20), Sender::Unknown, false, &settings));
         assert!(!duplicate.hear(at(40), Sender::Rival(larger), false, &settings));
-        // A passive node keeps nobody passive.
+        // A passive node keeps no other node passive.
         let passive = Rival {
             passive: true,
             ..larger

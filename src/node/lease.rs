@@ -1,28 +1,32 @@
-//! The lease of a view: how long a relay may hold what was agreed on, by its own clock, before the others may fly something else.
+//! Lease: how long a relay may rely on the last agreement, by its own clock.
 //!
-//! From the first agreement on the leader sends a *pulse* through the view, again and again. It goes onward to the last relay and back; one
-//! that has come back to the leader is over, and only then the next one begins. So the next one is the proof that all took part in the one
-//! before, and renews the lease.
+//! A partitioned relay must stop using an agreement before the rest of the chain can adopt another one. Each view therefore has a
+//! lease. After the first agreement the leader sends renewals: a `Pulse` message is forwarded to the last relay, the reply
+//! `Pulsed` travels back, and only then the next renewal is sent. Renewal n + 1 therefore proves that every member took part in
+//! renewal n, and extends the lease.
 //!
-//! | who | what happens | what it does |
+//! | role | event | action |
 //! | --- | --- | --- |
-//! | leader | it is time, and none is under way | a pulse: hand it on |
-//! | any | a pulse, while this relay has agreed on no place in the view | ask for a new view |
-//! | any | the next pulse | the lease counts from when it handed on the one before; hand it on |
-//! | any | the first ones, each with more than twice the span of the one before | no lease yet: it would not last until the one after |
-//! | any | the same again | say whether it has come back |
-//! | last | a pulse | it has come back: say so |
-//! | any | it has come back | say so; at the leader the lease counts from when it began, and the next one is due after a period |
-//! | any | the lease has run out | ask for a new view, and hold nothing that was agreed on |
+//! | leader | renewal due, none outstanding | send the next renewal |
+//! | any | renewal received, but no position agreed on in this view | request a new view |
+//! | any | next renewal received | extend the lease, counted from the forwarding of the previous renewal; forward it |
+//! | any | next renewal, no lease yet, span more than doubled | grant no lease: it would expire before the next renewal |
+//! | any | duplicate renewal received | reply whether it has completed |
+//! | last | renewal received | reply: completed |
+//! | any | completion received | forward it; at the leader: extend the lease from the start of this renewal, schedule the next one |
+//! | any | lease expired | drop the agreement; request a new view |
 //!
-//! *Why it is safe.* Let all have taken part in pulse n, and relay r have handed it on at t: r holds the view until t + span. Any other
-//! relay q said that pulse n had come back not before t: nearer to the leader after r said so, farther from it after r had handed it on.
-//! Who votes for a view without members of this one says until when they may hold it, span after it last said so; that is never
-//! before r lets go.
+//! # Safety
+//! No relay uses an old agreement once positions of a later view may be used. Suppose that every member took part in renewal n
+//! and that relay r forwarded it at time t: r relies on the agreement until t + span. Every other member reports the completion
+//! no earlier than t: members closer to the leader after r has replied, members farther away after r has forwarded. A member that
+//! votes for a view without r states when the last lease that it vouched for expires: span after its own last report, which is
+//! never before r's expiry.
 //!
-//! The span is `dead_after`, or three times as long as a pulse took lately and two periods, at most eight times `dead_after`: where many
-//! frames are lost a silence says less. The period from one to the next is half of `probe_after`, or twice as
-//! long as a pulse takes, up to a quarter of `dead_after`.
+//! # Timing
+//! The span is three round trips plus two periods, at least `dead_after` and at most eight times `dead_after`: on a lossy channel
+//! a silence is weaker evidence. The renewal period is the larger of half of `probe_after` and two round trips; the latter count
+//! for at most a quarter of `dead_after`.
 
 use super::circulation::{Circulation, Reply};
 use super::context::{Context, Effects};
@@ -33,39 +37,37 @@ use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::message::{Message, Pulse, Pulsed};
 
-/// Of a lease.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// Nothing has been agreed on in this view, or not all know it yet.
+    /// State without an agreement in this view, or with one that is not known to all members.
     Open,
     Until(Instant),
     Lapsed,
 }
 
-/// The last pulse that a relay took part in.
+/// Last renewal that this relay took part in.
 #[derive(Clone, Copy, Debug)]
 struct Current {
     number: u16,
-    /// In tenths of a second.
+    /// Duration of the lease, in tenths of a second.
     span: u16,
 }
 
-/// The lease of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Until when others may count on this relay.
+    /// Time until which other members may rely on this relay.
     relied_on: Instant,
-    /// The view accepted last, and until when its places are not to be taken, once all have accepted it.
+    /// Last accepted view, and the earliest time at which its positions may be used.
     rest: (ViewId, Instant),
-    /// Until when members of views before may hold what was agreed on there, as far as that is known.
+    /// Latest possible expiry of a lease granted before the accepted view; `None` if unknown.
     bound: Option<Instant>,
-    /// True once all relays of the view are known to have accepted it, or to have taken part in a pulse.
+    /// True once all relays of the view are known to have accepted it, or to have taken part in a renewal.
     is_whole: bool,
-    /// True once this relay has agreed on its place in this view.
+    /// True once this relay has agreed on its position in this view.
     is_agreed: bool,
-    /// At the leader: when the next pulse begins, and how long they took lately.
+    /// Start of the next renewal at the leader, and slowly decaying maximum of recent round trips.
     next_at: Option<Instant>,
     slowest: Duration,
     circulation: Circulation,
@@ -76,7 +78,7 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// A relay that was switched on at `now`: it may have been in a view that it does not remember.
+    /// Creates the lease of a relay that was switched on at `now`; it may have been in a view that it does not remember.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Open,
@@ -92,12 +94,12 @@ impl Lease {
         }
     }
 
-    /// It was in a view before it was switched on: the others may count on it for as long as a lease can take.
+    /// Allows for a view before the restart: other members may rely on this relay for the longest possible lease.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.relied_on = self.relied_on + longest_lease(settings);
     }
 
-    /// Until when this relay may hold what was agreed on; `None` where that is not known, or has run out.
+    /// Returns the lease's expiry time; `None` without a lease or after its expiry.
     pub(crate) const fn until(&self) -> Option<Instant> {
         match self.state {
             LeaseState::Until(at) => Some(at),
@@ -105,18 +107,18 @@ impl Lease {
         }
     }
 
-    /// Whether nothing has been agreed on in this view, as far as is known here.
+    /// Returns true until this relay knows of an agreement in this view.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, LeaseState::Open)
     }
 
-    /// How long a silence has to be until it says something.
+    /// Returns the silence after which a neighbour may be lost: the span of the last renewal, at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let told = self.current.map_or(0, |current| current.span);
         from_tenths(told).max(settings.dead_after)
     }
 
-    /// For how long what was agreed on may be held elsewhere.
+    /// Returns the remaining leases of other members, as far as this relay knows.
     pub(crate) fn held(&self, now: Instant) -> Held {
         Held {
             lease_left: self.relied_on.since(now),
@@ -125,13 +127,11 @@ impl Lease {
         }
     }
 
-    /// `view` is accepted, which follows `base`, and whose places are not to be taken before `rest`.
+    /// Accepts `view`, which follows `base` and whose positions must not be used before `rest`.
     ///
-    /// Members of `base` that have not accepted it yet may hold what was agreed on there, but not for longer than they rely on this relay,
-    /// if it was one of them: without it no more pulses go through.
-    ///
-    /// A pulse that is under way counts as slow only if the view loses no relay (`lost`) and this relay was a member of `base`. A relay that
-    /// was left out of `base` holds a pulse of an older view, whose age is the time for which the relay was away.
+    /// Members of `base` that have not accepted the new view hold a lease for no longer than they rely on this relay, if it was a
+    /// member of `base`: without it no renewal completes. The age of an outstanding renewal counts as a round trip only if the
+    /// view loses no relay (`lost`) and this relay was a member of `base`; otherwise it measures an outage.
     pub(crate) fn renew(
         &mut self,
         now: Instant,
@@ -150,7 +150,7 @@ impl Lease {
         self.leave();
     }
 
-    /// Gives up the lease of the view: nothing is agreed on until this relay agrees on its place in another one.
+    /// Ends the lease: there is no agreement until this relay agrees on its position in another view.
     pub(crate) fn leave(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
@@ -160,10 +160,10 @@ impl Lease {
         self.circulation.withdraw();
     }
 
-    /// All have accepted the view that this relay is in.
+    /// Records that all members have accepted this relay's view.
     pub(crate) fn commit(&mut self) {
         self.bound = Some(self.rest.1);
-        // The view that relays are switched on in was accepted by nobody.
+        // Nobody accepts the initial view: it is configured.
         self.is_whole |= self.rest.0 != ViewId::LOADED;
     }
 
@@ -173,7 +173,7 @@ impl Lease {
         self.is_whole
     }
 
-    /// This relay has agreed on its place in the view. If it leads, all others have, and it begins the pulses.
+    /// Records this relay's agreement in the view. If it leads, all members have agreed, and the first renewal is scheduled.
     pub(crate) fn begin(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
@@ -181,7 +181,7 @@ impl Lease {
         }
     }
 
-    /// A pulse, or what came back of it, of the view that this relay is in, from the neighbour that has it to say.
+    /// Handles a renewal or its reply, received in this relay's view from the neighbour that may send it.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),
@@ -203,21 +203,20 @@ impl Lease {
                     self.grant(context, current, pulse.lease);
                     effects.heard_back = self.circulation.completed_at();
                 }
-                // The leader has begun anew, or this relay was not asked for long.
+                // The leader has restarted, or this relay has missed renewals.
                 2..=0x7FFF => {}
                 _ => return Effects::STALE,
             }
         } else if !self.is_agreed {
-            // Another node with this relay's number has agreed on the place.
+            // Another node with this relay's index has agreed on the position.
             return Effects::FOREIGN;
         }
         self.take(context, pulse.number, pulse.lease);
         effects
     }
 
-    /// All took part in `pulse`; so long ago, perhaps, that the lease has run out since. `next` is the span of the one after.
-    ///
-    /// Where that is more than twice as long, the first ones were too short: the lease would run out before it could be renewed.
+    /// Extends the lease after all members took part in `pulse`, unless that lease has expired already. If `next`, the span of
+    /// the next renewal, is more than twice as long, the first spans were too short: the lease would expire before its renewal.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -242,7 +241,7 @@ impl Lease {
         }
     }
 
-    /// The current pulse has come back from the last relay.
+    /// Completes the current renewal.
     fn finish(&mut self, context: &Context<'_>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
@@ -254,12 +253,13 @@ impl Lease {
         if !context.leads() {
             return;
         }
-        // After a slow one the next one follows soon; where all are slow the channel is left some time for others.
+        // The period counts from the start of a renewal: after a slow one the next one is due at once, but after a pause for
+        // other traffic.
         let period = self.period(context.settings());
-        // The first two follow each other at once: nobody else has a lease before the second.
+        // The second renewal follows at once, because no other member has a lease before it.
         let first = self.state == LeaseState::Open;
         let took = context.now.since(forwarded_at);
-        // A run of lost frames is remembered for a minute or two.
+        // The maximum decays by 1/32 per renewal, so a run of lost frames counts for a minute or two.
         let part = self.slowest.as_micros() / 32;
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
@@ -272,12 +272,12 @@ impl Lease {
 
     fn period(&self, settings: &Settings) -> Duration {
         let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
-        // The span that was told last may be the shortest one: several have to fit into it.
+        // The last announced span may be the shortest one: several periods must fit into it.
         let most = Duration::from_micros(settings.dead_after.as_micros() / 4);
         half.max(self.slowest.times(2).min(most)).max(PAUSE)
     }
 
-    /// What the leader gives the others, in tenths of a second.
+    /// Returns the span that the leader announces, in tenths of a second.
     fn given(&self, settings: &Settings) -> u16 {
         let slow = self.slowest.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
@@ -308,7 +308,7 @@ impl Lease {
         }
     }
 
-    /// Does what is due: a pulse at the leader, one more time, or nothing any more.
+    /// Handles the timers: next renewal at the leader, retransmission, expiry of the lease.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
         let hop_time = context.settings().hop_time;
@@ -331,7 +331,7 @@ impl Lease {
         }
     }
 
-    /// What is to be sent onward; it is taken for sent then.
+    /// Returns the renewal to forward, if one is pending, and marks it as sent.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
         let is_due = self.circulation.poll_forward();
         let current = self.current.filter(|_| is_due)?;
@@ -344,7 +344,7 @@ impl Lease {
         }))
     }
 
-    /// What is to be sent back; it is taken for sent then.
+    /// Returns the reply, if one is pending, and marks it as sent.
     pub(crate) fn take_back(&mut self, context: &Context<'_>) -> Option<Message> {
         let reply = self.circulation.poll_reply()?;
         let current = self.current?;
@@ -368,8 +368,8 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Span in tenths of a second that a leader grants after it accepts a view 40 s after an unfinished pulse of view 1. The new view follows
-    /// view `base` and loses no relay.
+    /// Returns the span, in tenths of a second, that a leader announces 40 s after an unfinished renewal of view 1. Just before,
+    /// it has accepted a view that follows view `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

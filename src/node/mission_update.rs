@@ -1,30 +1,31 @@
-//! A newer mission, in flight: who holds it, who is offered it, and when it is flown.
+//! Distribution of a newer mission in flight.
 //!
-//! Any relay next to the ground takes an offer. Neighbours tell each other in every hello which mission they hold; whoever holds
-//! a newer one offers it, and whoever holds a newer one than it flies asks for a view. A proposal names the one mission that the
-//! view is to fly, and only a relay that holds just that one hands it on. So a view that is granted is of relays that hold it
-//! all, durably or not: one that misses the decision, or forgets what it held, can take part in nothing before it flies it, too.
+//! Any relay next to the ground station accepts an offer. Each hello states the mission that its sender has. A relay offers its
+//! mission to a neighbour with an older one, and requests a view if its stored mission is newer than the active one. A proposal
+//! names the mission of the view, and only relays that have exactly that mission forward it. So all members of a granted view
+//! have its mission. A relay that misses the decision, or loses the mission, cannot take part in anything before it flies that
+//! mission too.
 //!
-//! An offer answers a hello: it bears the number of one that the receiver said lately. The number is another one after `dead_after`, and
-//! the one before it is good until then as well, neither for longer than twice `dead_after` after it was last said. So an offer that was
-//! recorded or withheld is worth nothing later, though its tag is right.
+//! An offer contains the number of a recent hello of its receiver. The number changes after `dead_after`; it and the previous one
+//! are valid until twice `dead_after` after their last use. So a recorded or withheld offer is worthless later, although its tag
+//! is right.
 //!
-//! Whoever has an offer to make, and no hello of late that it could answer, says a hello that asks for one. Until the neighbour says that it
-//! holds the mission it is offered it again, first after four hops' time, and less and less often: sixteen times.
+//! A relay with an offer to make, but without a recent hello to answer, sends a hello that requests one. Offers are repeated
+//! until the neighbour reports the mission: first after four hop times, then less and less often, sixteen times.
 //!
-//! | between neighbours | what follows |
+//! | event | action |
 //! | --- | --- |
-//! | a hello of a node that holds an older mission | it is offered the newer one |
-//! | a hello of a node that holds a newer mission | a hello, so that it is offered here |
-//! | an offer of a newer mission | held from now on: `Event::Uploaded`; a hello; an offer to the neighbour on the other side; a request for a view |
-//! | an offer of one that is not newer | a hello |
-//! | an offer of one for which there is no line on earth, or that leaves the relay's own geofence | it is counted; `Event::UploadRefused`, once; from now on hellos name that mission, as refused; a hello |
-//! | a hello that names the mission held, as refused | hellos say so, too, until it is flown or a newer one is held; once a hello to the neighbour on the other side |
-//! | an offer that answers no hello of late | it is counted as stale; a hello, which the next one can answer |
-//! | a proposal is due, and the node after holds an older mission or has not said which | it is offered the newer one first |
-//! | an offer is owed, and the neighbour has said no hello of late | a hello that asks, and the offer answers what comes back |
-//! | a proposal that does not name the mission held | a hello, and no part in it |
-//! | a decision on a view that was granted | its mission is flown: `Event::Adopted` |
+//! | hello received, older mission | offer the newer one |
+//! | hello received, newer mission | reply with a hello, to be offered that mission |
+//! | offer received, newer mission | store it; `Event::Uploaded`; send a hello; offer it to the neighbour on the other side; request a view |
+//! | offer received, mission not newer | reply with a hello |
+//! | offer received, no valid line on earth or outside the relay's own geofence | count it; `Event::UploadRefused` once; state that mission as refused in hellos; reply with a hello |
+//! | hello received, stored mission refused | state the same in hellos, until the mission is flown or a newer one is stored; once send a hello to the other neighbour |
+//! | offer received, answers no recent hello | count it as stale; reply with a hello, which the next offer can answer |
+//! | proposal due, next relay has an older or unknown mission | offer the newer one first |
+//! | offer due, no recent hello of the neighbour | send a hello that requests one; answer that with the offer |
+//! | proposal received, names another mission than the stored one | reply with a hello; do not join |
+//! | decision received, view granted | fly its mission; `Event::Adopted` |
 
 use super::context::Member;
 #[cfg(feature = "upload")]
@@ -45,10 +46,12 @@ use crate::wire::upload::{Upload, UploadError};
 #[cfg(feature = "upload")]
 use crate::{line, sites::Sites};
 
-/// Whether this crate was built to take a newer mission in flight.
+/// True with the feature `upload`; without it uploads are not accepted.
 const UPLOAD: bool = cfg!(feature = "upload");
 
-/// A number that hellos bear, for the offers that answer them; 0 for none.
+/// Number of this relay's hellos, for the offers that answer them, with its first and last use.
+///
+/// The number 0 means none.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, Debug)]
 struct Asked {
@@ -59,7 +62,7 @@ struct Asked {
 
 #[cfg(feature = "upload")]
 impl Asked {
-    /// Whether an offer of that number answers one of the last twice `dead_after`.
+    /// Returns true if `number` equals this number, and a hello used it within the last two `dead_after`.
     fn is(&self, number: u16, now: Instant, settings: &Settings) -> bool {
         number != 0
             && number == self.number
@@ -67,13 +70,13 @@ impl Asked {
     }
 }
 
-/// Offers to the neighbour on one side.
+/// State of the offers to the neighbour on one side.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// When it said a hello last, which an offer answers.
+    /// Time of the neighbour's last hello, which an offer can answer.
     heard: Option<Instant>,
-    /// When it is to be offered the mission again, and how often it has been.
+    /// Time of the next repetition, and number of offers so far.
     at: Option<Instant>,
     tries: u8,
 }
@@ -87,19 +90,19 @@ impl Offering {
     };
 }
 
-/// What became of a mission that was offered.
+/// Result of an offered mission.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
-    /// It is held from now on.
+    /// Stored.
     Held,
-    /// It would be, but there is no line on earth for it; and whether that is new.
+    /// Rejected: no valid line on earth, or outside the geofence; `is_new` for the first time.
     Refused { why: LineError, is_new: bool },
-    /// It is not newer, or for other relays.
+    /// Ignored: not newer, or for other relays.
     Passed,
 }
 
-/// Hop times until an offer is made again, and how often it is until they are twice as many; so often in all.
+/// Hop times until the first repetition, offers until the time doubles, and number of repetitions.
 #[cfg(feature = "upload")]
 const OFFER_HOPS: u32 = 4;
 #[cfg(feature = "upload")]
@@ -107,34 +110,33 @@ const OFFERS_AT_A_PACE: u8 = 4;
 #[cfg(feature = "upload")]
 const OFFERS: u8 = 16;
 
-/// What one relay holds.
+/// Missions known to one relay, and its offers to the neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
-    /// The newest mission that it holds.
+    /// Newest stored mission.
     latest: MissionId,
-    /// The same, if it was uploaded.
+    /// Upload of that mission; `None` for the one loaded before flight.
     #[cfg(feature = "upload")]
     upload: Option<Upload>,
-    /// What was refused last, here or by a relay beyond a neighbour.
+    /// Last mission refused by this relay or by one beyond a neighbour.
     #[cfg(feature = "upload")]
     refused: Option<MissionId>,
-    /// The number that hellos bear now, and the one before.
+    /// Current number of this relay's hellos, and the previous one.
     #[cfg(feature = "upload")]
     asked: [Asked; 2],
-    /// Toward Tx and toward Rx.
+    /// Offers toward Tx and toward Rx.
     #[cfg(feature = "upload")]
     offering: [Offering; 2],
     #[cfg(feature = "upload")]
     jitter: Jitter,
 }
 
-/// Whether newer missions are taken in flight: only where frames are signed.
+/// Returns true if uploads are accepted, which requires signed frames.
 pub(crate) const fn takes_uploads(member: &Member) -> bool {
     UPLOAD && member.settings.auth.is_some()
 }
 
 impl MissionUpdate {
-    /// A relay that holds the mission that it was loaded with.
     pub(crate) const fn new(loaded: MissionId, seed: u32, now: Instant) -> Self {
         #[cfg(not(feature = "upload"))]
         let _ = (seed, now);
@@ -163,7 +165,7 @@ impl MissionUpdate {
         self.latest
     }
 
-    /// The mission of that number, if it is the one flown or the one held.
+    /// Returns mission `id` if it is the active or the stored one.
     pub(crate) fn mission_of(&self, member: &Member, id: MissionId) -> Option<Mission> {
         if id == member.active {
             return Some(member.mission);
@@ -183,7 +185,7 @@ impl MissionUpdate {
 
 #[cfg(feature = "upload")]
 impl MissionUpdate {
-    /// The number of a hello that is said now.
+    /// Returns the number for a hello sent now.
     pub(crate) fn ask(&mut self, now: Instant, settings: &Settings) -> u16 {
         let [current, before] = &mut self.asked;
         if now.since(current.first) >= settings.dead_after {
@@ -198,7 +200,6 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Whether an offer of that number answers a hello of late.
     pub(crate) fn asked(&self, answer: u16, now: Instant, settings: &Settings) -> bool {
         self.asked
             .iter()
@@ -213,23 +214,23 @@ impl MissionUpdate {
         }
     }
 
-    /// The neighbour at `side` has said a hello, which an offer may answer.
+    /// Records a hello of the neighbour at `side`, which an offer can answer.
     pub(crate) const fn may_answer(&mut self, side: Side, now: Instant) {
         self.offering(side).heard = Some(now);
     }
 
-    /// Whether it has of late: the number is good for `dead_after` after it was said, and more.
+    /// Returns true if the last hello at `side` is at most half of `dead_after` old: its number is valid.
     pub(crate) fn has_asked(&mut self, side: Side, now: Instant, settings: &Settings) -> bool {
         let heard = self.offering(side).heard;
         heard.is_some_and(|heard| now.since(heard).times(2) <= settings.dead_after)
     }
 
-    /// There is something new to offer the neighbour at `side`, or another neighbour.
+    /// Restarts the repetitions at `side`: there is a new mission or a new neighbour.
     pub(crate) const fn begin_offers(&mut self, side: Side) {
         self.offering(side).tries = 0;
     }
 
-    /// It is offered the mission now, or asked for a hello first.
+    /// Records an offer, or the request for a hello, and starts the timer of the next one.
     pub(crate) fn offered(&mut self, side: Side, now: Instant, settings: &Settings) {
         let tries = self.offering(side).tries;
         let hops = OFFER_HOPS << (tries / OFFERS_AT_A_PACE).min(OFFERS);
@@ -242,12 +243,11 @@ impl MissionUpdate {
         };
     }
 
-    /// The neighbour at `side` has nothing to be offered any more.
     pub(crate) const fn stop_offers(&mut self, side: Side) {
         self.offering(side).at = None;
     }
 
-    /// Whether the neighbour at `side` is to be offered the mission again now.
+    /// Returns true once when the timer of the next offer at `side` has expired.
     pub(crate) fn offers_again(&mut self, side: Side, now: Instant) -> bool {
         let offering = self.offering(side);
         let due = offering.at.is_some_and(|at| at <= now);
@@ -257,24 +257,23 @@ impl MissionUpdate {
         due
     }
 
-    /// When it is.
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
         let [upstream, downstream] = self.offering;
         earliest(upstream.at, downstream.at)
     }
 
-    /// The mission that was refused, if it is one of those that a relay flying `active` could fly next: the one held, or a newer one.
+    /// Returns the refused mission if it is the stored or a newer one, and not `active`.
     pub(crate) fn refused_of(&self, active: MissionId) -> Option<MissionId> {
         self.refused
             .filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// A neighbour says that the mission of that number is refused; returns true where it is the one held, and this is new.
+    /// Records a neighbour's refusal; returns true if it is new and concerns the stored mission.
     pub(crate) fn hear_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refused.replace(refused) != Some(refused)
     }
 
-    /// Holds `upload` from now on, if it is for this relay and newer than what it holds.
+    /// Stores `upload` if it is for this relay and newer than the stored mission.
     pub(crate) fn hold(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
         if id <= self.latest {
@@ -295,7 +294,6 @@ impl MissionUpdate {
         }
     }
 
-    /// The same by the relay's own firmware.
     pub(crate) fn hand_in(&mut self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         if !takes_uploads(member) {
             return Err(UploadError::Unsigned);
@@ -307,7 +305,7 @@ impl MissionUpdate {
         }
     }
 
-    /// A relay that has just been switched on, `untouched` or not, flies `upload`, which it held before: the mission of it.
+    /// Restores `upload` after a start, if the relay is still `untouched`; returns its mission.
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -324,24 +322,23 @@ impl MissionUpdate {
         Ok(mission)
     }
 
-    /// The sites of the mission held, if it has its own.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.upload.and_then(|upload| upload.sites())
     }
 
-    /// The newest mission held, if it was uploaded.
+    /// Returns the stored mission if it is an upload.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         self.upload.as_ref()
     }
 
-    /// What a neighbour that `holds` a mission has to be offered, if it is an older one or it has not said which.
+    /// Returns the upload to offer to a neighbour that `holds` an older or unknown mission.
     pub(crate) fn offer_to(&self, holds: Option<MissionId>) -> Option<Upload> {
         let older = holds.is_none_or(|holds| holds < self.latest);
         self.upload.filter(|_| older)
     }
 }
 
-/// Whether `upload` is for this relay. None is for relays in a field, even if its base has the digest of their mission.
+/// Checks that `upload` is for this relay. Relays in a field accept none, even if the digest of the base matches.
 #[cfg(feature = "upload")]
 fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
     let config = upload.config();
@@ -356,7 +353,7 @@ fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
         .encloses(config, upload.sites().is_some())
         .map_err(UploadError::Line)?;
     match upload.sites() {
-        // Every relay checks that, whether it flies along a line on earth or not: all hold it, or none does.
+        // Relays without a line on earth check it too, so that either all relays store the mission or none.
         Some(sites) => line::check(sites, config.distance_m).map_err(UploadError::Line),
         None if member.settings.sited && is_other => Err(UploadError::Line(LineError::Distance)),
         None => Ok(()),

@@ -1,33 +1,33 @@
-//! The protocol of one relay, on messages and without bytes: what it does with a message, and with silence.
+//! Protocol of one relay, in terms of messages and times, without bytes.
 //!
-//! Five layers, each a machine of its own beside its state table, with the same verbs: `handle` takes a message, `take_...` gives what
-//! there is to send, `handle_timeout` and `next_timeout` keep the time. None knows another: each is handed a `context` and gives back
-//! effects, which `dispatch` passes on.
+//! Each of the five layers is a state machine with a state table and the same verbs: `handle` takes a message, `take_...` returns
+//! a pending message, `handle_timeout` and `next_timeout` handle timers. Layers do not call each other: each receives a `context`
+//! and returns effects, which `dispatch` applies to the others.
 //!
-//! | layer | one idea |
+//! | layer | content |
 //! | --- | --- |
-//! | `neighbour` | which node is taken for the neighbour on each side, and when it counts as lost |
-//! | `view` | the view change: how the chain comes to a new view of who is in it |
-//! | `lease` | how long what was agreed on may be held |
-//! | `mission_update` | a newer mission, in flight |
-//! | `round` | a round of agreement: sweeps, gatherings of the joint method, turns |
+//! | `neighbour` | selection of the neighbour on each side, and detection of its loss |
+//! | `view` | view change: agreement on the members of the chain |
+//! | `lease` | how long a relay may use an agreement |
+//! | `mission_update` | distribution of a newer mission in flight |
+//! | `round` | rounds of agreement on positions: sweeps, profile collection, tokens, sensing |
 //!
-//! | above the layers | |
+//! | above the layers | content |
 //! | --- | --- |
-//! | `dispatch` | [`Node`], which holds the layers: a relay as its facade sees it. Begin there, with `incoming` |
-//! | `duplicate` | another node with this relay's number, and which of the two becomes passive |
-//! | `steering` | the setpoint on its way to the agreed place |
+//! | `dispatch` | [`Node`], which owns the layers, and is a relay as its facade sees it; `incoming` is a good start |
+//! | `duplicate` | detection of another node with the same number, and the choice of the one that becomes passive |
+//! | `steering` | setpoint on the way to the agreed position |
 //!
-//! | below the layers | |
+//! | below the layers | content |
 //! | --- | --- |
-//! | `context` | what a relay is and flies, as every layer is handed it, and what a layer asks of the others |
-//! | `circulation` | a message along the chain and the reply with its result: stages, duplicates, retransmission |
-//! | `numbering` | what a number that is not the expected one means |
-//! | `timing` | what the layers have in common in keeping time |
-//! | [`sample`] | the interference that a relay measures |
+//! | `context` | state that every layer receives, and the effects of a layer |
+//! | `circulation` | message along the chain and the reply with its result: stages, duplicates, retransmission |
+//! | `numbering` | detection of a restarted leader by late message numbers |
+//! | `timing` | durations that several layers share |
+//! | [`sample`] | measurements of a relay |
 //!
-//! A message is answered by setting flags, and what is sent is built from the state when it is asked for, so nothing queues up and a
-//! message sent twice is harmless.
+//! A received message only sets flags, and a pending message is built from the state when it is polled. So there are no queues,
+//! and duplicates are harmless.
 
 mod circulation;
 pub(crate) mod context;

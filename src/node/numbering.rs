@@ -1,16 +1,15 @@
-//! What a number that is not the expected one means.
+//! Counter of late messages in a row, which detects a restarted leader.
 
-/// So many stragglers in a row are none: frames come late twice, a leader that was rebooted insists.
+/// Late messages in a row after which they count as messages of a restarted leader.
 pub(crate) const SUSPICIOUS: u8 = 4;
 
-/// Messages in a row of something that should be over.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stragglers(u8);
 
 impl Stragglers {
     pub(crate) const NONE: Self = Self(0);
 
-    /// One more; whether they are too many to be late ones.
+    /// Counts a late message; returns true if there are too many, and starts again from zero.
     pub(crate) const fn one_more(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;

@@ -1,7 +1,7 @@
-//! The interference that a relay measures where it stands, and when it believes what it has measured.
+//! Measurements of a relay, and the interference that it derives from them at its setpoint.
 //!
-//! Samples are gathered until there are as many as `Settings::measure` asks for; only then is what they say used, and until
-//! as many have come at another place it does not change: within one agreement a relay always says the same.
+//! The estimate is replaced once the number of samples of `Settings::measure` has been taken at a position. Before that the
+//! estimate of the last position is used, so a relay reports the same value during one agreement.
 
 use crate::field::estimate::{Estimate, Estimator};
 use crate::field::is_upsilon;
@@ -10,46 +10,47 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
-/// Whether this crate was built for fields. Without that, no `Settings` with `measure` is taken, and none of the code is reached.
+/// True with the feature `field`; without it `Settings::measure` is rejected, and the code is unreachable.
 const FIELD: bool = cfg!(feature = "field");
 
-/// One measurement.
+/// Measurement of a relay or of a ground end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Received interference power, W.
+    /// Interference power at the setpoint, in a field.
     Interference {
-        /// That power, W: above 0, at most `Measure::i_max_w`.
+        /// Received power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
     },
-    /// The mean interference power that was received at a place on the way or where the drone hovers, over enough time that its
-    /// relative error is that of [`Listen`](crate::settings::Listen): without the signals of the chain itself; with the noise of the receiver,
-    /// which the mission tells (`MissionConfig::noise_w`) and the relay takes off.
+    /// Mean interference power at a position on the way or at the setpoint.
+    ///
+    /// It is averaged until its relative error is that of [`Listen`](crate::settings::Listen). It excludes the signals of the
+    /// chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
-        /// Where the drone was: at most 100 D from the transmitter in each coordinate.
+        /// Position of the drone: at most 100 D from the transmitter in each coordinate.
         at: Placement,
-        /// That power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
+        /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
     },
-    /// The same at the ground transmitter, handed to relay 1, or to any of the first four.
+    /// Mean interference power at the ground transmitter; for relay 1, or any of the first four.
     Transmitter {
-        /// That power, W: 1e-30 to 1e6.
+        /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// The same at the ground receiver, handed to relay N, or to any of the last four: in a view the last relay's counts.
+    /// Mean interference power at the ground receiver, for one of the last four relays; the view's last relay uses it.
     Receiver {
-        /// That power, W: 1e-30 to 1e6.
+        /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// SIR of the first hop, linear, as relay 1 measures it at its setpoint: what Algorithm 4 compares with the target.
+    /// SIR of the first hop, measured by relay 1 at its setpoint; Algorithm 4 compares it with the target.
     FirstHop {
-        /// That SIR, linear, above 0.
+        /// Linear SIR, above 0.
         sir: f32,
     },
 }
 
 impl Sample {
-    /// Whether it is for a relay that listens.
+    /// Returns true for measurements of the interferer, which need `Settings::listen`.
     pub(crate) const fn is_heard(self) -> bool {
         matches!(
             self,
@@ -58,7 +59,7 @@ impl Sample {
     }
 }
 
-/// What a relay has measured.
+/// Interference measured at the setpoint, in a field.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,
@@ -78,7 +79,7 @@ impl Meter {
         }
     }
 
-    /// Takes a sample, of which `at` is where relay 1 stands; whether it was of use.
+    /// Adds a sample; `at` is the setpoint of relay 1. Returns true if it was accepted.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,
@@ -101,13 +102,13 @@ impl Meter {
         let used = estimator.accepted() > before;
         if used && estimator.accepted() == *wanted {
             let upsilon = estimator.estimate().map(|estimate| estimate.upsilon_per_w);
-            // Where nothing can be said, what was agreed is better than what was true elsewhere.
+            // Without a valid estimate the agreed field is better than the estimate of another position.
             self.published = upsilon.filter(|upsilon| is_upsilon(*upsilon));
         }
         used
     }
 
-    /// The relay goes elsewhere: what has been gathered says nothing any more.
+    /// Discards the samples, because the relay moves.
     pub(crate) fn restart(&mut self) {
         if let Some((estimator, _)) = &mut self.estimator {
             estimator.clear();

@@ -1,4 +1,4 @@
-//! The setpoint on its way to the agreed place: with a [guard](crate::guard) as far as is safe by now, without one the place itself.
+//! Setpoint on the way to the agreed position: limited by the [guard](crate::guard), or without a guard the agreed position.
 
 use super::context::Effects;
 #[cfg(feature = "upload")]
@@ -9,30 +9,30 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// How long after the guard has said something it is said again, unless the neighbour is known to have heard it.
+/// Time after which fence messages that may be lost are sent again.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// Whether this crate was built to guard setpoints.
+/// True with the feature `guard`; without it no setpoint is limited.
 const GUARD: bool = cfg!(feature = "guard");
 
-/// What moves the setpoint of one relay.
+/// Setpoint control of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
-    /// The setpoint that the firmware was told of last.
+    /// Setpoint last reported to the firmware.
     told: Option<Placement>,
 }
 
 impl Steering {
-    /// Before it has begun.
+    /// State before [`begin`](Self::begin).
     pub(crate) const NONE: Self = Self {
         guard: None,
         remind_at: None,
         told: None,
     };
 
-    /// With the guard that `settings` ask for, of a relay with these neighbours.
+    /// Creates the guard that `settings` request, for a relay with these `neighbours`.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -49,7 +49,7 @@ impl Steering {
         self.guard.as_mut().filter(|_| GUARD)
     }
 
-    /// Moves the setpoint as far toward `agreed` as it may go by what is known at `now`; whether it has a new value.
+    /// Moves the setpoint toward `agreed` as far as the guard allows at `now`; returns true if it has changed.
     pub(crate) fn steer(&mut self, now: Instant, agreed: Option<Placement>) -> bool {
         if let Some(agreed) = agreed
             && let Some(guard) = self.guard()
@@ -69,7 +69,6 @@ impl Steering {
         changed
     }
 
-    /// Where to fly now.
     pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
         match &self.guard {
             Some(guard) if GUARD => guard.setpoint(),
@@ -77,14 +76,14 @@ impl Steering {
         }
     }
 
-    /// Another node is taken for the neighbour at `side`.
+    /// Sets the neighbour at `side`; `None` at the end of the chain.
     pub(crate) fn link(&mut self, side: Side, neighbour: Option<u16>) {
         if let Some(guard) = self.guard() {
             guard.link(side, neighbour);
         }
     }
 
-    /// What the neighbour `from` at `side` says of the fence between the two.
+    /// Handles a fence message of the neighbour `from` at `side`.
     pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) -> Effects {
         if let Some(guard) = self.guard() {
             guard.hear(side, from, fence);
@@ -92,7 +91,7 @@ impl Steering {
         Effects::NONE
     }
 
-    /// Says again what may have been lost.
+    /// Schedules fence messages again that may be lost.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.remind_at.is_some_and(|at| at <= now) {
             self.remind_at = None;
@@ -103,7 +102,7 @@ impl Steering {
         }
     }
 
-    /// Whether the drone flies to the setpoints from `now` on.
+    /// Sets whether the drone flies to the setpoints from `now` on.
     pub(crate) fn control(&mut self, now: Instant, flown: bool) {
         if let Some(guard) = self.guard()
             && guard.control(now, flown)
@@ -112,7 +111,7 @@ impl Steering {
         }
     }
 
-    /// Places are along another line, since `now` if the drone has flown along the one before.
+    /// Changes the line of the positions at time `now`, or after a start if `None`.
     #[cfg(feature = "upload")]
     pub(crate) fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
@@ -120,7 +119,6 @@ impl Steering {
         }
     }
 
-    /// The box is `fence` from now on.
     #[cfg(feature = "upload")]
     pub(crate) fn set_box(&mut self, fence: Option<Geofence>) {
         if let Some(guard) = self.guard()
@@ -130,26 +128,24 @@ impl Steering {
         }
     }
 
-    /// The drone was at `place` at time `at`.
     pub(crate) fn position(&mut self, at: Instant, place: Placement) {
         if let Some(guard) = self.guard() {
             guard.position(at, place);
         }
     }
 
-    /// Who fell silent at `side` is not in the air any more.
-    pub(crate) fn clear_lost(&mut self, side: Side) {
+    /// Removes the limits of lost relays at `side`; `others` states that the view has more relays there.
+    pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
-            guard.forget(side);
+            guard.forget(side, others);
         }
     }
 
-    /// What keeps the relay from its place at `side`.
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
-    /// What there is to say of a fence: at which side, to which node.
+    /// Returns the next fence message with its side and its destination node.
     pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
         self.guard()?.poll()
     }

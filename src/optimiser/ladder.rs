@@ -1,9 +1,9 @@
-//! The targets of one sweep, in six bytes.
+//! Ladder: the targets of one sweep, encoded in six bytes.
 //!
-//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j - 7|.
-//! So one ladder is dense where the optimum is expected and still spans everything it may be instead. It is laid out from
-//! target 7 both ways, so that rounding gathers at the ends and not where it matters. Every relay works the targets out
-//! from the six bytes with the same f32 operations, hence to the same bits.
+//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j - 7|. So a
+//! ladder is dense near the expected optimum and still spans the whole bracket. It is computed from target 7 in both directions,
+//! so that rounding errors are largest at the ends. Every relay computes the targets from the six bytes with the same f32
+//! operations, hence to the same bits.
 
 use super::PerTarget;
 use crate::root::sqrt;
@@ -11,25 +11,25 @@ use crate::root::sqrt;
 /// Targets in a full ladder.
 pub const TARGETS: usize = 16;
 
-/// Gaps from the middle one to either end of a full ladder, both included.
+/// Number of gaps from the middle one to either end of a full ladder, both included.
 const HALF: usize = TARGETS / 2;
 
 /// Target SIRs (linear, rising), as one target and two one-byte codes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// The target below the middle gap.
+    /// Target below the middle gap.
     anchor: f32,
-    /// The middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120; 0 makes `anchor` the only target.
+    /// Middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120; with 0 `anchor` is the only target.
     gap: u8,
-    /// What each gap is to its inner neighbour: 1 + `growth` / 16.
+    /// Ratio of each gap to its inner neighbour: 1 + `growth` / 16.
     growth: u8,
-    /// Whether the pass is a plain one: nobody holds back.
+    /// True for a plain pass, in which no relay holds back.
     plain: bool,
 }
 
 impl Ladder {
-    /// The one target `target`, above 0: what the last relay finds feasible, it commits.
+    /// Returns the single target `target`, above 0; if the last relay finds it feasible, it commits it.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -39,17 +39,17 @@ impl Ladder {
         }
     }
 
-    /// The same targets, on a pass that is plain or not.
+    /// Returns the same targets for a plain pass or another.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Whether nobody holds back on the pass.
+    /// Returns true for a plain pass, in which no relay holds back.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
 
-    /// Targets with equal ratios, the lowest just below `low` and the highest just above `high`; 0 < `low` < `high`.
+    /// Returns targets with equal ratios, the lowest just below `low` and the highest just above `high`; 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -58,7 +58,7 @@ impl Ladder {
         )
     }
 
-    /// Targets with equal ratios strictly between `low` and `high`, which are known already; 0 < `low` < `high`.
+    /// Returns targets with equal ratios strictly between the known `low` and `high`; 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -67,12 +67,12 @@ impl Ladder {
         )
     }
 
-    /// Targets with `centre` in the middle of a gap of `gap` (relative), growing outward until they span [`low`, `high`].
+    /// Returns targets with `centre` in the middle of a gap of `gap` (relative), growing outward until they span [`low`, `high`].
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
         let spans = |growth: u8| half_span(code, growth) >= wanted;
-        // Bisection for the smallest growth that spans, or the largest there is.
+        // Bisection for the smallest growth that spans the bracket, or the maximum.
         let (mut below, mut growth) = (0_u8, u8::MAX);
         if spans(0) {
             growth = 0;
@@ -97,7 +97,7 @@ impl Ladder {
         }
     }
 
-    /// A ladder from its bytes, if its targets are normal f32s above zero and it could not be written otherwise.
+    /// Decodes a ladder; `None` unless its targets are normal f32s above zero and its encoding is unique.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -106,30 +106,30 @@ impl Ladder {
             plain: false,
         };
         let targets = ladder.targets();
-        // Subnormal targets would make a hop depend on how the processor treats subnormals.
+        // Subnormal targets would make a hop depend on the processor's handling of subnormals.
         let sound = targets.first()? >= &f32::MIN_POSITIVE && targets.last()?.is_finite();
         // A single target has no gaps that could grow.
         let unique = gap != 0 || growth == 0;
         (sound && unique).then_some(ladder)
     }
 
-    /// Anchor, gap code and growth code, as [`Ladder::from_parts`] takes them.
+    /// Returns anchor, gap code and growth code for [`Ladder::from_parts`].
     pub const fn parts(&self) -> (f32, u8, u8) {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Whether this is a single target, which the last relay commits when it is feasible.
+    /// Returns true for a single target, which the last relay commits if it is feasible.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
 
-    /// How many targets there are, 1 or [`TARGETS`].
+    /// Number of targets, 1 or [`TARGETS`].
     #[allow(clippy::len_without_is_empty, reason = "there is always a target")]
     pub const fn len(&self) -> usize {
         if self.is_single() { 1 } else { TARGETS }
     }
 
-    /// The targets, rising.
+    /// Returns the targets, rising.
     pub fn targets(&self) -> PerTarget {
         if self.is_single() {
             return PerTarget::from([self.anchor]);
@@ -152,7 +152,6 @@ impl Ladder {
     }
 }
 
-/// The middle gap and those outward of it.
 fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     let ratio = 1.0 + f32::from(growth) / 16.0;
     let mut next = gap_value(gap);
@@ -163,7 +162,7 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// The ratio of the highest target to the lower of the middle two, and of the higher of those to the lowest target.
+/// Returns the ratio of the highest target to the lower middle one, which is also that of the higher middle one to the lowest.
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -174,17 +173,16 @@ fn geometric_mean(low: f32, high: f32) -> f32 {
     sqrt(low) * sqrt(high)
 }
 
-/// The gap of which `gaps` lead from `low` to `high`.
 fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// The eight bits of `code` put where an f32 has its low exponent and high mantissa bits: (1 + m / 8) 2^(e - 25).
+/// Returns (1 + m / 8) 2^(e - 25): the bits of `code` as low exponent and high mantissa bits of an f32.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// The code whose value is nearest to `gap`, within 1 to 254.
+/// Returns the code whose value is nearest to `gap`, within 1 to 254.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

@@ -1,9 +1,9 @@
-//! Algorithm 2's local search: where one relay, its neighbours standing still, makes the worse of its two hops best.
+//! Algorithm 2's local search: the position of one relay that maximises the worse of its two hops.
 //!
-//! Two ways through the same rectangle, between the neighbours along x and within `explore` of the altitude held. The
-//! paper's is a grid. The other goes from coarse to fine: five altitudes, of which the best and its neighbours bound the next
-//! five; and for each of them the place where the SIR of one hop falls to that of the other is found by halving. Where all
-//! hops are equal, which is what Algorithm 1 leaves, a grid has no point that is better at all, and this has.
+//! It searches the rectangle between the neighbours along x and within `explore` of the current altitude, by one of two methods.
+//! The paper's is a grid. The other goes from coarse to fine: five altitudes, of which the best one and its neighbours bound the
+//! next five; for each altitude the x where the SIRs of both hops are equal is found by bisection. Where all hops are equal, as
+//! after Algorithm 1, a grid has no better point, but this method finds one.
 //!
 //! Accuracy and effect: `host-tests/tests/adjust.rs`.
 
@@ -15,40 +15,39 @@ use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 use crate::sir::{in_noise, square};
 
-/// Altitudes in one round of the search from coarse to fine.
+/// Altitudes in one round of the coarse-to-fine search.
 const ROWS: u8 = 5;
 
-/// Rounds of it: each halves what is searched.
+/// Rounds of the coarse-to-fine search; each halves the range.
 const ROUNDS: u8 = 9;
 
-/// Halvings along x for each altitude.
+/// Bisection steps along x for each altitude.
 const HALVINGS: u8 = 20;
 
-/// What rounding may take from a step, as a part of the place.
 const ROUNDING: f32 = 3e-7;
 
-/// How the rectangle is searched.
+/// Method of the local search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// From coarse to fine: at most 1080 evaluations of both hops.
+    /// Coarse to fine: at most 1080 evaluations of both hops.
     #[default]
     Fine,
     /// The paper's grid, `columns` by `rows` evaluations.
     Grid {
-        /// Places along x, the neighbours' own included, 2 to 255.
+        /// Number of positions along x, including those of the neighbours, 2 to 255.
         columns: u8,
-        /// Altitudes, 2 to 255.
+        /// Number of altitudes, 2 to 255.
         rows: u8,
     },
 }
 
-/// One of the two neighbours, or the ground station in its place.
+/// Neighbour of the relay, or the ground station in its place.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
-    /// Where it stands; at altitude 0 for a ground station.
+    /// Position; at altitude 0 for a ground station.
     pub place: Placement,
-    /// The least distance to it, m; 0 for a ground station.
+    /// Minimum distance to it, m; 0 for a ground station.
     pub apart_m: f32,
 }
 
@@ -57,20 +56,19 @@ pub struct HopEnd {
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// What the power of the node before is worth.
     gain_in: PowerRatio,
-    /// What the relay's own is worth: on a hop to a relay, or K in m^2 to Rx.
+    /// Gain of the relay: for a hop to a relay, or K in m^2 for the hop to Rx.
     gain_out: f32,
     to_rx: bool,
     interferer: Interferer,
     /// nu = N eta / P, 1/m^2: 0 without noise.
     noise: f32,
-    /// What the interference is at the relay after this one, by [`crate::sir::quiet`], m^2.
+    /// Inverse interference at the next relay, by [`crate::sir::quiet`], m^2.
     quiet_after: f32,
 }
 
 impl Hops {
-    /// The hops of a relay of `power_w` watts, fed with `gain_in`; `after` is `None` for relay N.
+    /// Returns the hops of a relay of `power_w` watts that receives with `gain_in`; `after` is `None` for relay N.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -102,7 +100,7 @@ impl Hops {
         }
     }
 
-    /// The SIR of the hop to the relay at `at` and of the one from it, by the very operations of [`crate::sir`].
+    /// Returns the SIRs of the hops to and from the relay at `at`, with the same operations as [`crate::sir`].
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -119,13 +117,13 @@ impl Hops {
         (incoming, outgoing)
     }
 
-    /// The worse of the two: the paper's local SIR.
+    /// Returns the smaller SIR: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
     }
 
-    /// Whether the relay at `at` is between its neighbours, and far enough from both.
+    /// Returns true if the relay at `at` keeps its distance from both neighbours.
     fn is_clear(&self, at: Placement) -> bool {
         let clear = |of: HopEnd| {
             square(at.x_m - of.place.x_m) + square(at.altitude_m - of.place.altitude_m)
@@ -135,33 +133,32 @@ impl Hops {
     }
 }
 
-/// A search under way.
+/// Search in progress.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,
     hops: Hops,
-    /// The altitudes that may be taken.
     bottom_m: f32,
     top_m: f32,
-    /// What is searched now.
+    /// Altitudes of the current round.
     low_m: f32,
     high_m: f32,
     round: u8,
     row: u8,
     column: u8,
-    /// The best row of this round: its altitude and its worse SIR.
+    /// Best row of the current round: its altitude and its worse SIR.
     best_row: (f32, f32),
-    /// The best place so far, if it is better than the one held, and its worse SIR or that of the one held.
+    /// Best position so far if it is better than the current one, and the worse SIR of the better of the two.
     found: Option<Placement>,
     best_sir: f32,
 }
 
 impl LocalSearch {
-    /// A search by a relay at `at`, up to `explore_m` above and below within [`least_m`, `most_m`].
+    /// Starts a search by a relay at `at`, up to `explore_m` above and below within [`band.0`, `band.1`].
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
-        // A relay whose altitude is out of the band by more than that has nowhere to go.
+        // A relay farther than that outside of the band has no allowed altitude.
         let nowhere = !(low_m <= high_m);
         Self {
             how,
@@ -173,15 +170,16 @@ impl LocalSearch {
             round: if nowhere { ROUNDS } else { 0 },
             row: 0,
             column: if nowhere { u8::MAX } else { 0 },
-            // Where no row of a round is allowed this bounds the next: from outside the band it would lead out of it.
+            // If no row of a round is allowed, this altitude bounds the next round; one outside of the band would lead out of it.
             best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
             found: None,
             best_sir: hops.worse(at),
         }
     }
 
-    /// Goes on for at most `budget` evaluations and one row of 24; ready when it is over: where to stand, if that is
-    /// strictly better than where the relay stands.
+    /// Searches for at most `budget` evaluations plus one row of 24.
+    ///
+    /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;
         while left > 0 {
@@ -197,7 +195,7 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Keeps `at` if it is allowed and better than anything before; its worse SIR, or less than any if it is not allowed.
+    /// Records `at` if it is allowed and better than all before; returns its worse SIR, or -1 if it is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
@@ -210,12 +208,12 @@ impl LocalSearch {
         sir
     }
 
-    /// The altitude at `part`, 0 to 1, of what is searched. Rounded, the sum may be above its end, which may be the band's.
+    /// Returns the altitude at `part`, 0 to 1, of the current range; the clamp corrects rounding at the band's end.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// One more row from coarse to fine; the evaluations it took, `None` when there is none left.
+    /// Searches the next row; returns the number of evaluations, `None` after the last row.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -239,11 +237,11 @@ impl LocalSearch {
         Some(u16::from(HALVINGS) + 4)
     }
 
-    /// The best of a row: where, going toward Rx, the hop into the relay stops being the better one.
+    /// Searches a row for the x beyond which the incoming hop is no longer the better one; returns the best worse SIR.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
-            // What is left apart must still be so when the place has been rounded.
+            // The distance must be sufficient after the position has been rounded.
             sqrt(square(of.apart_m) - square(climb)) + ROUNDING * of.place.x_m
         };
         let (before, after) = (self.hops.before, self.hops.after);
@@ -253,7 +251,7 @@ impl LocalSearch {
             return -1.0;
         }
         let at = |x_m| Placement::on_line(x_m, altitude_m);
-        // Past the interferer the hop into the relay may get better with its length: then an end of the row is best.
+        // Beyond the interferer the incoming hop may improve with its length; then an end of the row is best.
         let ends = self.weigh(at(low)).max(self.weigh(at(high)));
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
@@ -267,7 +265,7 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// One more point of the grid, along the altitudes first; `None` when there is none left.
+    /// Evaluates the next point of the grid, altitudes first; `None` after the last one.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -296,7 +294,7 @@ mod tests {
     use crate::place::Placement;
     use crate::power_ratio::PowerRatio;
 
-    /// A relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`, who may go anywhere within the band.
+    /// Returns a search by a relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {
@@ -322,7 +320,7 @@ mod tests {
 
     #[test]
     fn from_outside_the_band_it_ends_in_it_or_stays() {
-        // Once with room in the band, once with room on the way there alone: that is no place to stop at.
+        // First with room in the band, then with room only on the way to it, where the search may not stop.
         for (from_m, beside_m, apart_m, band, ends_m) in [
             (80_000.0, 20.0, 0.0, (20.0, 20.0), Some(20.0)),
             (80_000.0, 20.0, 150.0, (20.0, 20.0), None),

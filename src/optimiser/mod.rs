@@ -1,13 +1,14 @@
-//! The placement maths that flies: pure functions of the mission, no state beyond what they are handed.
+//! Placement algorithms on board: pure functions of the mission without state of their own.
 //!
-//! | for | files |
+//! | purpose | files |
 //! | --- | --- |
-//! | how far one hop reaches for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
-//! | a pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] says which come next; [`plan`] runs all of it for a whole chain without a message |
-//! | places, sides and altitudes together | [`joint`] |
+//! | reach of one hop for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
+//! | pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] selects the next targets;
+//! [`plan`] runs all of it for a whole chain without messages |
+//! | joint optimum of x, y and altitude | [`joint`] |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
 //!
-//! The node walks the same functions one hop a relay.
+//! The node calls the same functions, one hop per relay.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -31,5 +32,5 @@ pub mod spacing;
 pub mod verdict;
 pub(crate) mod walk;
 
-/// Up to one number a target: reaches, slacks or the targets themselves.
+/// Numbers for the targets of a ladder: reaches, slacks or the targets themselves.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

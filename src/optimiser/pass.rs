@@ -1,13 +1,13 @@
-//! One pass of targets along the chain: what each relay makes of what the one before it hands on, how the last one ends it,
-//! and what the verdict that comes back makes of it.
+//! Pass of targets along the chain: each relay's reaches, the last relay's verdict, and the positions on the way back.
 //!
-//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest place that still hears the relay before it well enough, wherever
-//! that one stands up to its own reach; toward Tx (Algorithm 4) it is the place nearest to Tx from which it is still heard,
-//! wherever the one that hears it stands. So no chain that meets the target is left out, and a target that is missed is out of
-//! reach of every chain: see [`spacing`](super::spacing) and [`retreat`](super::retreat) for what may hold a relay back.
+//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it still receives the relay before it, for any position
+//! of that relay up to its own reach. Toward Tx (Algorithm 4) it is the x closest to Tx from which the relay before it on the
+//! pass still receives it, for any position of that relay. So no chain that meets the target is excluded, and a missed target is
+//! out of reach of every chain. See [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may
+//! have to hold back.
 //!
-//! On the way back each relay has taken its place, and [`stand`](Link::stand) tells where the one before it on the pass is to be.
-//! A *plain* pass holds nobody back: every hop leads from reach to reach, as in the paper.
+//! On the way back each relay has a position, and [`stand`](Link::stand) returns the required position of the relay before it on
+//! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 
 use super::PerTarget;
 use super::ladder::{Ladder, TARGETS};
@@ -19,21 +19,21 @@ use crate::place::Station;
 use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square};
 
-/// Points of a field that are looked at in one call: for as many targets as that makes, and one at least.
+/// Maximum number of field points per call, for as many targets as that allows, but at least one.
 const POINTS_AT_ONCE: usize = 128;
 
-/// The relay that a pass comes from, as its message tells.
+/// Relay before this one on a pass, as stated in its message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
-    /// Where it flies across the line, and its power.
+    /// Cross-section and power.
     pub relay: Station,
-    /// Upsilon as it measures it where it stands, 1/W, if it uses that instead of the agreed field. Means nothing toward Rx.
+    /// Upsilon measured there, 1/W, if the relay uses that instead of the agreed field. Not used toward Rx.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// A relay above the line that uses the agreed field.
+    /// Returns a relay above the line that uses the agreed field.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -42,31 +42,31 @@ impl Behind {
     }
 }
 
-/// A relay on a pass.
+/// Relay on a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
-    /// The mission it flies.
+    /// Mission of the relay.
     pub mission: &'a Mission,
-    /// The relay that the pass comes from; `None` for the first one, which begins at Tx or Rx.
+    /// Relay before it on the pass; `None` for the first one, which starts at Tx or Rx.
     pub behind: Option<Behind>,
-    /// Its place in the chain, 1 next to Tx.
+    /// Index of the relay in the chain, 1 next to Tx.
     pub index: u16,
-    /// Where it flies across the line, and its power.
+    /// Cross-section and power of the relay.
     pub own: Station,
-    /// Upsilon as it measures it, 1/W, if it uses that.
+    /// Upsilon measured by the relay, 1/W, if it uses that.
     pub measured_per_w: Option<f32>,
-    /// Whether nobody holds back.
+    /// True for a plain pass, in which no relay holds back.
     pub plain: bool,
-    /// How far along x it goes at most, where the joint method has said that, m: then nobody holds back either.
+    /// Maximum x from the joint method, m; with it no relay holds back either.
     pub end_m: Option<f32>,
 }
 
-/// Where a pass begins, as reaches: at Tx, or at Rx in a field, for every target.
+/// Returns the start of a pass as reaches: Tx, or Rx in a field, for every target.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// The same for one target, m.
+/// Returns the start of a pass for one target, m.
 pub(crate) fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -75,14 +75,15 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 }
 
 impl Link<'_> {
-    /// The reaches for as many of the rising `targets` as it can meet, appended to `reaches`, which has the first of them already.
+    /// Appends the reaches for the rising `targets` to `reaches`, which already has the first of them.
     ///
-    /// `from` are the reaches of the relay before, m. Bounded by a reach a target; in a field by three for each of its points.
+    /// It stops at the first target that cannot be met. `from` are the reaches of the relay before, m. Bounded by a reach per
+    /// target; in a field by three for each of its points.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
         match self.onward() {
-            // Asked once for all the targets of a sweep.
+            // Checked once for all the targets of a sweep.
             Some(Onward::Rx(hop)) if hop.is_silent() && !self.plain => {
                 let reach =
                     |(&target, &from_m): (&f32, &f32)| hop.outermost_in_silence(target, from_m);
@@ -111,9 +112,8 @@ impl Link<'_> {
         }
     }
 
-    /// The same for as many more targets as one call of a relay may; whether these are all.
-    ///
-    /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
+    /// Appends as many more reaches as one call of a relay may compute; returns true if these are all. Bounded by 16 reaches; in
+    /// a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -122,7 +122,6 @@ impl Link<'_> {
         reaches.len() < due.min(all) || reaches.len() == all
     }
 
-    /// The reach for one target.
     pub(crate) fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         let mut reaches = PerTarget::new();
         self.extend(&[target], &[from_m], &mut reaches);
@@ -152,18 +151,17 @@ impl Link<'_> {
         }))
     }
 
-    /// The last place that the relay before on a pass toward Tx may take, m: as many as its neighbours' altitudes allow may be above
-    /// each other.
+    /// Returns the maximum x of the relay before on a pass toward Tx, m. Relays may be above each other if their altitudes allow.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// The hop that begins nearest to Tx of all that end from `low` to `high`; on a plain pass, at `low`.
+    /// Returns the hop that starts closest to Tx of all that end from `low` to `high`; on a plain pass, at `low`.
     fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
-        // A hop toward Tx is one in a field: where there can be none, the image has nothing of it.
+        // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
         mission.field()?;
-        // Whatever a neighbour says, nobody stands beyond Rx.
+        // A position beyond Rx in a neighbour's message is not used.
         if low > distance_m {
             return None;
         }
@@ -179,11 +177,11 @@ impl Link<'_> {
         hop.longest(interference, target, low, high)
     }
 
-    /// By how much a chain whose last relay this is overshoots for `target`, m: not negative when it closes; and where in its
-    /// range, whose end `reach` is, it then stands. `None` where Rx cannot be reached from anywhere.
+    /// Returns the slack of a chain with this last relay for `target`, m, and the relay's position in its range.
     ///
-    /// Toward Rx the slack is reach + `d_max` - D; toward Tx it is the same seen from the other end, the farthest that the first
-    /// hop may be minus the place, at that place of the range where it is most.
+    /// `reach` is the end of that range. A slack of 0 or more means that the chain closes. `None` if Rx is out of reach from
+    /// everywhere. Toward Rx the slack is reach + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the
+    /// position, at the position of the range that maximises it.
     pub fn ending(&self, target: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -193,9 +191,9 @@ impl Link<'_> {
         let c = mission.tx_gain().value() / target;
         let beyond = square(self.own.at.altitude_m);
         let value = |place: f32, quiet: f32| {
-            // Cut at 1e9 m, as the last hop toward Rx: an infinite slack would not be sent.
+            // Limited to 1e9 m, as the last hop toward Rx, since an infinite slack cannot be sent.
             let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - beyond;
-            // Where no place is near enough, by how much the square is negative: it stays continuous in the target.
+            // If no position is close enough, the root of the negated square keeps the slack continuous in the target.
             Some(place - sqrt_in_place(squared.abs()).copysign(squared))
         };
         let interference = HopInterference::new(mission, self.measured_per_w);
@@ -216,10 +214,10 @@ impl Link<'_> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Where the relay before is to stand, whose reach for `target` is `from_m`, when this one stands at `place`; `None` where
-    /// it is heard, or hears, from nowhere: a range was taken for one without holes, and has one.
+    /// Returns the required position of the relay before, whose reach for `target` is `from_m`, with this one at `place`.
     ///
-    /// Bounded by two reaches, in a field by three for each of its points.
+    /// `None` if there is none, because a range that was assumed to have no holes has one. Bounded by two reaches, in a field by
+    /// three for each of its points.
     pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
         if self.plain {
             return Some(Stand::AtReach);
@@ -234,7 +232,7 @@ impl Link<'_> {
                     .mission
                     .least_step(self.own.at.apart_squared(behind.relay.at));
                 let low = from_m.max(place + apart).max(place.next_up());
-                // Rather where all that are toward Rx of it have room along the line, however high they fly.
+                // A position that leaves all relays toward Rx room along the line, at any altitude, is preferred.
                 let clear = self.mission.latest(self.index.saturating_add(1));
                 let to = |high| {
                     let step = self.longest(&hop, target, low, high)?;
@@ -251,7 +249,6 @@ impl Link<'_> {
     }
 }
 
-/// A hop of either heading.
 enum Onward {
     Rx(Hop),
     Tx(Retreat),
@@ -265,7 +262,7 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// The verdict on the pass, by the last relay, `link`, which has these `reaches`.
+/// Returns the verdict of the last relay, `link`, which has these `reaches`.
 pub fn close(link: &Link<'_>, ladder: Ladder, reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();

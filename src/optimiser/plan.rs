@@ -1,7 +1,7 @@
-//! The whole chain from the mission alone, without a message: the radio-silent form of Algorithm 1.
+//! Whole chain from the mission alone, without messages: the radio-silent form of Algorithm 1.
 //!
-//! It walks the hops with the very functions the relays use, so what it finds is what they agree on by messages, to the
-//! bit. The leader predicts with it, a relay that must keep silent finds its own place with it, and so does a planner.
+//! It uses the same functions as the relays, so its result equals the relays' agreement to the bit. The leader predicts with it,
+//! a radio-silent relay computes its own position, and so does a planner.
 
 use super::PerTarget;
 use super::ladder::Ladder;
@@ -11,40 +11,39 @@ use super::walk::Walk;
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// A target the whole chain meets, as the ladder and the place in it that the last relay would commit.
+/// Target that the whole chain meets, as the ladder and the index that the last relay would commit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// The ladder of the sweep that settles the chain.
+    /// Ladder of the sweep that settles the chain.
     pub ladder: Ladder,
-    /// Which of its targets.
+    /// Index of the committed target.
     pub commit: u8,
-    /// That target, linear SIR.
+    /// Committed target, linear SIR.
     pub target: f32,
-    /// What no chain at these altitudes has, linear SIR; `None` with the paper's fixed step, which leaves chains out.
+    /// Lowest SIR that no chain at these altitudes has, linear; `None` with the paper's fixed step, which excludes some chains.
     pub most: Option<f32>,
-    /// Sweeps it took to find.
+    /// Number of sweeps.
     pub sweeps: u32,
 }
 
-/// A chain being solved, a few hops at a time. Its size does not depend on N.
+/// Chain being solved, a few hops at a time. Its size does not depend on N.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// The next reaches, as far as they are known.
+    /// Reaches of the current relay, as far as they are computed.
     next: PerTarget,
-    /// The relay whose reaches come next, 1 to N.
     index: u16,
     behind: Option<Behind>,
     sweeps: u32,
 }
 
 impl Planner {
-    /// Starts to solve `mission`, whose leader holds `leader`.
+    /// Starts to solve `mission`, whose leader has the profile `leader`.
     ///
     /// # Errors
-    /// [`Infeasible`] where the receiver can have no SIR at all.
+    /// [`Infeasible`] if no SIR above zero is possible at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let search = Search::new(mission, leader, schedule)?;
         let mut planner = Self {
@@ -66,13 +65,14 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Works through at most `hops` hops (at most 16 reaches each, in a field 128 of its points); `Ok(Some(..))` when the chain is solved.
+    /// Computes at most `hops` hops; `Ok(Some(..))` once the chain is solved.
     ///
-    /// `profile_of` gives what relay 1..=N holds; it must answer the same every time.
+    /// A hop takes at most 16 reaches, in a field 128 of its points. `profile_of` returns the profile of relay 1..=N; it must be
+    /// constant.
     ///
     /// # Errors
-    /// [`Infeasible`] when no target is left to try.
-    #[inline(never)] // what it needs of the stack is given back before a sweep is begun
+    /// [`Infeasible`] if no target is left to try.
+    #[inline(never)] // frees its stack before a sweep starts
     pub fn step(
         &mut self,
         mission: &Mission,
@@ -120,12 +120,12 @@ impl Planner {
     }
 }
 
-/// Solves the chain in one go: at most about fifty sweeps over N hops with the bracketed schedule.
+/// Solves the chain in one call: at most about fifty sweeps over N hops with the bracketed schedule.
 ///
-/// Where relays hold back, they are followed once more, as [`place`] does.
+/// If relays hold back, their positions are checked as in [`place`].
 ///
 /// # Errors
-/// [`Infeasible`] when no target can be met.
+/// [`Infeasible`] if no target can be met.
 pub fn solve(
     mission: &Mission,
     schedule: Schedule,
@@ -158,7 +158,7 @@ pub fn solve(
     }
 }
 
-/// Where relay `index` stands when the chain takes `target`, on a `plain` pass or not.
+/// Returns the position of relay `index` for `target`, on a `plain` pass or not.
 fn placed(
     mission: &Mission,
     target: f32,
@@ -172,16 +172,16 @@ fn placed(
         plain,
         profile_of: &profile_of,
     };
-    // Everybody must be able to, not only those on the way back to this one.
+    // Every relay must have a position, not only those on the way back to this one.
     chain.place(0)?;
     chain
         .place(index)
         .map(|x_m| profile_of(index).on_line().at.at(x_m))
 }
 
-/// Where relay `index` stands when the chain takes `target`, held back where that lets the others meet it.
+/// Returns the position of relay `index` for `target`, held back if that lets the other relays meet it.
 ///
-/// `None` when the target cannot be met. At most N^2 reaches' worth of work.
+/// `None` if the target cannot be met. At most N^2 reaches.
 pub fn place(
     mission: &Mission,
     target: f32,
@@ -193,10 +193,10 @@ pub fn place(
 }
 
 impl Mission {
-    /// Returns the place that relay `index` finds for itself without a message, where every relay holds what the mission has in common.
+    /// Returns the position that relay `index` computes without messages, if every relay has the mission's common profile.
     ///
-    /// Equal to the bit to what the chain settles on by messages: `silent_places_equal_those_by_messages` in
-    /// `host-tests/tests/chain.rs`. `None` when no target can be met.
+    /// It equals the agreement by messages to the bit: `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`.
+    /// `None` if no target can be met.
     pub fn silent_place(&self, index: u16) -> Option<Placement> {
         let common = |_| self.config().common;
         let agreed = solve(self, Schedule::Bracketed, common).ok()?;

@@ -1,28 +1,28 @@
-//! How far from its receiver the sender of a hop may stand in a field: Algorithm 4's way back from Rx, in closed form.
+//! Maximum distance of a sender from its receiver in a field: Algorithm 4's steps back from Rx, in closed form.
 //!
-//! Where the node that hears a hop stands is known, and with it the Upsilon it hears through. With that node at (x0, h0),
-//! its sender at (x0 - d, h) and A = p Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
+//! The receiver's position is known, and with it Upsilon. With the receiver at (x0, h0), its sender at (x0 - d, h) and A = p
+//! Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
 //!
 //! ```text
 //! d^2 <= A / gamma - (h - h0)^2
 //! ```
 //!
-//! the paper's eq. (num), with relays that differ in altitude. For the last hop x0 = D, h0 = 0 and A = p Upsilon(D) / eta.
-//! The printed algorithm lets a place become negative; here a sender stops where there is just room for those before it.
+//! This is the paper's eq. (num), for relays at different altitudes. For the last hop x0 = D, h0 = 0 and A = p Upsilon(D) / eta.
+//! The printed algorithm lets a position become negative; here a sender stops where there is just room for those before it.
 //!
-//! That node need not stand as near to Tx as it may: where it hears less of the interference the hop may be longer. The places
-//! from which a relay can be continued to Rx are a range [l, r], and the next range begins at
+//! The receiver need not be as close to Tx as possible: with less interference the hop may be longer. The positions from which a
+//! relay can be continued to Rx form a range [l, r], and the next range starts at
 //!
 //! ```text
 //! l_k = min { y - d(y) : l_{k+1} <= y <= r_{k+1} }.
 //! ```
 //!
 //! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex where it
-//! is defined, and its least value is at an end, where d falls to the least step, or where d'(y) = 1: d = c b / 2 with b the
-//! slope of Upsilon. `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/` holds it against grids of places.
-//! Where a least separation or a climb makes some y useless the ranges may have holes, and l_k is a bound.
+//! is defined. Its minimum is at an end, where d falls to the minimum step, or where d'(y) = 1: d = c b / 2 with b the slope of
+//! Upsilon. `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/` compares it with grids of positions. If a minimum
+//! separation or a climb excludes some y, the ranges may have holes, and l_k is a bound.
 //!
-//! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` asserts it in f64.
+//! Accuracy: asserted by `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` against f64.
 
 use crate::field::{FieldPoint, InNoise};
 use crate::mission::Mission;
@@ -30,23 +30,21 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// One hop, from where it is heard: ready to be evaluated for many targets.
+/// Hop to a known receiver, prepared for evaluation with many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat {
-    /// A of the module's text without its Upsilon, for the hop to Rx with it.
+    /// A of the module's text without Upsilon; for the hop to Rx with it.
     gain: f32,
     /// (h - h0)^2, m^2.
     climb_squared: f32,
-    /// The least step to the sender, m.
     least_step: f32,
-    /// The first place the sender may take, m.
+    /// Smallest x of the sender, m.
     end_m: f32,
-    /// Whether it is Rx that hears it.
     to_rx: bool,
 }
 
 impl Retreat {
-    /// The hop that relay `index`, `own`, feeds to a relay at `altitude_m`; `None` for the one to Rx.
+    /// Returns the hop from relay `index`, `own`, to a relay at `altitude_m`, or to Rx if that is `None`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb = own.at.altitude_m - altitude_m.unwrap_or(0.0);
         Self {
@@ -55,7 +53,7 @@ impl Retreat {
                 None => mission.receiver_gain(own.power_w),
             },
             climb_squared: square(climb),
-            // The receiver stands on the ground: its altitude alone keeps relay N clear of it.
+            // The receiver is on the ground, so altitude alone separates relay N from it.
             least_step: match altitude_m {
                 Some(_) => mission.least_step(square(climb)),
                 None => 0.0,
@@ -65,7 +63,7 @@ impl Retreat {
         }
     }
 
-    /// The same hop of relay `index` where those before it hold back to leave themselves room rather than this one.
+    /// Returns the same hop if not relay `index` but those before it hold back to leave themselves room.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -73,7 +71,7 @@ impl Retreat {
         }
     }
 
-    /// The place nearest to Tx at which its receiver leaves the sender room, m.
+    /// Returns the x closest to Tx at which the receiver leaves the sender room, m.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -83,16 +81,16 @@ impl Retreat {
         }
     }
 
-    /// The place nearest to Tx in [end, `from_m`] from which the sender still meets `target`; `None` if there is none.
+    /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`; `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the receiver's place in [0, D], `quiet` what it hears through: Upsilon
-    /// there over the field's largest, above 0, or 1 at Rx. The place is rounded toward the receiver. Constant work.
+    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], `quiet` Upsilon there over the field's largest,
+    /// above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
             return None;
         }
-        // Cut at 1e9 m, far beyond any end: of infinity there is no root.
+        // Limited to 1e9 m, far beyond any end, to avoid infinity.
         let squared = (self.gain * quiet / target).min(1e18) - self.climb_squared;
         if !(squared >= 0.0) {
             return None;
@@ -110,11 +108,11 @@ impl Retreat {
         } else {
             place
         };
-        // Two relays never share a place, however short the hop.
+        // Two relays never share an x, however short the hop.
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// The hop that begins nearest to Tx of all into [`low`, `high`]; `None` if there is none.
+    /// Returns the hop that starts closest to Tx of all that end in [`low`, `high`]; `None` if there is none.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -132,26 +130,26 @@ impl Retreat {
     }
 }
 
-/// A hop: where it ends, and where it begins.
+/// Hop as the x of its end and of its start.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
-    /// Where it is heard, m.
+    /// x of the receiver, m.
     pub to_m: f32,
-    /// Where its sender stands, m.
+    /// x of the sender, m.
     pub from_m: f32,
 }
 
-/// The interference that a hop may meet, place by place.
+/// Interference at the receiver of a hop, by position.
 #[derive(Clone, Copy, Debug)]
 pub enum HopInterference<'a> {
-    /// The same Upsilon everywhere, over the field's largest: what its receiver measures.
+    /// Constant Upsilon over the field's largest, as measured by the receiver.
     Evenly(f32),
-    /// The agreed field.
+    /// Agreed field.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// The mission's field with the noise, or what the receiver measures instead, 1/W: that has its noise in it.
+    /// Returns the mission's field with noise, or the receiver's measurement, 1/W, which includes the noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -160,7 +158,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Upsilon at `x_m` over the field's largest.
+    /// Returns Upsilon at `x_m` over the field's largest.
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,
@@ -169,10 +167,9 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// The least `value` of a place y in [`low`, `high`] and its quiet, where it is y - sqrt(`c` quiet - q), or `None` where the
-/// root is of less than the second of `squares`, of which q is the first. Of equal ones the one nearest to Tx.
-///
-/// Work: at most three values for each point of the field in between that a hop could reach at all.
+/// Returns the minimum of `value` over y in [`low`, `high`], with the smallest y for equal values. `value` gets y and its quiet.
+/// It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the root is below the second minus
+/// the first. Work: at most three values for each field point in between that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,
@@ -220,7 +217,7 @@ pub(super) fn least(
         } else {
             weigh(low, interference.quiet(low))
         };
-        // To begin nearer to Tx than the best, a hop would have to be longer than any here can be.
+        // To start closer to Tx than the best, a hop would have to be longer than possible here.
         if let Some(best) = best
             && left.x_m > best.from_m
             && square(left.x_m - best.from_m) + apart > c * start.max(end)
@@ -228,7 +225,7 @@ pub(super) fn least(
             continue;
         }
         let slope = (end - start) / (right.x_m - left.x_m);
-        // Where the root is c slope / 2 long, and where it is just long enough to count.
+        // Where the root is c slope / 2, and where it is just long enough to count.
         let steepest = (square(0.5 * c * slope) + apart) / c;
         let shortest = least_apart / c * (1.0 + 1e-6);
         for quiet in [steepest, shortest] {

@@ -1,16 +1,16 @@
-//! The search for the highest target that the chain can meet: which targets to try next, from what the last ones gave.
+//! Search for the highest target that the chain meets: selection of the next targets from the results of the last ones.
 //!
-//! Both schedules of Algorithm 1 are one path. The paper's tries gamma_0, gamma_0 - epsilon, ... one a sweep. The bracketed
-//! one tries a ladder of targets a sweep; feasibility is monotone in the target, so the answer lies between the highest
-//! that was met and the lowest that was not, and the slacks, smooth in log gamma, tell where: inverse interpolation puts
-//! the next ladder's dense middle there while its ends still span the bracket.
+//! It implements both schedules of Algorithm 1. The paper's tries gamma_0, gamma_0 - epsilon, ..., one per sweep. The bracketed
+//! one tries a ladder of targets per sweep. Feasibility is monotone in the target, so the optimum is between the highest target
+//! that was met and the lowest that was missed. The slacks are smooth in log gamma, so inverse interpolation places the dense
+//! middle of the next ladder, while its ends still span the bracket.
 //!
-//! On a plain pass, which holds nobody back, a target may be met while lower ones are not: what is met is met. All other passes
-//! leave no chain out, so the lowest target that has been missed is a bound of what any chain can have.
+//! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as met. All
+//! other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
 //!
-//! A pass takes the places of a relay for a stretch without holes. Where a separation binds there may be one, and the relay that is
-//! told to stand in it refuses. Then a plain pass, which holds nobody back, finds what can be had for certain, and the targets between
-//! that and what was refused are halved. Every one that is accepted is flown; the last pass is of the best.
+//! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be one, and the
+//! relay whose required position is in it refuses. Then a plain pass finds a target that is certain, and the interval between
+//! that and the refused one is bisected. Every accepted target is flown; the last pass is for the best one.
 
 use core::ops::Range;
 
@@ -21,21 +21,21 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::{self, Sender};
 
-/// Which targets the leader tries.
+/// Selection of the targets that the leader tries.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets a sweep around the interpolated optimum, until it is known to the mission's tolerance.
+    /// Sixteen targets per sweep around the interpolated optimum, until it is known to the mission's tolerance.
     #[default]
     Bracketed,
-    /// The paper's: one target a sweep, from the highest any chain can meet downward.
+    /// The paper's schedule: one target per sweep, from the ceiling downward.
     FixedStep {
-        /// Epsilon, linear SIR, above 0. In f64: it is taken up to ten thousand times from one start.
+        /// Epsilon, linear SIR, above 0. In f64, because it is subtracted up to ten thousand times from one start.
         step: f64,
     },
 }
 
-/// No target down to a millionth of a millionth of the ceiling can be met.
+/// Error: no target above 1e-12 of the ceiling can be met.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Infeasible;
@@ -48,58 +48,54 @@ impl core::fmt::Display for Infeasible {
 
 impl core::error::Error for Infeasible {}
 
-/// The highest target that is tried.
 const HIGHEST: f32 = 1e30;
 
-/// How far below the ceiling the search gives up.
+/// Target relative to the ceiling below which the search gives up.
 const DEPTH: f32 = 1e-12;
 
-/// How far, as a part of the gap between two targets, a smooth slack may make the cubic's root differ from the line's.
+/// Maximum difference of the roots of cubic and line for a smooth slack, as a fraction of the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// How much of a bracket a sweep must cut off for the interpolation to be trusted with the next one.
+/// Minimum reduction of the bracket by a sweep after which the interpolation is used again.
 const PROGRESS: f32 = 0.25;
 
-/// Sweeps after which the search settles for the best target it has met.
+/// Sweeps after which the search takes the best target so far.
 const MOST_SWEEPS: u32 = 48;
 
-/// The state of a search: the bracket so far and the ladder to try next.
+/// State of a search: the current bracket and the next ladder.
 #[derive(Clone, Debug)]
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// What the leader's own end of the chain can have at most, hence the chain.
+    /// Upper bound by the hop at the leader's end.
     ceiling: f32,
-    /// The first target of the fixed-step schedule: the paper's gamma_0.
+    /// First target of the fixed-step schedule: the paper's gamma_0.
     start: f32,
-    /// Highest target known to be met.
     feasible: Option<f32>,
-    /// Lowest target known not to be met.
     infeasible: Option<f32>,
     /// infeasible / feasible - 1 before the last sweep.
     width: f32,
     ladder: Ladder,
-    /// Sweeps whose verdict has come in.
     tried: u32,
-    /// Whether nobody holds back: as in the paper, and where a chain that did has turned out not to be one.
+    /// True for plain passes: in the paper's schedule, and after a chain with relays that hold back was refused.
     plain: bool,
-    /// The lowest target that no chain can meet, as far as known.
+    /// Lowest known target that no chain can meet.
     most: Option<f32>,
-    /// What is tried once somebody was held back to where it could not be.
+    /// Bisection after a relay has refused its required position.
     trials: Option<StandTrials>,
 }
 
 impl Search {
-    /// A search by the leader of `mission`, which holds `leader`; the other relays need not hold what the mission has in common.
+    /// Creates a search by the leader of `mission` with the profile `leader`; other relays may have profiles of their own.
     ///
     /// # Errors
-    /// [`Infeasible`] where even a relay right above the receiver gives it no SIR: an interferer standing at the receiver.
+    /// [`Infeasible`] if a relay right above the receiver gives it no SIR: the interferer is at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
             distance_m, common, ..
         } = *mission.config();
         let above_receiver = |profile: Profile| Placement::on_line(distance_m, profile.altitude_m);
-        // What the hop at either end can have at most, and what a chain of equals meets that takes no step at all.
+        // Ceilings of the hops at both ends, and the SIR of a chain of equal relays without any step.
         let (ceiling, start, met) = match mission.heading() {
             Heading::TowardRx => {
                 let ceiling = sir::first_hop_ceiling(mission, leader.altitude_m);
@@ -118,13 +114,13 @@ impl Search {
         if !(start >= 8.0 * f32::MIN_POSITIVE / DEPTH) {
             return Err(Infeasible);
         }
-        // In a quiet field they may be above any f32, and no ladder ends there.
+        // With very low interference they may exceed f32.
         let (ceiling, start) = (ceiling.min(HIGHEST), start.min(HIGHEST));
         let plain = schedule != Schedule::Bracketed;
         let ladder = if plain {
             Ladder::single(start)
         } else {
-            // Half of what is met leaves room for rounding.
+            // Half of the met target leaves a margin for rounding.
             Ladder::spanning(met.min(start).max(start * DEPTH) / 2.0, start * 1.01)
         };
         Ok(Self {
@@ -143,20 +139,18 @@ impl Search {
         })
     }
 
-    /// The targets to try now.
+    /// Returns the next ladder.
     pub const fn ladder(&self) -> &Ladder {
         &self.ladder
     }
 
-    /// Tries `ladder` next instead: the one by which the leader, having solved the chain beforehand, expects a commit.
-    ///
-    /// Where that is plain, all are.
+    /// Replaces the next ladder by the leader's prediction, for which it expects a commit. If it is plain, all later ones are.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// The lowest target that no chain can meet, once the last pass gave these `slacks`; `None` of plain passes alone.
+    /// Returns the lowest target that no chain can meet, after a pass with these `slacks`; `None` after plain passes only.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if self.plain || self.trials.is_some() {
             return self.most;
@@ -166,18 +160,18 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Takes the slacks of [`Search::ladder`], in metres for as many targets as every hop could meet, and moves on.
+    /// Continues with the slacks of [`Search::ladder`], m, for as many targets as every hop can meet.
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
     /// # Errors
-    /// [`Infeasible`] when no target is left to try.
+    /// [`Infeasible`] if no target is left to try.
     pub fn advance(&mut self, slacks: &[f32]) -> Result<(), Infeasible> {
         self.tried = self.tried.saturating_add(1);
         if let Some(trials) = &mut self.trials
             && !self.plain
         {
-            // A relay has changed.
+            // The result differs from before, because a relay has changed.
             trials.high = trials
                 .high
                 .min(self.ladder.targets().first().copied().unwrap_or(0.0));
@@ -189,7 +183,7 @@ impl Search {
         };
         match next {
             Ok(next) => self.ladder = next.plainly(self.plain),
-            // No plain chain at all: others may do.
+            // No plain chain is feasible, but one with relays that hold back may be.
             Err(Infeasible) => self.try_next()?,
         }
         Ok(())
@@ -217,7 +211,7 @@ impl Search {
             .copied();
         let worst = targets.get(met).copied();
         if self.ladder.is_single() && best.is_none() {
-            // What had been met is not any more: a relay has changed.
+            // A target that was met is missed now, because a relay has changed.
             self.feasible = None;
         }
         self.feasible = best.into_iter().chain(self.feasible).reduce(f32::max);
@@ -231,10 +225,10 @@ impl Search {
                 Ok(Ladder::between((high / 1e3).max(f32::MIN_POSITIVE), high))
             };
         };
-        // No chain meets more than its first hop can have.
+        // No chain exceeds the ceiling of its first hop.
         let high = self.infeasible.unwrap_or(self.ceiling * 1.000_001);
         if low >= high {
-            // With altitudes of their own, relays may meet a target and miss a lower one. What is met is met.
+            // With different altitudes relays may meet a target and miss a lower one; the target then counts as met.
             self.infeasible = None;
             self.width = f32::INFINITY;
             return Ok(Ladder::single(low));
@@ -242,8 +236,7 @@ impl Search {
         Ok(self.inside(low, high, &targets, slacks))
     }
 
-    /// The next ladder inside a bracket.
-    #[inline(never)] // its stack is not for working out the targets
+    #[inline(never)] // keeps its stack apart from that of `targets`
     fn inside(&mut self, low: f32, high: f32, targets: &[f32], slacks: &[f32]) -> Ladder {
         let width = (high - low) / low;
         let stalled = width > PROGRESS * self.width;
@@ -257,16 +250,15 @@ impl Search {
             interpolate(targets, slacks)
         };
         match centre.filter(|centre| low < *centre && *centre < high) {
-            // A quarter of the tolerance in the middle: the root may lie in a neighbouring gap and still be close enough.
+            // A quarter of the tolerance in the middle: the root may be in a neighbouring gap and still be close enough.
             Some(centre) => Ladder::around(centre, self.tolerance / 4.0, low, high),
             None => Ladder::between(low, high),
         }
     }
 }
 
-/// The target at which the slack is zero: log target as a cubic in the slack through the four points about its change of sign.
-///
-/// `None` where the cubic and the straight line disagree: the slack jumps there, and a root of either means nothing.
+/// Returns the target with zero slack, by a cubic of log target in the slack through the four points about its sign change.
+/// `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -286,7 +278,7 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// The polynomial through `points` (abscissa, value) at abscissa 0; `None` unless the abscissae fall strictly.
+/// Evaluates the polynomial through `points` (abscissa, value) at 0; `None` unless the abscissae fall strictly.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -301,21 +293,21 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     points.first().map(|point| point.1)
 }
 
-/// Targets that are agreed on to see whether everybody can stand where the others need it.
+/// Bisection of targets that are proposed to check that all relays can take their required positions.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
-    /// The lowest that was refused.
     high: f32,
-    /// The highest that was not, and its pass.
+    /// Highest accepted target, and its ladder.
     best: Option<(f32, Ladder)>,
-    /// Whether that is agreed on for good.
+    /// True once the best target is final.
     over: bool,
 }
 
 impl Search {
-    /// Whether `verdict`, which commits nothing, is on a pass that was to be agreed on: somebody cannot stand where another needs
-    /// it. Then the target that was.
-    #[inline(never)] // its stack is not for the search that goes on
+    /// Returns the target that was due to be committed, if a relay refused its required position.
+    ///
+    /// Then `verdict` commits nothing, although its slacks call for a commit.
+    #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
         let due = Verdict::new(mission, self.ladder, &targets, verdict.slacks.clone());
@@ -325,7 +317,7 @@ impl Search {
         targets.get(usize::from(due)).copied()
     }
 
-    /// A target was agreed on; whether that is all.
+    /// Records an accepted target; returns true if the search is over.
     pub fn accept(&mut self, target: f32) -> bool {
         let own = Ladder::single(target).plainly(self.plain);
         let Some(trials) = &mut self.trials else {
@@ -333,15 +325,16 @@ impl Search {
         };
         let last = trials.over;
         trials.best = Some((target, own));
-        // The best is what is held: once no other is left to try, it is that.
+        // The best target is the current one, and the final one if no other is left.
         last || self.try_next().is_err() || self.trials.is_some_and(|trials| trials.over)
     }
 
-    /// `target` was to be agreed on, and `refused`. First a plain pass tells what can be had for certain; between that and what was
-    /// refused the targets are then halved.
+    /// Continues after `target` was refused.
+    ///
+    /// First a plain pass finds a target that is certain; the interval between that and the refused one is then bisected.
     ///
     /// # Errors
-    /// [`Infeasible`] when none is left.
+    /// [`Infeasible`] if no target is left.
     pub fn refuse(
         &mut self,
         mission: &Mission,
@@ -368,7 +361,7 @@ impl Search {
         Ok(())
     }
 
-    /// The next target that may be agreed on with somebody held back; at the end the best once more, if it is not held.
+    /// Selects the next target of the bisection; at the end the best one again, if it is not the current one.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -1,6 +1,6 @@
-//! How far a hop reaches: the closed forms of the paper's `d_1`, `d_k` and `d_max` as one stable rule.
+//! Reach of a hop: the closed forms of the paper's `d_1`, `d_k` and `d_max` as one numerically stable rule.
 //!
-//! With the sender at (x0, y0, h0), the node at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
+//! With the sender at (x0, y0, h0), the receiver at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
 //! gain, SIR >= gamma is
 //!
 //! ```text
@@ -8,35 +8,34 @@
 //! H = (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) - e ((y - y0)^2 + (h - h0)^2)
 //! ```
 //!
-//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. `end` if f is not negative there; else the largest root
-//! inside, which the signs of e, u and C decide:
+//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. It is `end` if f is not negative there, and otherwise the
+//! largest root inside, which depends on the signs of e, u and C:
 //!
 //! | C | u | largest root below `end` |
 //! | --- | --- | --- |
 //! | >= 0 | >= 0 | C / (u + r) |
 //! | >= 0 | < 0 | (r - u) / e, and e > 0 follows from f(end) < 0 |
 //! | < 0 | < 0 and e > 0 | (r - u) / e, if inside |
-//! | < 0 | otherwise | none: the target cannot be met |
+//! | < 0 | otherwise | none: the target is infeasible |
 //!
-//! with r = sqrt((gamma / A) u^2 + e H); the discriminant u^2 + e C is the same number, but cancels, and so does 1 + e for
-//! small targets. e is formed from a gain of twice f32's width, so targets next to A lose nothing. The printed
-//! case distinction picks wrong roots once the chain has passed the interferer.
+//! with r = sqrt((gamma / A) u^2 + e H). The discriminant u^2 + e C is the same number, but cancels, and so does 1 + e for small
+//! targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed case distinction
+//! selects wrong roots once the chain has passed the interferer.
 //!
-//! Where every sender in [0, x0] counts, only the nearest to a place matters: the interference there does not depend on it, and
-//! none is louder. Up to x0 and the least step s beyond, that is one just s before, and a node at x is heard there if
-//!
+//! If the sender may be anywhere in [0, x0], only the one closest to the receiver matters: it is received best, and the
+//! interference does not depend on it. For a receiver at x up to x0 plus the minimum step s, that sender is s before it, and the
+//! target is met if
 //! ```text
 //! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
 //! ```
 //!
-//! everywhere but within w of the interferer. So where nothing is heard from x0, the sender may *hold back*, for a node at X - w:
-//! to climb before it comes near, or to leave the least step room. `at_mixed_altitudes` and `with_a_separation_that_binds` in
-//! `host-tests/tests/exact.rs` holds it against all places at once.
+//! which is true except within w of the interferer. So if the target cannot be met from x0, the sender may *hold back* for a
+//! receiver at X - w: to climb before it comes near, or to leave the minimum step. `at_mixed_altitudes` and
+//! `with_a_separation_that_binds` in `host-tests/tests/exact.rs` compare this with a search over all positions.
 //!
-//! With noise of their own receivers hear less, and the reach has no such form: `noise` searches for it from this one on.
+//! With receiver noise the reach has no closed form: `noise` searches for it, starting from this one.
 //!
-//! Accuracy: `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` asserts it against a bisection of the
-//! SIR itself in f64.
+//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
 
 mod noise;
 mod stretched;
@@ -46,22 +45,22 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Where the relay before on the pass is to stand.
+/// Required position of the relay before on the pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stand {
-    /// At its own reach, or where it cannot be told: at Tx, at Rx.
+    /// Reach of that relay; or Tx or Rx, which do not move.
     AtReach,
-    /// There, m along x.
+    /// x, m.
     At(f32),
 }
 
-/// No hop is short enough for a target this far above its gain, and every term of f stays finite below it.
+/// Maximum ratio of target and gain: above it no hop is short enough, and below it every term of f is finite.
 const MOST_RATIO: f32 = 1e18;
 
-/// One hop toward Rx, ready to be evaluated for many targets.
+/// Hop toward Rx, prepared for evaluation with many targets.
 ///
-/// The terms that do not depend on the target are worked out once, so a reach costs three divisions and a square root.
+/// The terms that do not depend on the target are precomputed, so a reach takes three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -75,19 +74,19 @@ pub struct Hop {
     across_squared: f32,
     /// nu = N eta / P, 1/m^2: 0 without noise.
     noise: f32,
-    /// The least step to the node, m.
     least_step: f32,
-    /// Whether the sender is Tx, which cannot hold back.
+    /// True if the sender is Tx, which cannot hold back.
     from_tx: bool,
-    /// The last place the node may take, m.
+    /// Maximum x of the receiver, m.
     end_m: f32,
-    /// The last places that the node and its sender take where all gather at the end, m.
+    /// Maximum x of the receiver and of its sender if all relays gather at the end, m.
     gathered_m: [f32; 2],
 }
 
 impl Hop {
-    /// The hop from `sender` to relay `index`, which flies at `at`; neighbours among the relays after it may be `spread_squared`
-    /// m^2 apart across the line.
+    /// Returns the hop from `sender` to relay `index` at `at`.
+    ///
+    /// Neighbours among the relays after it may be `spread_squared` m^2 apart across the line.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -102,7 +101,7 @@ impl Hop {
         let before = mission.end_for(index.saturating_sub(1), spread_squared);
         Self {
             from_tx: index <= 1,
-            // The transmitter stands on the ground: its altitude alone keeps the head clear of it.
+            // The transmitter is on the ground, so altitude alone separates the first relay from it.
             least_step: if index <= 1 {
                 0.0
             } else {
@@ -113,8 +112,7 @@ impl Hop {
         }
     }
 
-    /// The hop from `sender` to a node at `at` that may be as near to it as it likes, and goes no farther than `end_m`, in
-    /// noise of nu = `noise`, 1/m^2.
+    /// Returns the hop from `sender` to a receiver at `at` without a minimum step, at most to `end_m`. `noise` is nu.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -139,7 +137,7 @@ impl Hop {
         }
     }
 
-    /// The same hop, to relay `index`, when those after it hold back to leave themselves room rather than this one.
+    /// Returns the same hop if not relay `index` but those after it hold back to leave themselves room.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -147,16 +145,14 @@ impl Hop {
         }
     }
 
-    /// The same hop, to a node that goes no farther than `end_m`.
     pub(crate) fn ending(self, end_m: f32) -> Self {
         Self { end_m, ..self }
     }
 
-    /// The farthest place in [`from_m`, end] at which the node still meets `target`, m along x; `None` if there is none.
+    /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m; `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the sender's place in [0, D]. The place is rounded toward the sender,
-    /// so what is promised for the target holds at the f32 that is returned. Constant work; with noise at most 96 evaluations of
-    /// the hop, usually five.
+    /// `target` is a linear SIR above zero, `from_m` the sender's x in [0, D]. The result is rounded toward the sender, so it
+    /// meets the target as an f32. Constant work; with noise at most 96 evaluations of the hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -180,7 +176,7 @@ impl Hop {
             return None;
         }
         let u = self.interferer_x_m - from_m;
-        // f(end) as the SIR's own two terms: expanded, they would cancel right next to the interferer.
+        // f(end) as the two terms of the SIR; expanded, they would cancel close to the interferer.
         if square(u - room) + self.aside_squared >= ratio * (square(room) + self.across_squared) {
             return Some(self.end_m);
         }
@@ -201,22 +197,22 @@ impl Hop {
             return None;
         }
         if d >= room {
-            // With C < 0 the feasible stretch lies wholly beyond the end; else rounding put the root on it.
+            // With C < 0 the feasible interval is entirely beyond the end; otherwise rounding put the root on it.
             return if c < 0.0 { None } else { Some(self.end_m) };
         }
         rounded(from_m, d)
     }
 
-    /// The farthest place at which the node meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is none.
+    /// Returns the largest x at which the receiver meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is
+    /// none.
     ///
-    /// Beyond `from_m` by the least step or more that is [`Hop::reach`]; short of it the sender stands just the least step
-    /// before, which is as near as it may be. Constant work.
+    /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step before.
+    /// Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         self.reach(target, from_m)
             .or_else(|| self.held_back(target, from_m))
     }
 
-    /// The same of a hop that is silent.
     pub(super) fn outermost_in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
         self.in_silence(target, from_m)
             .or_else(|| self.held_back(target, from_m))
@@ -228,10 +224,10 @@ impl Hop {
             return None;
         }
         let near = (from_m + self.least_step).min(self.end_m);
-        // Nobody hears even the nearest sender within this of the interferer; its place is rounded, as is the node's.
+        // Within this distance of the interferer even the closest sender is too weak; both positions are rounded.
         let nearest = self.least_step + 2.0 * f32::EPSILON * near;
         let needed = ratio * (square(nearest) + self.across_squared);
-        // s / (1 + nu s) >= needed: nowhere, where the sender is not heard through the noise.
+        // s / (1 + nu s) >= needed has no solution if the signal is below the noise.
         let left = 1.0 - self.noise * needed;
         if !(left > 0.0) {
             return None;
@@ -245,7 +241,7 @@ impl Hop {
         (self.before(place) >= 0.0).then_some(place)
     }
 
-    /// The nearest that a sender may be before `place`, m.
+    /// Returns the largest x of a sender before `place`, m.
     fn before(&self, place: f32) -> f32 {
         let from = place - self.least_step;
         if place - from < self.least_step || from >= place {
@@ -255,9 +251,9 @@ impl Hop {
         }
     }
 
-    /// Where the sender, whose reach for `target` is `from_m`, is to stand when the node is at `place`; `None` if nowhere.
+    /// Returns the required position of the sender, whose reach for `target` is `from_m`, with the receiver at `place`.
     ///
-    /// The nearest that it may be, which is the loudest.
+    /// It is the closest allowed position, which has the best SIR; `None` if there is none.
     pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
         if self
             .reach(target, from_m)
@@ -281,17 +277,17 @@ impl Hop {
             return at(from_m);
         }
         let near = from_m.min(self.before(place));
-        // Where all gather at the end, as evenly as a pass that leaves them room from the start.
+        // If all relays gather at the end, they are spaced as evenly as by a pass that leaves them room from the start.
         let [own, sender] = self.gathered_m;
         let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
         gathered.flatten().or_else(|| at(near))
     }
 }
 
-/// What rounding may take from a hop's SIR at the edge of where it meets its target, relative.
+/// Relative rounding error of a hop's SIR at the limit of its target.
 const ROUNDING: f32 = 4e-6;
 
-/// The place `d` beyond `from_m`, rounded toward it; `None` for a hop too short for an f32: two relays never share a place.
+/// Returns the x `d` beyond `from_m`, rounded toward it; `None` for a hop too short for an f32: two relays never share an x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -307,10 +303,10 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// The farthest a relay may be from the receiver, m along x, for the receiver to meet `target`: the paper's `d_max`.
+/// Returns the maximum distance of a relay from the receiver for `target`, m along x: the paper's `d_max`.
 ///
-/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` where even a relay right above the receiver is too weak. Not cut at D: it
-/// stays smooth in the target for the search that looks for its root.
+/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
+/// that it is smooth in the target for the root search.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.at.y_m) + square(relay.at.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
@@ -348,7 +344,7 @@ mod tests {
         )
     }
 
-    /// Behind the transmitter an interferer makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
+    /// An interferer behind the transmitter makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

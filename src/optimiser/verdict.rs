@@ -1,23 +1,22 @@
-//! The last relay's verdict on one pass: by how much each target is met, and whether one of them is good enough to keep.
+//! Verdict of the last relay on one pass: the slacks of the targets, and the target to commit, if any.
 
 use super::PerTarget;
 use super::ladder::Ladder;
 use crate::mission::Mission;
 
-/// What became of the targets of one sweep.
+/// Result of the targets of one sweep.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// The target, by its place in the ladder, that every relay now takes its place for.
+    /// Index of the committed target in the ladder; every relay then takes its position for it.
     pub commit: Option<u8>,
-    /// For each target that every hop can meet, by how much the chain overshoots, m: not negative when it closes.
+    /// Slack for each target that every hop can meet, m: 0 or more if the chain closes.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// The verdict on a pass of `ladder`, whose targets are `targets`, from the slacks of those that every hop can meet.
-    ///
-    /// A target is committed when the next one up is known to be infeasible and no more than the mission's tolerance away,
-    /// or when the ladder has no other target: the step of the paper's Algorithm 1.
+    /// Returns the verdict on a pass of `ladder`, with its `targets`, from the slacks of those that every hop can meet. A target
+    /// is committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the ladder has no
+    /// other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -44,10 +43,8 @@ impl Verdict {
     }
 }
 
-/// One more than the place of the highest target that is met; 0 if none is.
-///
-/// Where every relay has the same altitude all targets below it are met too. In a field that varies, and with altitudes of
-/// their own, some may not be, which takes nothing from the one that is.
+/// Returns the index of the highest target that is met, plus one; 0 if none is. If every relay has the same altitude, all lower
+/// targets are met too. In a varying field, and with different altitudes, some may be missed, and the highest one still counts.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()

@@ -1,10 +1,9 @@
-//! A whole chain for one target: from the leader's reach to the last relay's, and back to where each is to stand.
+//! Whole chain for one target: reaches from the leader to the last relay, and required positions on the way back.
 
 use super::pass::{self, Behind, Link};
 use super::spacing::Stand;
 use crate::mission::{Heading, Mission, Profile};
 
-/// A chain that takes one target.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
     pub(crate) target: f32,
@@ -26,7 +25,7 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Goes through the reaches of all; the slack that they end with, and where the last one stands.
+    /// Computes the reaches of all relays; returns the final slack and the last relay's position.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = pass::origin(self.mission);
         let mut at = self.mission.leader();
@@ -41,7 +40,7 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Whether the chain closes, on a plain pass or with everybody able to stand where the others need it.
+    /// Returns true if the chain closes, on a plain pass or with required positions that all relays can take.
     pub(crate) fn is_met(&self) -> bool {
         let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
         closes(self)
@@ -51,7 +50,7 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             }) || self.place(0).is_some())
     }
 
-    /// Where relay `index` stands where nobody has to hold back; 0 for any.
+    /// Returns the position of relay `index` if no relay has to hold back; 0 for any relay.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = Self {
             plain: true,
@@ -77,7 +76,7 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// The reach of relay `index`; of the place that the pass begins at, without one.
+    /// Returns the reach of relay `index`, or the start of the pass for `None`.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let mut from_m = pass::origin(self.mission);
         let Some(index) = index else {
@@ -93,8 +92,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Where relay `index` stands, m along x; `None` where somebody cannot stand where the others need it. For an `index` that
-    /// is none's, anything if everybody can.
+    /// Returns the x of relay `index`, m; `None` if a relay cannot take its required position. For an `index` of no relay, some
+    /// x.
     pub(crate) fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -126,7 +125,6 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
     }
 }
 
-/// The relay that a pass comes from to relay `index`.
 pub(crate) fn before(mission: &Mission, index: u16) -> Option<u16> {
     match mission.heading() {
         Heading::TowardRx => index.checked_sub(1).filter(|before| *before > 0),

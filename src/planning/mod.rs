@@ -1,10 +1,10 @@
-//! The placement maths of before a flight: one relay alone, and how many relays a link needs. No message, and nothing that flies.
+//! Planning before a flight: optimal position of one relay, and number of relays for a link. Not used on board.
 //!
-//! | for | files |
+//! | purpose | files |
 //! | --- | --- |
-//! | one relay alone | `single`: Theorems 1 to 3, Algorithm 3 |
-//! | one relay of a chain, without a message | [`Mission::silent_place`](crate::Mission::silent_place) |
-//! | how many relays | [`fleet`]: the fewest for a target, and the most any number can have |
+//! | one relay | `single`: Theorems 1 to 3, Algorithm 3 |
+//! | one relay of a chain, without messages | [`Mission::silent_place`](crate::Mission::silent_place) |
+//! | number of relays | [`fleet`]: the minimum for a target, and the maximum SIR of any number |
 
 pub mod fleet;
 #[cfg(not(feature = "internals"))]

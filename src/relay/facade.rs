@@ -1,44 +1,37 @@
-//! The relay: bytes and time in, frames and events out, and records of votes and uploads that a firmware keeps over a reboot.
+//! Facade of a relay: bytes and time in, frames and events out, and records that a firmware keeps across a reboot.
 
-use super::incoming;
-use super::incoming::Addressed;
+use super::frames;
 use super::port::{Port, Transmit};
-#[cfg(feature = "auth")]
-use super::signed;
 use crate::event::Event;
 use crate::mission::Mission;
 use crate::node::Node;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
-use crate::side::Side;
-use crate::stats::bump;
 use crate::time::{Instant, MonotonicClock};
-use crate::wire::deframe::{DeframeError, Deframer};
-use crate::wire::frame;
-use crate::wire::frame::{Header, MAX_FRAME};
-#[cfg(feature = "auth")]
-use crate::wire::session::Session;
+use crate::wire::deframe::Deframer;
+use crate::wire::endpoint::Endpoint;
+use crate::wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
-/// One relay's share of the placement, sans-IO.
+/// A relay of the chain: the whole protocol, without input or output of its own (sans-IO).
 ///
 /// # Contract
-/// - *Inputs* [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) take anything, never fail
-///   and do a bounded amount of work; what is wrong with it is counted in [`stats`](Self::stats).
-/// - *Time* is an argument; the relay never reads a clock. After a backward step of the caller's clock timers and lease go on as if no time had
-///   passed between the two calls, after a forward step they expire. Give it a monotonic clock: a forward step while a part of the chain is out of reach ends the wait for the
-///   leases of that part early, so two chains may fly until these have expired.
-/// - *Getters* take constant work, and their numbers are those of the last agreement. Places are in metres in the frame of
+/// - *Inputs*: [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) accept anything, never fail
+///   and do a bounded amount of work; [`stats`](Self::stats) counts invalid input.
+/// - *Time* is an argument; the relay never reads a clock. Use a monotonic clock. After a backward step, timers and the lease
+///   continue as if no time had passed between the two calls; after a forward step they expire. A forward step while a part of
+///   the chain is out of reach ends the wait for that part's leases early: two chains may then fly until these have expired.
+/// - *Getters* take constant time and return values of the last agreement. Positions are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
-/// - *Output* is made from the state when it is asked for, so nothing can overflow. After every input, call
-///   [`poll_transmit`](Self::poll_transmit) until it gives `None`, then [`poll_event`](Self::poll_event) until `None`,
+/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, call
+///   [`poll_transmit`](Self::poll_transmit) until it returns `None`, then [`poll_event`](Self::poll_event) until `None`,
 ///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
-/// - Once drained, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
-/// - *Setpoints* are finite, inside [0, D], at the altitude the relay holds or one of the mission's band, and at least the
-///   mission's separation from those of its neighbours for the same pass. There is none before the first agreement, and
-///   nothing moves it but a new agreement or the relay's own turn in Algorithm 2: a new mission does not, though the place that is
-///   held may be outside its limits, until the chain has agreed in it. One between other sites leaves none until then.
+/// - After that, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
+/// - *Setpoints* are finite, within [0, D] along the line, at the relay's altitude or one of the mission's band, and at least
+///   the mission's separation from the neighbours' setpoints of the same pass. There is none before the first agreement. Only
+///   a new agreement or the relay's own turn in Algorithm 2 changes it. A new mission keeps it until the chain has agreed in
+///   that mission, even outside the new limits; a mission between other sites removes it until then.
 ///
 /// ```
 /// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
@@ -71,26 +64,23 @@ use crate::wire::upload::{Upload, UploadError};
 #[derive(Clone, Debug)]
 pub struct Relay {
     pub(super) node: Node,
-    network: u16,
+    pub(super) endpoint: Endpoint,
     wiring: Wiring,
-    /// Upstream or shared, and downstream.
+    /// Deframers of the upstream or shared port, and of the downstream port.
     deframers: [Deframer; 2],
-    pub(super) counter: u32,
     pub(super) clock: MonotonicClock,
-    #[cfg(feature = "auth")]
-    session: Option<Session>,
 }
 
 impl Relay {
-    /// A relay that has just been switched on at `now`; relay 1 (in a field relay N) begins by itself.
+    /// Creates a relay that is switched on at `now`; relay 1 (in a field relay N) starts by itself.
     ///
-    /// `seed` must differ from board to board, also where image and configuration are copies of each other, and should differ from one
-    /// start to the next: a chip's unique number, a random number generator, the noise of RAM after power-up. Two relays with one index tell
-    /// each other apart by it, so that at most one of them has a setpoint. The timing of repetitions, the numbering of sweeps and
-    /// which frames a guard takes for old ones depend on it, too, but no placement.
+    /// `seed` must differ between boards, even if their image and configuration are the same, and should differ between starts:
+    /// use a chip's unique number, a random number generator, or the noise of RAM after power-up. It lets two relays with the
+    /// same index distinguish each other, so that at most one has a setpoint. It also affects retransmission timing, sweep
+    /// numbers and the frames that a guard considers old, but no position.
     ///
     /// # Errors
-    /// [`SetupError`] names the part of `identity` or `settings` that does not fit.
+    /// Returns a [`SetupError`] that names the invalid part of `identity` or `settings`.
     pub fn new(
         mission: Mission,
         identity: Identity,
@@ -104,10 +94,10 @@ impl Relay {
         Ok(relay)
     }
 
-    /// As [`new`](Self::new), in `slot`, which stands in a place of its own: the stack need not hold a relay.
+    /// Creates a relay as [`new`](Self::new) does, but in `slot`, so that the stack need not hold it.
     ///
     /// # Errors
-    /// As there; `slot` is left as it was.
+    /// Returns the errors of [`new`](Self::new); `slot` is then unchanged.
     pub fn new_in<'a>(
         slot: &'a mut Option<Self>,
         mission: &Mission,
@@ -131,13 +121,10 @@ impl Relay {
     ) -> Self {
         Self {
             node: Node::new(mission, identity, settings, seed, now),
-            network: identity.network,
+            endpoint: Endpoint::new(identity.network, identity.index),
             wiring: settings.wiring,
             deframers: [Deframer::new(), Deframer::new()],
-            counter: 0,
             clock: MonotonicClock::new(now),
-            #[cfg(feature = "auth")]
-            session: None,
         }
     }
 
@@ -149,15 +136,17 @@ impl Relay {
             let Settings {
                 auth, dead_after, ..
             } = self.node.member().settings;
-            self.session = auth.map(|auth| Session::new(auth, number, dead_after));
+            if let Some(auth) = auth {
+                self.endpoint.sign(auth, number, dead_after);
+            }
         }
         self.node.begin(identity, seed, now);
     }
 
-    /// Takes in bytes received at `port`, however they are cut. Bytes at a port that `Settings::wiring` does not have are dropped.
+    /// Processes bytes received at `port`, split anywhere. Bytes at a port that `Settings::wiring` lacks are dropped.
     ///
-    /// A dozen instructions a byte; a CRC for at most one frame in 16 bytes; a tag, where frames are signed, and a message, at most 16
-    /// reaches, for at most one in 19. What takes longer is left to [`handle_timeout`](Self::handle_timeout).
+    /// Takes a dozen instructions per byte; a CRC for at most one frame per 16 bytes; a message of at most 16 reaches, with a tag
+    /// if frames are signed, for at most one per 19 bytes. Longer work is left to [`handle_timeout`](Self::handle_timeout).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -165,7 +154,7 @@ impl Relay {
     /// use uav_relay::{Instant, Port, Settings};
     ///
     /// let mut relay = relay(Settings::default());
-    /// // What a UART has received, however it is cut. Noise is counted, and nothing else comes of it.
+    /// Bytes from a UART, split anywhere. Noise is counted and has no other effect.
     /// relay.handle_bytes(Instant::from_millis(5), Port::Upstream, &[0x11, 0x22, 0x33, 0]);
     /// assert_eq!(relay.stats().truncated, 1);
     /// ```
@@ -182,51 +171,18 @@ impl Relay {
             first
         };
         for &byte in bytes {
-            match deframer.push(byte) {
-                None => {}
-                Some(Err(error)) => {
-                    let stats = self.node.stats_mut();
-                    let counter = match error {
-                        DeframeError::Oversized => &mut stats.oversized,
-                        DeframeError::Truncated => &mut stats.truncated,
-                    };
-                    bump(counter);
-                }
-                Some(Ok(plain)) => {
-                    let addressed =
-                        incoming::addressed(&mut self.node, now, self.network, port, plain);
-                    let (side, frame) = match addressed {
-                        Some(Addressed::By(side, frame)) => (side, frame),
-                        Some(Addressed::ByDuplicate(frame)) => {
-                            #[cfg(feature = "auth")]
-                            let sender = match &self.session {
-                                Some(session) => Some(session.sender(&frame)),
-                                None => incoming::sender(&self.node, &frame),
-                            };
-                            #[cfg(not(feature = "auth"))]
-                            let sender = incoming::sender(&self.node, &frame);
-                            if let Some(sender) = sender {
-                                self.node.hear_duplicate(now, sender);
-                            }
-                            continue;
-                        }
-                        None => continue,
-                    };
-                    #[cfg(feature = "auth")]
-                    if let Some(session) = &mut self.session {
-                        signed::receive(&mut self.node, session, now, side, &frame);
-                        continue;
-                    }
-                    incoming::receive(&mut self.node, now, side, &frame);
-                }
+            if let Some(decoded) = deframer.push(byte)
+                && let Some(frame) = self.endpoint.open(decoded, self.node.stats_mut())
+            {
+                frames::receive(&mut self.node, &mut self.endpoint, now, port, &frame);
             }
         }
     }
 
-    /// Handles what is due by `now`: timers that have run out, and one portion of a computation.
+    /// Handles timers that have expired by `now`, and one portion of a computation.
     ///
-    /// Bounded by that portion: 256 reaches while the leader predicts, the chain's hops over ten relays (or over forty where nothing
-    /// changes) of the joint method, 624 places of Algorithm 2; next to nothing otherwise.
+    /// The portion is bounded: 256 reaches while the leader predicts, the chain's hops over ten relays (over forty where nothing
+    /// changes) of the joint method, 624 positions of Algorithm 2; almost nothing otherwise.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -234,7 +190,7 @@ impl Relay {
     /// use uav_relay::Settings;
     ///
     /// let mut relay = relay(Settings::default());
-    /// // Relay 1 begins by itself: it wants to be called, portion by portion, until it has its place.
+    /// Relay 1 starts by itself: call it for each portion of work until it has its position.
     /// while let (None, Some(due)) = (relay.setpoint(), relay.poll_timeout()) {
     ///     relay.handle_timeout(due);
     /// }
@@ -245,9 +201,9 @@ impl Relay {
         self.node.handle_timeout(self.clock.advance(now));
     }
 
-    /// Has the chain agree again, from the beginning of its method: in a closed loop, once it has measured where it stands.
+    /// Restarts the method from its beginning: use it in a closed loop after measuring the actual position.
     ///
-    /// Only the leader (relay 1; in a field relay N) has something to begin; with any other relay nothing happens.
+    /// Only the leader (relay 1; in a field relay N) restarts; at other relays the call has no effect.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -262,9 +218,9 @@ impl Relay {
         self.node.restart(self.clock.advance(now));
     }
 
-    /// Writes the next frame to be sent into `frame`, if there is one. Call until there is none.
+    /// Writes the next frame to send into `frame`, if there is one. Call it until it returns `None`.
     ///
-    /// Linear in the length of the frame; a tag, where frames are signed.
+    /// The work is linear in the frame's length, plus a tag if frames are signed.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -282,44 +238,19 @@ impl Relay {
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut [u8; MAX_FRAME]) -> Option<Transmit> {
         let now = self.clock.advance(now);
-        let sender = self.node.member().node;
-        let mut header = Header {
-            network: self.network,
-            sender,
-            destination: 0,
-            counter: self.counter,
+        let sent = frames::poll_transmit(&mut self.node, &mut self.endpoint, now, frame)?;
+        let port = match self.wiring {
+            Wiring::Shared => Port::Shared,
+            Wiring::Pair if sent.to < self.node.member().node => Port::Upstream,
+            Wiring::Pair => Port::Downstream,
         };
-        #[cfg(feature = "auth")]
-        if let Some(session) = &mut self.session {
-            if self.node.is_passive() {
-                return None;
-            }
-            // A counter is never used twice: after four billion frames a new epoch is due.
-            if self.counter == u32::MAX {
-                return None;
-            }
-            let (side, len) = signed::next(&mut self.node, session, now, &mut header, frame)?;
-            return Some(self.sent(side, len));
-        }
-        let (side, to, message) = self.node.poll_message(now)?;
-        header.destination = to;
-        let len = frame::encode(header, &message, frame);
-        Some(self.sent(side, len))
+        Some(Transmit {
+            port,
+            len: sent.len,
+        })
     }
 
-    /// One more frame has gone out.
-    fn sent(&mut self, side: Side, len: usize) -> Transmit {
-        self.counter = self.counter.wrapping_add(1);
-        bump(&mut self.node.stats_mut().sent);
-        let port = match (self.wiring, side) {
-            (Wiring::Shared, _) => Port::Shared,
-            (Wiring::Pair, Side::Upstream) => Port::Upstream,
-            (Wiring::Pair, Side::Downstream) => Port::Downstream,
-        };
-        Transmit { port, len }
-    }
-
-    /// The next thing the firmware should know of, if there is one. Call until there is none. Constant work.
+    /// Returns the next event for the firmware, if there is one. Call it until it returns `None`. Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -343,7 +274,7 @@ impl Relay {
         self.node.poll_event()
     }
 
-    /// When [`Relay::handle_timeout`] is to be called at the latest; after a call it is `None` or later than `now`.
+    /// Returns the latest time of the next [`Relay::handle_timeout`] call; after that call it is `None` or later than `now`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -360,20 +291,20 @@ impl Relay {
 }
 
 impl Relay {
-    /// What it has said in the votes on views, to be stored whenever it has changed, *before* [`poll_transmit`](Self::poll_transmit) is
-    /// called: a promise that is forgotten is none. Constant work.
+    /// Returns the acceptor state, to be persisted after every change and *before* [`poll_transmit`](Self::poll_transmit).
+    ///
+    /// Without it a restarted relay breaks its promises, and the chain can split. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
         self.node.view_record()
     }
 
-    /// Has a relay that has just been made, and was handed nothing but an upload yet, stand by what it had said before it was
-    /// switched off in flight: the [`view_record`](Self::view_record) that was stored last.
+    /// Restores the [`view_record`](Self::view_record) stored before the relay was switched off in flight.
     ///
-    /// Constant work.
+    /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
     ///
     /// # Errors
-    /// [`RecordError::Base`] if it was stored by a relay that was loaded with another mission, [`RecordError::Begun`] if the relay
-    /// has begun to talk or to compute. Nothing has changed then.
+    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and [`RecordError::Begun`] if the
+    /// relay has already sent, received or computed something. The relay is then unchanged.
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
         self.node.resume_view(self.clock.advance(now), record)
     }
@@ -381,36 +312,34 @@ impl Relay {
 
 #[cfg(feature = "upload")]
 impl Relay {
-    /// Has a relay that has just been made, and was handed nothing yet, fly `upload`: the newest that it had stored on
-    /// [`Event::Uploaded`](crate::Event::Uploaded) before it was switched off. [`Relay::new`] still takes the mission that was loaded
-    /// before flight.
+    /// Restores `upload`, the newest one stored on [`Event::Uploaded`](crate::Event::Uploaded) before the relay was switched off.
     ///
-    /// Constant work.
+    /// Call it right after the relay was created, before any other input. [`Relay::new`] still takes the mission that was loaded
+    /// before flight. Takes constant time.
     ///
     /// # Errors
-    /// [`UploadError::Base`] if it was stored for another mission than the one that was loaded, [`UploadError::Line`] if there is no
-    /// line on earth for it, [`UploadError::Begun`] if the relay has begun to talk or to compute. Nothing has changed then.
+    /// Returns [`UploadError::Base`] if the upload was stored for another loaded mission, [`UploadError::Line`] if there is no
+    /// line on earth for it, and [`UploadError::Begun`] if the relay has already started. The relay is then unchanged.
     pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         self.node.resume(upload)
     }
 
-    /// Takes a new mission that has come another way than over the link; the chain adopts it as one that has.
-    ///
-    /// Constant work.
+    /// Accepts a new mission that was not received over the link; the chain adopts it like any other upload. Constant time.
     ///
     /// # Errors
-    /// [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays, [`UploadError::Line`] if
-    /// there is no line on earth for it, [`UploadError::Old`] if a mission as new as that is held.
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays,
+    /// [`UploadError::Line`] without a line on earth for it, and [`UploadError::Old`] if the relay holds a mission that is as
+    /// new.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }
 
-    /// The newest mission held, flown or not yet, if it was uploaded.
+    /// Returns the newest mission of this relay, active or not, if it was uploaded.
     pub fn upload(&self) -> Option<&Upload> {
         self.node.upload()
     }
 
-    /// The version of the mission that it flies: 0 for the one that was loaded before flight.
+    /// Returns the version of the active mission: 0 for the one that was loaded before flight.
     pub fn version(&self) -> u16 {
         self.node.member().active.version
     }

@@ -1,18 +1,16 @@
-//! What a firmware calls: bytes in, bytes and setpoints out, and no input or output of its own.
+//! Interface to the firmware: bytes in, frames, events and setpoints out, without input or output of its own.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `facade` | bytes and time into a relay, frames and events out of it; records and uploads over a reboot |
-//! | `readings` | what the firmware may read of it, and what it tells it of the world |
-//! | `port` | where frames come in and go out |
-//! | `incoming`, `signed` | a frame, without and with a tag, to the node and from it |
+//! | `facade` | relay: bytes and time in, frames and events out; records and uploads across a reboot |
+//! | `readings` | getters, and inputs besides bytes |
+//! | `port` | ports |
+//! | `frames` | frames to and from the protocol |
 
 mod facade;
-mod incoming;
+mod frames;
 mod port;
 mod readings;
-#[cfg(feature = "auth")]
-pub(crate) mod signed;
 #[cfg(feature = "auth")]
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,4 @@
-//! Readings of a relay, of its last agreement; and inputs besides bytes: measurements, the drone's position, who flies it, relays that are
-//! out of the way. Constant work.
+//! Getters of a relay, and inputs besides bytes: measurements, position, control state, lost relays out of the way.
 
 use super::facade::Relay;
 use crate::field::estimate::Estimate;
@@ -17,8 +16,9 @@ use crate::time::Instant;
 use crate::view::ViewId;
 
 impl Relay {
-    /// Where to fly, once the chain has agreed, in metres in the mission's frame: to the relay's place, or with `Settings::guard` as
-    /// far toward it as is safe by now.
+    /// Returns the current setpoint in metres in the mission's frame; `None` before the first agreement.
+    ///
+    /// It is the agreed position, or with `Settings::guard` a position as close to it as is safe now.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -32,13 +32,15 @@ impl Relay {
         self.node.setpoint()
     }
 
-    /// The place that the chain has agreed on for this relay, where it is to be in the end; `None` before the first agreement.
+    /// Returns the agreed position, before the guard limits it; `None` before the first agreement.
     pub fn final_setpoint(&self) -> Option<Placement> {
         self.node.final_setpoint()
     }
 
-    /// Returns true unless the drone is known to be out of order with a flown neighbour: it must not be engaged before its pilot has flown
-    /// it to its own side along the line. Hand it to `Autopilot::handle_ready`.
+    /// Returns true unless the drone is known to be out of order with a flown neighbour.
+    ///
+    /// If false, its pilot must fly it to its own side along the line before engaging. Pass the value to
+    /// `Autopilot::handle_ready`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -52,26 +54,27 @@ impl Relay {
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
     }
 
-    /// Returns what keeps the drone from the agreed place on `side`, where `Settings::guard` is set. While the drone is not flown only
-    /// [`HoldReason::Order`] is possible.
+    /// Returns the reason why the guard holds the drone back on `side`; `None` without a guard.
+    ///
+    /// While the drone is not flown only [`HoldReason::Order`] is possible.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
 
-    /// The SIR (linear) that every hop of the agreed chain meets; `None` before the first agreement, and while nothing is known of the
-    /// interference.
+    /// Returns the linear SIR of every hop of the agreed chain; `None` before an agreement or without known interference.
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
     }
 
-    /// At the leader, after Algorithm 1 or 4: at the altitudes held no chain has an SIR of this or more, linear. `None` elsewhere, and
-    /// with the paper's fixed step, which leaves chains out.
+    /// Returns an upper bound of the linear SIR at the current altitudes, at the leader after Algorithm 1 or 4.
+    ///
+    /// No chain reaches it. `None` at other relays, and with the paper's fixed step, which omits chains.
     pub fn bound(&self) -> Option<f32> {
         self.node.round().bound()
     }
 
-    /// Where the relay is in the protocol.
+    /// Returns the protocol phase of the relay.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -84,14 +87,15 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive: it has no setpoint and takes part in nothing, because another relay uses its number and
-    /// has the larger claim to it. It becomes active with [`clear_index_taken`](Self::clear_index_taken), or once nothing was received
-    /// of the other relay for twice `Settings::dead_after`, and has a place again once the chain has agreed anew.
+    /// Returns true while this relay is passive, because another relay with the larger claim uses its index.
+    ///
+    /// It has no setpoint and takes no part in the protocol until the other relay has been silent for twice
+    /// `Settings::dead_after`, or until [`clear_index_taken`](Self::clear_index_taken) is called.
     pub fn stands_down(&self) -> bool {
         self.node.is_passive()
     }
 
-    /// What has been counted since the relay was switched on.
+    /// Returns the counters since the relay was switched on.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -105,82 +109,85 @@ impl Relay {
         self.node.stats()
     }
 
-    /// Its place in the chain by the view agreed on, 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
+    /// Returns the relay's place in the agreed view: 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
         self.node.member().index
     }
 
-    /// The view of the chain that it is in, which it has accepted last: all that it says of places is of that view.
+    /// Returns the last accepted view, to which all positions refer.
     pub fn view(&self) -> ViewId {
         self.node.member().view
     }
 
-    /// Until when it may hold what was agreed on without hearing more: by then nobody else flies anything else. `None` before that is
-    /// known, and when the time is over.
+    /// Returns the expiry time of the lease; `None` before the first lease and after its expiry.
+    ///
+    /// Without a renewal the relay drops the agreement at that time; no other relay uses another agreement before.
     pub fn lease(&self) -> Option<Instant> {
         let until = self.node.lease()?;
         Some(self.clock.external(until))
     }
 
-    /// The node numbers of its neighbours toward the transmitter and toward the receiver, `None` where it has none. A node number is
-    /// the index that a relay was given before flight; no view changes it.
+    /// Returns the node numbers of the neighbours toward the transmitter and toward the receiver; `None` for none.
+    ///
+    /// A node number is the index that a relay was configured with; no view changes it.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
         self.node.neighbours()
     }
 
-    /// The mission the relay flies, with as many relays as are in its view.
+    /// Returns the active mission, with the number of relays in the view.
     pub fn mission(&self) -> &Mission {
         &self.node.member().mission
     }
 
-    /// Between which sites the mission is flown; `None` for those that the relay was loaded with. Places are along the line between these:
-    /// a firmware turns them into latitudes and longitudes, and back, by no other from the call on in which this changed.
+    /// Returns the sites of the active mission; `None` for the ones configured before flight.
+    ///
+    /// They define the line of all positions: once they change, convert latitude and longitude by the new ones only.
     pub fn sites(&self) -> Option<Sites> {
         self.node.member().sites()
     }
 
-    /// What the measurements at this place say so far, and `None` before they say anything.
+    /// Returns the estimate from the measurements at this position; `None` before there are enough.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
 
-    /// Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
+    /// Returns the Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// What it believes of the interference, and the number of that: of the mission before the chain has found anything else.
+    /// Returns the estimate of the interference and its number; the mission's until the chain has estimated another.
     pub fn belief(&self) -> Told {
         self.node.round().sensing().told()
     }
 
-    /// What the transmitter (upstream) or the receiver (downstream) has told this relay of the interference there: the mean of its
-    /// measurements, W, the receiver's noise taken off; `None` before it has, and in a relay that does not listen
-    /// ([`Settings::listen`](crate::Settings::listen)).
+    /// Returns the interference measured at the transmitter (upstream) or the receiver (downstream), W.
+    ///
+    /// The mean without noise; `None` before a report or without [`Settings::listen`](crate::Settings::listen).
     pub fn level_w(&self, side: Side) -> Option<f32> {
         self.node.round().sensing().level_w(side)
     }
 
-    /// At the leader: why nothing was made of what was heard last.
+    /// Returns the reason why the last collected measurements gave no estimate, at the leader.
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
 
-    /// While Algorithm 2 goes on, at the leader: rounds that are over, and the SIR (linear) of the chain after the last.
+    /// Returns the completed rounds of Algorithm 2 while it runs, and the chain's linear SIR after the last; at the leader.
     pub fn rounds(&self) -> Option<(u16, f32)> {
         self.node.round().rounds()
     }
 
-    /// What the relay holds; its altitude is the one chosen last.
+    /// Returns the relay's profile; its altitude is the one chosen last.
     pub fn profile(&self) -> Profile {
         self.node.round().profile()
     }
 }
 
 impl Relay {
-    /// Takes one measurement of the interference, W or linear SIR, where `Settings::measure` asks for them.
+    /// Processes one measurement of the interference, W or linear SIR, if `Settings::measure` requires them.
     ///
-    /// Constant work. What is no use is counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
+    /// Takes constant time. Unusable samples are counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -198,10 +205,9 @@ impl Relay {
         self.node.handle_sample(self.clock.advance(now), sample);
     }
 
-    /// Takes in where the drone was at time `at`, `x_m` and altitude: when that was measured, not when it was read. Where
-    /// `Settings::guard` is set there is no setpoint before the first of these.
+    /// Processes the drone's position, `x_m` and altitude, at the time `at` of its measurement. Takes constant time.
     ///
-    /// Constant work. A place that is no number, or farther than 1e7 m, has no effect.
+    /// A guard needs it before the first setpoint. A position that is not a number, or farther than 1e7 m, is ignored.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -222,14 +228,12 @@ impl Relay {
             .handle_position(now, self.clock.internal(at), place);
     }
 
-    /// Whether the drone flies to the setpoints from now on: not while its pilot has it, or it is on the ground. A relay is taken to be
-    /// flown until this says otherwise.
+    /// Reports whether the drone flies to the setpoints from now on; initially true. Takes constant time.
     ///
-    /// Where `Settings::guard` is set, a relay that is not flown has no setpoint, and its neighbours are told that it may be anywhere: they
-    /// stay where they are toward it. Flown again it begins as after a start, with the next place that
-    /// [`handle_position`](Self::handle_position) takes in.
-    ///
-    /// Constant work. To say the same again has no effect.
+    /// Report false while a pilot controls the drone or it is on the ground. With `Settings::guard`, a relay that is not flown
+    /// has no setpoint, and its neighbours are informed that it may be anywhere: they keep their positions toward it. When flown
+    /// again, it starts as after power-up, with the next position from [`handle_position`](Self::handle_position). A repeated
+    /// report has no effect.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -237,7 +241,7 @@ impl Relay {
     /// use uav_relay::{Instant, Settings};
     ///
     /// let mut relay = relay(Settings::default());
-    /// // The pilot has taken the sticks; later the autopilot follows set-points again.
+    /// The pilot has taken control; later the autopilot follows setpoints again.
     /// relay.handle_control(Instant::from_millis(1_000), false);
     /// relay.handle_control(Instant::from_millis(9_000), true);
     /// ```
@@ -245,18 +249,17 @@ impl Relay {
         self.node.handle_control(self.clock.advance(now), flown);
     }
 
-    /// Relays at `side` that fell silent, or are not flown ([`handle_control`](Self::handle_control)), have landed, or were taken away: the
-    /// guard need not keep clear of them any more.
+    /// Reports that lost or unflown relays on `side` ([`handle_control`](Self::handle_control)) have landed or were removed.
     ///
-    /// Constant work.
+    /// The guard no longer keeps clear of them. It keeps clear of the other relays of the view on that side until it has heard the
+    /// nearest one; if that one is lost before, clear again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
 
-    /// Reports that the other relay with this one's number ([`Event::IndexTaken`](crate::Event::IndexTaken)) has landed, or has another number
-    /// now: a relay that is [passive](Self::stands_down) becomes active, with a larger claim than the other one had.
+    /// Reports that the other relay with this index ([`Event::IndexTaken`](crate::Event::IndexTaken)) is gone.
     ///
-    /// Constant work.
+    /// A [passive](Self::stands_down) relay becomes active, with a larger claim than the other had. Takes constant time.
     pub fn clear_index_taken(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }

@@ -1,4 +1,4 @@
-//! The end of the counter, which no test gets to by sending.
+//! End of the frame counter, which no test can reach by sending.
 
 use super::Relay;
 use crate::mission::tests::paper;
@@ -19,7 +19,7 @@ fn relay(auth: Option<Auth>) -> Relay {
     Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
 }
 
-/// A counter that came again would let an old frame be taken for a new one: better to fall silent.
+/// Checks that the relay stops sending: a repeated counter would let an old frame pass for a new one.
 #[test]
 fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
     let auth = Auth {
@@ -29,7 +29,7 @@ fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
     let mut frame = [0; MAX_FRAME];
     for (auth, silent) in [(Some(auth), true), (None, false)] {
         let mut relay = relay(auth);
-        relay.counter = u32::MAX - 1;
+        *relay.endpoint.counter_mut() = u32::MAX - 1;
         let mut counters = 0;
         for seconds in 0..100 {
             let now = Instant::from_millis(1_000 * seconds);
@@ -39,9 +39,12 @@ fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
             }
         }
         if silent {
-            assert_eq!((counters, relay.counter), (1, u32::MAX));
+            assert_eq!((counters, *relay.endpoint.counter_mut()), (1, u32::MAX));
         } else {
-            assert!(counters > 2 && relay.counter < 1000, "it wraps");
+            assert!(
+                counters > 2 && *relay.endpoint.counter_mut() < 1000,
+                "it wraps"
+            );
         }
     }
 }

@@ -1,13 +1,13 @@
-//! What the chain flies by, and when something else takes its place.
+//! Interference estimate of the chain, and the rules for its replacement.
 //!
-//! | what the sums say | what is believed | what follows |
+//! | result of the fit | current estimate | action |
 //! | --- | --- | --- |
-//! | a source | nothing yet | it is believed |
-//! | a source | another one, and more than 1 % of the SIR hangs on it | it is believed if chance would not make it so, or if a quarter more is known than when the last one was |
-//! | a source | nearly the same | nothing |
-//! | too few places | nothing yet | the next spread: the relays hear other places |
-//! | too few places, or no source | a source that what is heard contradicts | the relays spread evenly |
-//! | too few places, or no source | a source | it is kept |
+//! | a source | none | adopt the source |
+//! | a source | another source, and the SIR differs by more than 1 % | adopt it if the difference is significant, or the information has grown by 10 % |
+//! | a source | nearly the same source | keep the estimate |
+//! | too few positions | none | take the next spread, so that the relays measure elsewhere |
+//! | too few positions, or no source | a source that contradicts the measurements | spread evenly |
+//! | too few positions, or no source | a source | keep the estimate |
 
 use super::ends::{judge, v_at_end};
 use super::fit::{Fit, FoundSource, Unfit, misfit};
@@ -20,29 +20,29 @@ use crate::place::Placement;
 use crate::settings::Listen;
 use crate::time::{Duration, Instant};
 
-/// What the chain believes of the interference.
+/// Interference estimate of the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Belief {
-    /// What the mission says.
+    /// Interference of the mission.
     #[default]
     Mission,
-    /// Nothing: the relays spread along the line, to hear.
+    /// Unknown interference; the relays spread along the line to measure.
     Unknown(Spread),
-    /// One source.
+    /// Single source.
     Source {
-        /// Where, and how strong.
+        /// Position and power of the source.
         source: Interferer,
-        /// What the receiver hears of it, W; 0 where it has not said, and the source's path loss over the ground is taken.
+        /// Interference power at the receiver, W; 0 if it has not measured: then the source's path loss over the ground is used.
         receiver_w: f32,
     },
 }
 
-/// How relays spread that know nothing.
+/// Spacing of relays without an estimate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
-    /// Evenly.
+    /// Equal hops.
     #[default]
     Even,
     /// The first hop half as long as the others.
@@ -61,59 +61,58 @@ impl Spread {
     }
 }
 
-/// A belief and its number, which counts up at the leader and wraps.
+/// Estimate with its sequence number, which the leader increments and which wraps.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Told {
-    /// Its number, 0 for what was loaded.
+    /// Sequence number, 0 for the initial estimate.
     pub number: u16,
-    /// What is believed.
+    /// Interference estimate.
     pub belief: Belief,
 }
 
-/// Relative, as a mean square: what is not worth an agreement, though more is known,
+/// Mean square relative change that is not worth an agreement, even with more information,
 const WORTH: f64 = 1e-5;
 
-/// and what is a change of the interference,
+/// and the one that is a change of the interference,
 const CHANGE: f64 = 1e-4;
 
-/// if it is so many times what chance would make: where nothing is seen to move, and where something is.
+/// if it exceeds the expected variance by this factor: for a stationary interferer, and for one that moves.
 const BEYOND_CHANCE: f64 = 8.0;
 const FOLLOWED: f64 = 1.5;
 
-/// Once a chain has settled, only what is beyond so many times is followed: then it is another world, of which all is to be learned again.
+/// The factor once a chain has settled: a larger change means another interferer, for which the estimation starts again.
 const ANOTHER: f64 = 64.0;
 
-/// The same for the receiver alone.
+/// `CHANGE` for the receiver's own measurement.
 const LOUDER: f64 = 0.025;
 
-/// How many times what chance would make the track may be off what is heard.
+/// Maximum squared deviation of the track from the fit, relative to the expected variance.
 const ASTRAY: f64 = 4.0;
 
-/// How much more has to be known for the same again, and how many other beliefs there are until a chain has settled: a world that is
-/// still becomes silent.
+/// Minimum growth of the information for a refinement, and number of refinements until a chain has settled. So the chain stops
+/// sending new estimates of a stationary interferer.
 const LEARNED: f64 = 1.1;
 const REFINED: u8 = 4;
 
-/// How long drones take to follow by a few metres.
+/// Time in which drones follow by a few metres.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// A mean square of relative errors above which a belief is contradicted.
+/// Mean square relative error above which the measurements contradict an estimate.
 const CONTRADICTED: f64 = 0.25;
 
-/// The same of what the mission says, in times what is expected of a measurement.
+/// The limit for the mission's interference, relative to the expected variance of a measurement.
 const GUESSED: f64 = 16.0;
 
-/// How much was known when a belief was taken up.
+/// Information at the time at which an estimate was adopted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Places over the variance of one.
+    /// Number of positions over the variance of one.
     information: f64,
-    /// How far off it may be by chance, relative, as a mean square.
+    /// Expected mean square relative error of the estimate.
     chance: f64,
-    /// How often another one was taken up in the same world; of an interferer that moves, because more was known.
+    /// Number of refinements for the same interferer; for a moving one, of those because of more information.
     refined: u8,
-    /// Which way the interferer goes.
     track: Track,
 }
 
@@ -126,21 +125,17 @@ impl Knowledge {
     };
 }
 
-/// What sums make of a belief.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Review {
-    /// What is to be believed instead.
     pub(crate) adopt: Option<Belief>,
-    /// How much was known by then.
     pub(crate) known: Knowledge,
-    /// Why there is no source.
     pub(crate) unfit: Option<Unfit>,
-    /// Which ends measure something else than follows from what the relays hear.
+    /// Transmitter or receiver whose measurements do not fit those of the relays.
     pub(crate) ends: EndsOff,
 }
 
-/// Reviews `told`, of which `mission` is made, by `sums` along the chain and what its ends hear. `before` is what was
-/// known when it was taken up.
+/// Reviews the estimate `belief`, on which `mission` is based, with the chain's `sums` and the `levels` of its ends. `before` is
+/// the information when `belief` was adopted.
 pub(crate) fn review(
     mission: &Mission,
     belief: &Belief,
@@ -210,7 +205,7 @@ pub(crate) fn review(
         Belief::Source {
             receiver_w: before, ..
         } if receiver_w > 0.0 || *before > 0.0 => {
-            // Where only one of the two says anything, all of it is new.
+            // If only one of the two has a measurement, the whole difference is new.
             let ratio = f64::from(before - receiver_w) / f64::from(receiver_w);
             ratio * ratio
         }
@@ -236,7 +231,7 @@ pub(crate) fn review(
     }
 }
 
-/// The fit of all that is heard, and the source that it speaks of; and which ends are off, whose levels are taken away.
+/// Returns the fit of all measurements and its source; `levels` of ends that do not fit are cleared.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -263,7 +258,7 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Where an interferer that is seen to move will be when the chain stands for it. `heard` is when what is heard was, on average.
+/// Returns the position of a moving interferer when the drones will have moved; `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -273,7 +268,7 @@ fn followed(
     listen: &Listen,
 ) -> Option<Interferer> {
     track.take(found, heard, listen.half_life);
-    // What is agreed on now holds until the next look, and the drones have to fly there.
+    // The agreement is used until the next review, and the drones have to fly to the new positions.
     let ahead = Duration::from_micros(listen.every.as_micros() / 2);
     let [was, will] = track.ahead(now + ahead + FLIGHT)?;
     let power_w = fit.power_w(mission, was)?;
@@ -286,8 +281,8 @@ fn followed(
     None
 }
 
-/// The fit that counts the end at `x_m` as one place more, as far as what it hears is in line with the others: then the path loss over the
-/// ground is what the mission says.
+/// Returns the fit with the end at `x_m` as an additional position, if its level fits the others. Only then does the path loss
+/// over the ground agree with the mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -319,8 +314,8 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// What the receiver hears, W: what it says, and, as far as that is in line with it, what the source makes of it over the ground. Both count
-/// by how sure they are. 0 where the receiver has said nothing.
+/// Returns the interference power at the receiver, W; 0 without a measurement. It is the mean of the receiver's level and the
+/// source's power over the ground, if the two agree, weighted by their variances.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -366,7 +361,7 @@ fn at_a_loss(
     let known = mission.known_source();
     let expected = f64::from(listen.relative_error) * f64::from(listen.relative_error);
     let allowed = match belief {
-        // What nobody has heard is believed no more than what is heard bears out.
+        // The mission's interference was not measured, so its limit is stricter.
         Belief::Mission => GUESSED * expected,
         _ => CONTRADICTED,
     };

@@ -1,23 +1,24 @@
-//! The relay whose measurements do not fit those of the others: its receiver is broken, or it lies.
+//! Identification of the relay whose measurements do not fit those of the others, because its receiver is faulty or it lies.
 //!
-//! Where what all hear is not of one source, the leader has one relay after the other leave its share out of a pass. Without the one that is
-//! wrong the others are of one mind; without any other one they are not.
+//! If the measurements do not fit a single source, the leader excludes one relay after the other from a pass. Without the faulty
+//! relay the others are consistent; without any other relay they are not.
 //!
-//! | pass | left out | what comes back | next |
+//! | pass | excluded | result | next |
 //! | --- | --- | --- | --- |
-//! | usual | nobody | fits, or a trial was in vain less than [`REST`] passes ago | usual |
-//! | usual | nobody | does not fit, of four relays or fewer | usual, and what comes back counts: nobody knows who is wrong |
-//! | usual | nobody | does not fit | trial of relay 1 |
-//! | trial of n | n | how well the others fit | trial of n + 1 |
-//! | trial of the last | it | one without which the others fit far better than without any other | first word |
-//! | trial of the last | it | no such one: nobody knows who is wrong | usual, and what comes back counts |
-//! | first word | it | | second word |
-//! | second word | it | what the others hear | usual, and what comes back counts |
+//! | usual | none | fits, or the last trial failed less than [`REST`] passes ago | usual |
+//! | usual | none | does not fit, with four relays or fewer | usual, and the result counts: the faulty relay is unknown |
+//! | usual | none | does not fit | trial of relay 1 |
+//! | trial of n | n | variance of the others | trial of n + 1 |
+//! | trial of the last | last | without one relay the others fit far better than without any other | first notice |
+//! | trial of the last | last | no such relay: the faulty one is unknown | usual, and the result counts |
+//! | first notice | faulty relay | | second notice |
+//! | second notice | faulty relay | measurements of the others | usual, and the result counts |
 //!
-//! A relay that hears something absurd, a factor of 300 off what is believed and far off what the others hear, leaves itself out at once, and says so on the way back.
+//! A relay with an absurd measurement, a factor of 300 off the estimate and inconsistent with the others, excludes itself at
+//! once, and reports that on the way back.
 //!
-//! A relay that is left out of two passes one after the other leaves itself out from then on, until it fits the others again. Nothing new is
-//! believed from the first pass of a trial to its last.
+//! A relay that is excluded from two successive passes excludes itself from then on, until it fits the others again. No new
+//! estimate is adopted from the first pass of a trial to its last.
 
 use super::fit::Fit;
 use super::level::MEASURED_W;
@@ -25,69 +26,67 @@ use super::listener::Place;
 use super::sums::Sums;
 use super::terms::{Terms, UNIT_W};
 
-/// How many times the variance that is expected all may have and still fit.
+/// Maximum variance of consistent measurements, relative to the expected one.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Standard deviations, squared, that what leaving one out takes from the misfit must be above,
+/// Minimum reduction of the misfit by an exclusion, in squared standard deviations,
 const DEVIATIONS: f64 = 49.0;
 
-/// and the least that it must be: some 15 % of one place.
+/// and absolutely: some 15 % of one position.
 const LEAST: f64 = 0.02;
 
-/// The variance without anybody else must be so many times that without the wrong one.
+/// Minimum ratio of the variances without the second-best relay and without the faulty one.
 const DECISIVE: f64 = 6.0;
 
-/// The others are of one mind up to this variance of their relative errors (some 1.5 dB).
+/// Maximum variance of the relative errors of consistent measurements (some 1.5 dB).
 const OF_ONE_MIND: f64 = 0.1;
 
-/// Passes between a trial that was in vain and the next one.
+/// Passes between a failed trial and the next one.
 const REST: u8 = 4;
 
-/// Standard deviations, squared, and the least of a difference, squared, up to which a relay fits the others again.
+/// Maximum squared difference at which a relay fits the others again: in squared standard deviations, and absolutely.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Of fewer relays nobody can tell who is wrong: without one of them three are left, which any three unknowns fit.
+/// Minimum number of relays for an identification: with four, an exclusion leaves three, which any three unknowns fit.
 const FEWEST: u16 = 5;
 
-/// With fewer places than that, less what has faded, they could all be as wrong as any one.
+/// Minimum number of positions, after fading; with fewer, any of them could be faulty.
 const ENOUGH: f32 = 3.5;
 
-/// A place that counts so many times less than the others' on average is lost in the rounding of their sums.
+/// Maximum ratio of the others' mean weight to that of a position; a smaller weight is lost in the rounding of the sums.
 const LOST: f32 = 3e3;
 
-/// What the leader is at.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Usual,
-    /// This node is left out.
+    /// Trial without this node.
     Trying(u16),
-    /// It is told for the first or the second time that this node is left out.
+    /// Notice that this node is excluded; `true` for the second one.
     Telling(u16, bool),
 }
 
-/// The leader's search for who is wrong.
+/// Leader's search for the faulty relay.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
     stage: Stage,
-    /// Passes that are left until the next trial may begin.
+    /// Passes until the next trial may start.
     rest: u8,
-    /// Without whom the others fit best.
+    /// Node without which the others fit best.
     best: u16,
-    /// What is left of all, of those without that one, and their variance; and the least variance without any other.
+    /// Misfit with all relays and without the best one, their variance, and the smallest variance without any other.
     seen: f32,
     seen_best: f32,
     least: f32,
     second: f32,
 }
 
-/// What follows a pass.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
-    /// What came back counts.
+    /// Review the result.
     Review,
-    /// It counts, and does not fit together: nobody knows who is wrong.
+    /// Review the result; it is inconsistent, and the faulty relay is unknown.
     Unknown,
-    /// Another pass, soon.
+    /// Start another pass soon.
     Again,
 }
 
@@ -102,7 +101,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// The node that is left out of the next pass, 0 for none.
+    /// Node excluded from the next pass, 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Usual => 0,
@@ -110,7 +109,7 @@ impl Trial {
         }
     }
 
-    /// Takes what came back of a pass of `relays` relays, whose nodes are among 1 to `nodes`.
+    /// Evaluates a pass of `relays` relays, whose nodes are among 1 to `nodes`.
     pub(crate) fn take(
         &mut self,
         sums: &Sums,
@@ -122,7 +121,7 @@ impl Trial {
         match self.stage {
             Stage::Usual => {
                 self.rest = self.rest.saturating_sub(1);
-                // One that hears far more than all the others drowns them, so that nothing fits.
+                // A relay that measures far more than all others dominates the sums, so that nothing fits.
                 let (odd, seen) = match fit {
                     Ok(fit) => {
                         let odd = fit.variance() > OUT_OF_LINE * fit.expected();
@@ -148,7 +147,7 @@ impl Trial {
                 let (variance, seen) = match fit {
                     Ok(fit) => (narrow(fit.variance()), narrow(fit.seen())),
                     Err(_) if sums.count() > ENOUGH => (f32::MAX, f32::MAX),
-                    // It may be the one.
+                    // This relay may be the faulty one.
                     Err(_) => (0.0, 0.0),
                 };
                 if variance < self.least {
@@ -198,11 +197,11 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// What a relay hears may be so many times more or less than what is believed before it looks for itself: its share counts so little then
-/// that a trial would not find it, nor are the others any worse for it.
+/// Factor between measurement and estimate above which a relay checks itself. Its weight is then so small that a trial would not
+/// find it, and it does not disturb the others.
 const ABSURD: f32 = 300.0;
 
-/// Whether a relay hears at `place` something absurd by what is believed, `expected`, and by what all the others hear, whose sums are `others`.
+/// Returns true if the measurement at `place` is absurd compared with the estimate `expected` and with the sums of all `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -222,9 +221,8 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Whether a relay that has left itself out still hears something else at `place` than all the others, whose sums are `others`; what is believed makes it `expected`.
-///
-/// The difference of v and what the others make of it, e, is (v / e - e / v) / 2, which grows alike in both directions.
+/// Returns true if the measurement of an excluded relay at `place` still does not fit the sums of all `others`. `expected` is the
+/// estimate there. The difference of v and the others' fit e is (v / e - e / v) / 2, which is symmetric in both.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -246,7 +244,7 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Whether a relay that hears nothing at these terms should hear several times the noise by what the others hear, all of them repeatedly.
+/// Returns true if a relay that measures nothing should measure several times the noise, by repeated measurements of all others.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -261,7 +259,7 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Whether a ratio of two powers is not 1 beyond these standard deviations, squared, and this least difference, squared.
+/// Returns true if a ratio of powers differs from 1 by more than these squared standard deviations and difference.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;

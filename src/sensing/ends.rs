@@ -1,15 +1,17 @@
-//! An end whose receiver is broken: the transmitter or the receiver measures something else than follows from what the relays hear.
+//! Faulty receiver of the transmitter or of the ground receiver: its measurements do not fit those of the relays.
 //!
-//! What an end should hear follows from the source that the relays hear and from what the mission says of the path over the ground. Of each end:
+//! The expected level at an end follows from the source of the relays' fit and from the mission's path loss over the ground. The
+//! two ends:
 //!
-//! | the transmitter | the receiver | what follows |
+//! | transmitter | receiver | conclusion |
 //! | --- | --- | --- |
-//! | fits | does not | the receiver's sensor is off: what it says is left out, the mission's path counts |
-//! | does not | fits | the transmitter's sensor is off |
-//! | does not | does not, by the same factor | the ground takes more or less than the mission says: the receiver counts |
-//! | does not, or says nothing | does not, or not alike | nobody knows who is wrong, or a hill is in the way: the receiver counts |
+//! | fits | does not fit | the receiver's sensor is faulty: its level is ignored, and the mission's path loss is used |
+//! | does not fit | fits | the transmitter's sensor is faulty |
+//! | does not fit | does not fit, by the same factor | the path loss over the ground differs from the mission's: the receiver's level is used |
+//! | does not fit, or no level | does not fit, or another factor | a sensor is faulty or a hill is in the way: the receiver's level is used |
 //!
-//! The relays have to be three or more, of one mind, and more than the unknowns. An end that was off stays so until it fits, or the other one does not.
+//! At least three relays are required, consistent and more than the unknowns. A faulty end stays so until it fits or the other
+//! does not.
 
 use super::doubt::is_apart;
 use super::fit::Fit;
@@ -18,13 +20,13 @@ use super::terms::{UNIT_W, terms};
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Standard deviations, squared, and the least of a difference, squared (a factor of 1.5), from which on an end does not fit.
+/// Minimum squared difference of an end that does not fit: in squared standard deviations, and absolutely (a factor of 1.5).
 const APART: (f64, f64) = (49.0, 0.174);
 
-/// Of fewer relays, and two ends, nobody can tell who is wrong.
+/// Minimum number of relays; with fewer and two ends, the faulty one is unknown.
 const FEWEST: u16 = 3;
 
-/// What an end says over what it should, and its variance, relative.
+/// Ratio of an end's level to the expected one, and its relative variance.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     ratio: f64,
@@ -37,13 +39,13 @@ impl Told {
     }
 }
 
-/// The v of an end that hears `level`, over the ground that the mission says.
+/// Returns v of an end with `level`, by the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Holds what the ends say against what the relays hear, whose fit is `fit`.
+/// Compares the levels of the ends with `fit`, the fit of the relays' measurements.
 pub(super) fn judge(mission: &Mission, fit: &Fit, levels: &Levels, relative_error: f32) -> EndsOff {
     let before = levels.off;
     if mission.relays() < FEWEST || !fit.is_of_one_mind() {
@@ -55,7 +57,7 @@ pub(super) fn judge(mission: &Mission, fit: &Fit, levels: &Levels, relative_erro
         let expected = fit.value(&there);
         let own = f64::from(relative_error) * f64::from(relative_error);
         let ratio = v_at_end(mission, level) / expected;
-        // The difference is taken relative to the smaller of the two, and so is the error of what is expected.
+        // The difference is relative to the smaller of the two, and so is the error of the expected level.
         let unsure = fit.relative_variance(&there) * (1.0 / (ratio * ratio)).max(1.0);
         let told = Told {
             ratio,
@@ -76,7 +78,7 @@ pub(super) fn judge(mission: &Mission, fit: &Fit, levels: &Levels, relative_erro
             let alike = !is_apart(tx.ratio / rx.ratio, tx.unsure + rx.unsure, APART);
             off(false, false, !alike)
         }
-        // The one that was off is still the one; of the other nothing new is known.
+        // A faulty end remains faulty; about the other one nothing new is known.
         (None, Some(rx)) if before.receiver && !rx.fits() => before,
         (Some(tx), None) if before.transmitter && !tx.fits() => before,
         (None, Some(end)) | (Some(end), None) => off(false, false, !end.fits()),

@@ -1,20 +1,20 @@
-//! A symmetric positive 4 x 4 system by its L D L^T factors, in f64; the last unknown may be left out.
+//! Symmetric positive 4 x 4 system, solved by L D L^T factorisation in f64; the last unknown may be omitted.
 
-/// The factors. In the order of the terms: below the diagonal of L, and D.
+/// L D L^T factors in the order of the terms: L below its diagonal, and D.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// Whether the last unknown is solved for.
+    /// True if the last unknown is solved for.
     pub(super) whole: bool,
 }
 
-/// A pivot is no pivot below this part of what it came from: seven digits of an f32, of sums of some hundred places.
+/// Minimum pivot relative to the first: seven digits of an f32, for sums of some hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Of the products as [`Sums`](super::sums::Sums) has them. The last unknown is left out where its pivot is not above `least`. `None`
-    /// where the first three cannot be told apart.
+    /// Factors the products of [`Sums`](super::sums::Sums); `None` if the first three unknowns cannot be separated. The last
+    /// unknown is omitted if its pivot is not above `least`.
     pub(super) fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
         if !(aa > 0.0) {
@@ -39,7 +39,6 @@ impl Factor {
         })
     }
 
-    /// L^-1 `right`.
     fn forward(&self, right: [f64; 4]) -> [f64; 4] {
         let [l1, l2, m2, l3, m3, n3] = self.below;
         let [a, b, c, d] = right;
@@ -53,7 +52,6 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// The unknowns.
     pub(super) fn solve(&self, right: [f64; 4]) -> [f64; 4] {
         let [l1, l2, m2, l3, m3, n3] = self.below;
         let [da, db, dc, dd] = self.diagonal;
@@ -65,13 +63,13 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// The pivot of the last unknown: one over its variance, in units of that of one place.
+    /// Pivot of the last unknown: the inverse of its variance, in units of that of one position.
     pub(super) const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// r^T G^-1 r: the variance of what the unknowns make of the terms r, in units of that of one place.
+    /// Returns r^T G^-1 r: the variance of the fit at the terms r, in units of that of one position.
     pub(super) fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);

@@ -1,12 +1,12 @@
-//! The source that sums speak of: weighted least squares, and how sure it is.
+//! Source estimate: a weighted least-squares fit of the sums, and its uncertainty.
 //!
-//! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is what is left of the sums, over
-//! the places beyond the unknowns; four places' worth of what the operator expects is put to it, for of few places little is left.
+//! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is the residual of the
+//! sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four positions, as few of
+//! them leave little residual.
 //!
-//! The source that comes nearest to sums which no source would make: on a grid, and a finer one about the best of it.
-//!
-//! Of a source at (X', Y') the coefficients are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), G the
-//! products and m those with v; and what it leaves of the sums is least where (m g)^2 / (g G g) is largest. Two numbers are left to look for.
+//! If no source fits, the closest one is searched on a grid, and on finer ones about its optimum. The coefficients of a source at
+//! (X', Y') are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), with m the products with v, and the
+//! residual is smallest where (m g)^2 / (g G g) is largest. So the search has two dimensions.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -24,59 +24,61 @@ use super::sums::Sums;
 use super::terms::{Terms, coefficients, expected_v, strength, value};
 use crate::mission::{Interferer, Mission};
 
-/// Why sums are of no source.
+/// Reason why the measurements give no source.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Unfit {
-    /// They are of too few places, or of places too close to one another: what is heard elsewhere does not follow.
+    /// Too few positions, or positions too close to one another to extrapolate.
     Places,
-    /// No single source on the ground would be heard like that.
+    /// The measurements fit no single source on the ground.
     NoSource,
-    /// What is heard does not fit together, and nobody knows whose measurements are wrong: of four relays or fewer nobody can, nor where more
-    /// than one is, nor where the ground between the interferer and an end takes more than the mission says.
+    /// The measurements are inconsistent, and the faulty one is unknown: with four relays or fewer, with more than one faulty
+    /// relay, or if the path loss between the interferer and an end differs from the mission's.
     Contradiction,
 }
 
-/// How much the operator's expectation of errors counts beside what is seen, in places.
+/// Weight of the operator's expected error, in positions.
 const EXPECTED: f64 = 4.0;
 
-/// How far apart in t places must be, as a variance, to tell the sides of the line from each other.
+/// Minimum variance of t that separates the sides of the line.
 const SIDES: f64 = 2.5e-5;
 
-/// A source that was found.
+/// Estimated source.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FoundSource {
-    /// It.
+    /// Position and power.
     pub source: Interferer,
-    /// The variance of its place, along the line and to its right, m^2.
+    /// Variance of the position along the line and to its right, m^2.
     pub variance_m2: [f32; 2],
-    /// Whether what is heard is that of one source; if not, it is the one that comes nearest, and the variance is not known.
+    /// True if the measurements fit a single source; otherwise it is the closest one, and the variance is unknown.
     pub is_one: bool,
 }
 
-/// A fit of the four coefficients.
+/// Fit of the four coefficients.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     coefficients: [f64; 4],
     products: [f64; 10],
     right: [f64; 4],
     factor: Factor,
-    /// Variance of the relative error of one place, and what of it is expected.
+    /// Variance of the relative error of one position, and the expected one.
     variance: f64,
     expected: f64,
-    /// What is left of the sums, and the places beyond the unknowns.
+    /// Residual of the sums, and the number of positions beyond the unknowns.
     seen: f64,
     beyond: f64,
     count: f64,
 }
 
 impl Fit {
-    /// Of `sums`, where a place is expected to be off by `relative_error`. About 6 000 instructions on a Cortex-M4F: doubles in software.
+    /// Fits `sums`, with an expected relative error per position of `relative_error`.
+    ///
+    /// About 6 000 instructions on a Cortex-M4F, in software f64.
     ///
     /// # Errors
-    /// [`Unfit::Places`]: the three unknowns of the line cannot be told apart.
+    /// [`Unfit::Places`] if the three unknowns of the line cannot be separated.
     pub fn of(sums: &Sums, relative_error: f32) -> Result<Self, Unfit> {
         let [
             aa,
@@ -126,13 +128,12 @@ impl Fit {
         Ok(fit)
     }
 
-    /// What it says that is heard at these terms, as v.
     pub(crate) fn value(&self, terms: &Terms) -> f64 {
         value(&self.coefficients, terms)
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// The power that a source at this place most likely has, W: k = m g / (g G g), as in `nearest`.
+    /// Returns the most likely power of a source at this position, W: k = m g / (g G g), as in `nearest`.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -147,59 +148,59 @@ impl Fit {
         (1e-6..=1e9).contains(&power_w).then_some(power_w)
     }
 
-    /// The variance of that, relative to the square of what is heard.
+    /// Returns the relative variance of [`Fit::value`].
     pub(crate) fn relative_variance(&self, terms: &Terms) -> f64 {
         let heard = self.value(terms);
         self.variance * self.factor.variance(terms.map(f64::from)) / (heard * heard)
     }
 
-    /// The variance of what one place is off, relative.
     pub(crate) const fn variance(&self) -> f64 {
         self.variance
     }
 
-    /// The variance of what one place is expected to be off, relative.
     pub(crate) const fn expected(&self) -> f64 {
         self.expected
     }
 
-    /// What its places are off, relative: the sum of the squares.
+    /// Residual: the sum of the squared relative errors of all positions.
     pub(crate) const fn seen(&self) -> f64 {
         self.seen
     }
 
-    /// Whether there are more places than unknowns, and they are off no more than is expected.
+    /// Returns true if there are more positions than unknowns, with errors as expected.
     pub(crate) fn is_of_one_mind(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// How much its sums say: places over the variance of one.
+    /// Information of the sums: number of positions over the variance of one.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
 
-    /// The mean square of the relative differences between two lots of coefficients, over the places that it is of.
+    /// Returns the mean square relative difference of two sets of coefficients over the fitted positions.
     pub(crate) fn off(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// How far off others are from itself.
+    /// Returns the mean square relative difference of `others` from the fit.
     pub(crate) fn off_by(&self, others: &[f64; 4]) -> f64 {
         self.off(&self.coefficients, others)
     }
 
-    /// How far off it may be itself by chance, in the same measure.
+    /// Returns the expected mean square relative error of the fit.
     pub(crate) fn chance(&self) -> f64 {
         let unknowns = if self.factor.whole { 4.0 } else { 3.0 };
         unknowns * self.variance / self.count
     }
 
-    /// The source, and whether what is heard is that of one. Its side of the line is that of `side_m` where the places do not tell.
+    /// Returns the source.
+    ///
+    /// `side_m` selects its side of the line if the positions do not determine it.
     ///
     /// # Errors
-    /// [`Unfit::NoSource`]: nothing on the ground makes anything like it.
+    /// [`Unfit::NoSource`] if no source on the ground comes close.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "the mission checks the range of what comes of it"
@@ -228,7 +229,7 @@ impl Fit {
             let apart = libm::sqrt(squared);
             let found = source([x, t + sign * apart, k]);
             if found.is_valid() {
-                // By how much they change with the coefficients.
+                // Derivatives of the position by the coefficients.
                 let along = [0.0, -0.5 / k, -x / k, 0.0];
                 let side = 0.5 / (apart * k);
                 let aside = [side, side * x, side * (2.0 * x * x - above), side * t];
@@ -241,7 +242,7 @@ impl Fit {
                 });
             }
         }
-        // Of weights that add up to 1, so that an f32 holds their squares.
+        // Weights normalised to a sum of 1, so that an f32 holds their squares.
         let scale = libm::sqrt(aa);
         let products = self.products.map(|product| (product / aa) as f32);
         let right = self.right.map(|product| (product / scale) as f32);
@@ -259,7 +260,7 @@ impl Fit {
     }
 }
 
-/// The mean square of what coefficients leave of `sums`, relative.
+/// Returns the mean square relative residual of `sums` for these coefficients.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [
         aa,
@@ -295,7 +296,7 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// What is expected at terms by what the mission says, as v; `None` where it says nothing, or what nobody measures.
+/// Returns v of the mission's source by terms; `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -303,18 +304,18 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// As far as sources are looked for, in halves of the distance: from one distance before Tx to one beyond Rx, and 1.5 to the side.
+/// Half width of the search area for sources, in units of D / 2: from D before Tx to D beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
-/// Steps from the middle to the edge of the first grid, and of the finer ones.
+/// Grid steps from the middle to the edge, of the first grid and of the finer ones.
 const COARSE: i8 = 8;
 const FINE: i8 = 2;
 
-/// Finer grids, each a third as wide as the one before.
+/// Number of finer grids, with steps of 0.4 times those of the previous one.
 const FINER: u8 = 5;
 
-/// X', Y' and k of the source nearest to these products, and on this side of the line of places (1 or -1, from `side` on). 414 places,
-/// some 16 000 instructions on a Cortex-M4F. `None` where no source makes anything of them.
+/// Returns X', Y' and k of the closest source on one side of the line of positions; `None` if no source fits at all. `sign` is 1
+/// or -1 for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

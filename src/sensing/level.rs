@@ -1,4 +1,4 @@
-//! How strong the interference is at an end of the chain, on the ground; and what powers may be measured anywhere.
+//! Interference level at an end of the chain, on the ground, and the measurable range of powers.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -11,25 +11,26 @@
     )
 )]
 
-/// The least and the largest interference that may be measured, W, at a relay less the noise of its receiver. The square of each, and of
-/// the ratio of any two, taken as [`sensing`](crate::sensing) takes them, is a finite number; what is outside is refused.
+/// Measurable range of interference, W, without the receiver's noise.
+///
+/// The square of a value and of the ratio of any two is finite in the units of [`sensing`](crate::sensing); others are rejected.
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
-/// What an end hears.
+/// Interference level at an end.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Level {
-    /// Mean interference, W; 0 if it has not said.
+    /// Mean interference, W; 0 without a measurement.
     pub power_w: f32,
-    /// Of how many measurements, as far as they have not faded.
+    /// Number of measurements, after fading.
     pub count: f32,
 }
 
-/// Which ends are off, the transmitter and the receiver.
+/// Ends whose measurements do not fit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// They do not fit, and nobody knows who is wrong.
+    /// The measurements do not fit, and the faulty one is unknown.
     pub(crate) unknown: bool,
 }
 
@@ -41,7 +42,7 @@ impl EndsOff {
     };
 }
 
-/// What both ends hear, and which of them were off.
+/// Levels of both ends, and the ends that did not fit before.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
@@ -54,18 +55,17 @@ impl Level {
         is_power(self.power_w) && (0.0..=1e9).contains(&self.count)
     }
 
-    /// Whether it says anything.
     pub(crate) fn is_heard(self) -> bool {
         self.power_w > 0.0 && self.count > 0.0
     }
 }
 
-/// Whether an end may hear that, W; 0 if it has not said.
+/// Returns true if `power_w` is a valid level, W; 0 means no measurement.
 pub(crate) fn is_power(power_w: f32) -> bool {
     power_w.to_bits() == 0 || is_level(power_w)
 }
 
-/// Whether an end may say that it hears that, W.
+/// Returns true if `power_w` is in the measurable range, W.
 pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }

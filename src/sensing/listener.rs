@@ -1,6 +1,4 @@
-//! What one relay has heard: the place where it is, averaged, and the places before it, faded.
-//!
-//! Measurements are averaged and fade with time.
+//! Measurements of one relay: the average at its current position, and faded sums of the earlier positions.
 
 use super::sums::Sums;
 use super::terms::{Terms, terms};
@@ -8,7 +6,7 @@ use crate::place::Placement;
 use crate::sir::square;
 use crate::time::{Duration, Instant};
 
-/// A place is another one from this part of the distance on.
+/// Distance from which on a position is another one, as a fraction of D.
 const APART: f32 = 1.0 / 200.0;
 
 /// Measurements of one relay. 120 bytes.
@@ -17,16 +15,15 @@ pub(crate) struct Listener {
     half_life: Duration,
     past: Sums,
     faded: Instant,
-    /// Where the relay is, and what is heard there, in units that the listener is told.
+    /// Current position of the relay, and the average there, in units of `UNIT_W`.
     at: Placement,
     heard: Average,
 }
 
-/// What a listener makes of its place.
+/// Current position of a listener and its measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,
-    /// v of what is heard there.
     pub(crate) v: f32,
 }
 
@@ -45,7 +42,7 @@ impl Listener {
         self.half_life
     }
 
-    /// Interference of `heard` was measured at `at`, above 0; `expected` tells the v that is believed at terms.
+    /// Adds a measurement `heard` above 0 at `at`; `expected` returns v of the estimate by terms.
     pub(crate) fn take(
         &mut self,
         now: Instant,
@@ -70,7 +67,6 @@ impl Listener {
         self.at.altitude_m += (at.altitude_m - self.at.altitude_m) * share;
     }
 
-    /// What it hears where it is.
     pub(crate) fn place(&self, distance_m: f32) -> Option<Place> {
         (self.heard.mean > 0.0).then(|| Place {
             terms: terms(distance_m, self.at),
@@ -78,7 +74,7 @@ impl Listener {
         })
     }
 
-    /// All that it has heard, as of `now`.
+    /// Returns the sums of all measurements as of `now`.
     pub(crate) fn sums(
         &self,
         now: Instant,
@@ -103,27 +99,25 @@ impl Listener {
         sums.fade(left(age, self.half_life), seconds);
     }
 
-    /// What was heard elsewhere is nothing to go by.
+    /// Discards the measurements at earlier positions.
     pub(crate) const fn forget_past(&mut self) {
         self.past = Sums::NONE;
     }
 }
 
-/// Which share of something that old is left.
+/// Returns the fraction that remains after `age`.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }
 
-/// The mean of what was measured, in which what is a half-life older counts half.
+/// Exponentially weighted mean of measurements, with a half-life.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Average {
-    /// The mean; 0 of nothing.
+    /// Mean; 0 without a measurement.
     pub(crate) mean: f32,
-    /// How many measurements are left in it.
     pub(crate) weight: f32,
-    /// When the last one was.
     pub(crate) last: Instant,
-    /// How much older they are on average than that, s.
+    /// Mean age of the measurements at `last`, s.
     pub(crate) behind_s: f32,
 }
 

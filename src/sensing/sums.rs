@@ -1,4 +1,4 @@
-//! What a pass adds up along the chain: all that a fit needs to know of what was heard, in eighteen numbers.
+//! Sums that a pass collects along the chain: eighteen numbers that contain all a fit needs of the measurements.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -14,19 +14,21 @@
 use super::terms::Terms;
 use crate::root::sqrt;
 
-/// Numbers of [`Sums`]: the products of the terms, the terms with v, v squared, how many places, their measurements, their age.
+/// Length of [`Sums`]: products of the terms, terms times v, v squared, number of positions, of measurements, and their age.
 pub const SUMS: usize = 18;
 
-/// Weighted sums over places. Of each place: w a b for every two of the four terms, w a v, w v^2, how much it counts, how often it was
-/// measured, and how much it counts times its age in seconds. w is 2 (v / e)^(1/2) / (v^2 + e^2) of what was heard, v, and what was expected, e:
-/// 1 / e^2 where both agree, and such that errors which are alike in decibels weigh alike, and no place more than all the others.
+/// Weighted sums over positions.
+///
+/// For each position: w a b for every two of the four terms, w a v, w v^2, its share, its number of measurements, and its share
+/// times its age in seconds. w is 2 (v / e)^(1/2) / (v^2 + e^2) with v measured and e expected. It is 1 / e^2 if both agree, and
+/// gives errors that are equal in decibels equal weights, and no position more than all the others.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
-/// The largest sum: what would be larger stays there, and finite. Nothing that is measured within 2 D of the line comes near it.
+/// Limit of a sum, so that it stays finite. No measurement within 2 D of the line comes near it.
 const MOST: f32 = 1e38;
 
 fn within(sum: f32) -> f32 {
@@ -34,12 +36,13 @@ fn within(sum: f32) -> f32 {
 }
 
 impl Sums {
-    /// Of no place.
+    /// Sums without any position.
     pub const NONE: Self = Self {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a place with these `terms` where v was heard and `expected` was to be, above 0 both, which counts `share` and was `measured` so often. At most 60 instructions.
+    /// Adds a position with its `terms`, measured v and `expected` v, both above 0. It counts `share`, with `measured`
+    /// measurements. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -69,14 +72,13 @@ impl Sums {
         *measurements += share * measured;
     }
 
-    /// Adds those of others.
     pub(crate) fn merge(&mut self, other: &Self) {
         for (sum, number) in self.numbers.iter_mut().zip(other.numbers) {
             *sum = within(*sum + number);
         }
     }
 
-    /// They are `seconds` older, and count `share` of what they did.
+    /// Ages the sums by `seconds` and multiplies their weight by `share`.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -85,31 +87,29 @@ impl Sums {
         }
     }
 
-    /// How many places they are of; of what has faded, a part.
+    /// Number of positions, after fading.
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
     }
 
-    /// How often each place was measured, on average.
+    /// Mean number of measurements per position.
     pub(crate) fn measured(&self) -> f32 {
         let [.., count, measured, _] = self.numbers;
         if count > 0.0 { measured / count } else { 0.0 }
     }
 
-    /// The weights of all places.
     pub(crate) fn weight(&self) -> f32 {
         let [weight, ..] = self.numbers;
         weight
     }
 
-    /// How old they are on average, s.
+    /// Mean age, s.
     pub fn age_s(&self) -> f32 {
         let [.., count, _, age] = self.numbers;
         if count > 0.0 { age / count } else { 0.0 }
     }
 
-    /// The same in microseconds.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -119,7 +119,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Whether all are finite, and those of squares not negative.
+    /// Returns true if all numbers are finite, and those of squares not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())

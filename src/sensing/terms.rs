@@ -1,25 +1,25 @@
-//! The terms that 1 / I is a sum of, and what a source makes their coefficients.
+//! Terms of which 1 / I is a linear combination, and the coefficients of a source.
 
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
 
-/// 1, u, u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D and z = 2 h / D.
+/// Terms 1, u, u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D and z = 2 h / D.
 pub(crate) type Terms = [f32; 4];
 
-/// The terms at a place, of a line of `distance_m`.
+/// Returns the terms at a position, for a line of `distance_m`.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
     let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// The interference that v = 1 stands for, W: the middle of what may be measured, so that no square of a v leaves an f32.
+/// Interference of v = 1, W: the middle of the measurable range, so that no square of a v leaves an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
-/// The least and the largest v: of what may be measured, [`MEASURED_W`](super::level::MEASURED_W).
+/// Range of v for the measurable range, [`MEASURED_W`](super::level::MEASURED_W).
 const V: (f32, f32) = (1e-18, 1e18);
 
-/// What is expected somewhere, as v; `None` where nothing may be measured like that.
+/// Converts an expected v to f32; `None` outside of the measurable range.
 pub(crate) fn expected_v(v: f64) -> Option<f32> {
     let (least, most) = (f64::from(V.0), f64::from(V.1));
     #[expect(
@@ -29,14 +29,14 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// k = eta D^2 [`UNIT_W`] / (4 P) of a source of `power_w`; and the power of one of that k.
+/// Returns k = eta D^2 [`UNIT_W`] / (4 P) of a source of `power_w`; its own inverse: the power for k.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// The coefficients that `source` gives the terms: k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
+/// Returns the coefficients of `source`: k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -53,7 +53,6 @@ pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     ]
 }
 
-/// The sum of `terms` with these coefficients.
 pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     let [a, b, c, d] = coefficients;
     let [one, u, q, t] = terms.map(f64::from);

@@ -1,22 +1,22 @@
-//! An interferer that moves: its velocity from one fit to the next, and where it will be when the chain stands for it.
+//! Track of a moving interferer: its velocity, and its predicted position.
 //!
-//! A Kalman filter for each axis, of place and velocity, whose velocity walks at random. A fit is of what was heard a while ago, on average
-//! the age of its sums; and two fits share what has not faded between them, so each counts as much as the time between them is of a
-//! half-life.
+//! There is a Kalman filter of position and velocity for each axis; the velocity is a random walk. A fit refers to the mean time
+//! of its measurements. Two successive fits share the measurements that have not faded between them, so each counts in proportion
+//! to the time between them over the half-life.
 
 use super::fit::FoundSource;
 use crate::time::{Duration, Instant};
 
-/// The velocity that an interferer may have, m/s, before anything is known of it.
+/// Initial standard deviation of the velocity, m/s.
 const SPEED: f32 = 10.0;
 
-/// Times the standard deviation that a velocity must be to count.
+/// Minimum squared velocity of a moving interferer, relative to its variance.
 const CERTAIN: f32 = 16.0;
 
-/// Times the standard deviation from which on a fit is of another interferer.
+/// Squared deviation, relative to the variance, from which on a fit belongs to another interferer.
 const ELSEWHERE: f32 = 49.0;
 
-/// Place and velocity along one axis, m and m/s, and their covariance.
+/// Position and velocity along one axis, m and m/s, and their covariance.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     at: f32,
@@ -33,7 +33,7 @@ impl Axis {
         }
     }
 
-    /// So many seconds later, of a velocity that walks by `walk` m^2/s^3.
+    /// Predicts the state `seconds` later; the velocity's variance grows by `walk` m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;
@@ -42,7 +42,7 @@ impl Axis {
         *speed += walk * seconds;
     }
 
-    /// A fit of that variance puts it there.
+    /// Updates the state with a position of the given variance.
     fn take(&mut self, found: f32, variance: f32) {
         let [at, both, speed] = self.variance;
         let sum = at + variance;
@@ -50,7 +50,7 @@ impl Axis {
             return;
         }
         if !sum.is_finite() {
-            // It was seen too long ago to say anything.
+            // The last fit is too old to be of use.
             *self = Self::new(found, variance);
             return;
         }
@@ -74,11 +74,10 @@ impl Axis {
     }
 }
 
-/// What is known of an interferer's way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Track {
     axes: [Axis; 2],
-    /// The time that they are of; `None` before the first fit.
+    /// Time of the state; `None` before the first fit.
     at: Option<Instant>,
 }
 
@@ -88,7 +87,7 @@ impl Track {
         at: None,
     };
 
-    /// Takes a fit of what was heard at `at`, with this half-life.
+    /// Updates the track with a fit of measurements at `at`, with this half-life.
     pub(crate) fn take(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]
@@ -105,7 +104,7 @@ impl Track {
         if !(seconds > 0.0) {
             return;
         }
-        // Over three half-lives the velocity may become another one by 1 m/s.
+        // The velocity may change by 1 m/s in three half-lives.
         let walk = 1.0 / (3.0 * half_life);
         let shared = (1.44 * half_life / seconds).max(1.0);
         for (axis, (place, variance)) in self.axes.iter_mut().zip(fits) {
@@ -115,7 +114,7 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Where it was by the last fit, and where it will be at `then`, m along the line and to its right; `None` while it is not seen to move.
+    /// Returns the last and the predicted position at `then`, m along the line and to its right; `None` while it does not move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

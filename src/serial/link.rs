@@ -1,6 +1,4 @@
-//! One serial port: what comes in, what waits to go out, and who drives the line.
-//!
-//! Faults on this side are counted.
+//! Serial link: received bytes, the transmit queue, the driver-enable pin, and counters of local faults.
 
 use super::READ_LIMIT;
 use super::port::{Fault, SerialPort};
@@ -12,13 +10,13 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
 
-/// Room for two frames: one on its way, and one that is due before it has left.
+/// Capacity for two frames: one in transmission, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
-/// The longest pause, in byte times, between two attempts at a port that takes nothing.
+/// Maximum pause, in byte times, between two attempts at a port that accepts nothing.
 const LONGEST_PAUSE: u32 = 128;
 
-/// The driver-enable pin of a link that has none: full duplex, or a radio that switches by itself.
+/// Driver-enable pin of a link without one: full duplex, or a radio that switches by itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NoPin {}
 
@@ -36,49 +34,50 @@ impl OutputPin for NoPin {
     }
 }
 
-/// The least time one byte of 10 bits (a start bit, 8 data bits, a stop bit) takes on a line of `baud` bit/s, rounded up to
-/// a microsecond. `baud` is at least 1; 0 counts as 1.
+/// Minimum time of a byte of 10 bits (start bit, 8 data bits, stop bit) at `baud` bit/s, rounded up to a microsecond.
+///
+/// `baud` is at least 1; 0 counts as 1.
 pub(crate) const fn byte_time(baud: u32) -> Duration {
     let baud = if baud == 0 { 1 } else { baud as u64 };
     Duration::from_micros(10_000_000_u64.div_ceil(baud))
 }
 
-/// A serial port, the frames that wait for it, and its driver-enable pin if it has one.
+/// Serial port with its transmit queue, and its driver-enable pin if it has one.
 ///
-/// The pin is high from before the first byte of a frame until the last bit of the last waiting frame has left, and low
-/// otherwise. When that is, an [`Nb`](super::Nb) port is asked; for an [`Io`](super::Io) port it is worked out from the time of
-/// a byte, on the safe side: every byte counts from the first poll after the one that wrote it.
+/// The pin is high from before the first byte of a frame until the last bit of the last queued frame has left, and low otherwise.
+/// An [`Nb`](super::Nb) port reports that; for an [`Io`](super::Io) port it is computed from the byte time, conservatively: every
+/// byte counts from the first poll after the one that wrote it.
 #[derive(Debug)]
 pub struct SerialLink<P, D = NoPin> {
     port: P,
     pin: Option<D>,
-    /// The pin as it was last set; unknown before, and after an error.
+    /// Last level of the pin; `None` before it is set, and after an error.
     level: Option<bool>,
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
     clock: MonotonicClock,
-    /// When a byte was taken last, or the first one began to wait.
+    /// Time at which a byte was last accepted, or the first one was queued.
     moved_at: Instant,
-    /// Bytes written by the last poll: when exactly is not known, so they count from the next one.
+    /// Bytes written by the last poll; they count from the next one, because their exact time is unknown.
     uncounted: u32,
-    /// When everything counted has left.
+    /// Time at which all counted bytes have left.
     quiet_at: Instant,
-    /// Whether the last poll stopped reading at its limit.
+    /// True if the last poll stopped reading at its limit.
     unread: bool,
     stats: SerialStats,
 }
 
 impl<P: SerialPort> SerialLink<P> {
-    /// A link over `port` at `baud` bit/s, with ten bits a byte.
+    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte.
     pub fn new(port: P, baud: u32) -> Self {
         Self::with_pin(port, baud, None)
     }
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// A link over `port` at `baud` bit/s, with ten bits a byte, and a pin that is high while this relay sends.
+    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte, and a pin that is high while this relay sends.
     ///
-    /// The pin is set low by the first poll, unless that one has something to send.
+    /// The first poll sets the pin low, unless it has something to send.
     pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
         Self::with_pin(port, baud, Some(pin))
     }
@@ -101,7 +100,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Whether the line is this relay's to send on, after asking for it.
+    /// Sets the pin high; returns true if the line may be driven.
     fn raise(&mut self) -> bool {
         if let Some(pin) = &mut self.pin
             && self.level != Some(true)
@@ -116,7 +115,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
         true
     }
 
-    /// Gives the line up, if everything has left.
+    /// Sets the pin low if all bytes have left.
     fn lower(&mut self, now: Instant) {
         let Some(pin) = self.pin.as_mut().filter(|_| self.level != Some(false)) else {
             return;
@@ -139,35 +138,34 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P, D> SerialLink<P, D> {
-    /// What has been counted since the link was made.
+    /// Counters since the link was created.
     pub fn stats(&self) -> &SerialStats {
         &self.stats
     }
 
-    /// The port, for what this crate does not do: another baud rate, an interrupt.
+    /// Returns the port, for functions outside of this crate such as another baud rate or an interrupt.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// The port and the pin. What was waiting is gone, and the pin stays as it is.
+    /// Returns the port and the pin. The transmit queue is discarded, and the pin keeps its level.
     pub fn release(self) -> (P, Option<D>) {
         (self.port, self.pin)
     }
 }
 
-/// A link, whatever it is made of.
 pub(super) trait FrameLink {
-    /// Takes in at most `READ_LIMIT` bytes as those of `port`.
+    /// Passes at most [`READ_LIMIT`] received bytes to `relay`, as bytes of `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
-    /// Whether one more frame of any length fits.
+    /// Returns true if a frame of any length fits.
     fn has_room(&self) -> bool;
-    /// Takes a frame to be sent, or counts that it cannot.
+    /// Queues a frame, or counts that it does not fit.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame for a port that is not there.
+    /// Counts a frame for a port that does not exist.
     fn unrouted(&mut self);
-    /// Writes what fits, and sees to the pin.
+    /// Writes as many bytes as fit, and updates the pin.
     fn transmit(&mut self, now: Instant);
-    /// When to be polled again, for the sake of this link; later than `now`.
+    /// Returns the time of this link's next poll, later than `now`.
     fn wake(&self, now: Instant) -> Option<Instant>;
 }
 
@@ -210,7 +208,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
             self.moved_at = self.clock.advance(now);
         }
         for &byte in frame {
-            // There is room, as just seen.
+            // There is room, as checked above.
             let _ = self.waiting.push_back(byte);
         }
     }
@@ -224,7 +222,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         if !self.waiting.is_empty() && !self.raise() {
             return;
         }
-        // A port that is ready takes at least a byte, so this ends.
+        // A port that is ready accepts at least one byte, so the loop ends.
         while let (front @ [_, ..], _) = self.waiting.as_slices() {
             match self.port.write(front) {
                 Ok(0) => return,
@@ -246,7 +244,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         if self.unread || (driving && self.waiting.is_empty()) {
             return Some(now + self.byte_time);
         }
-        // A port that takes nothing is left alone for as long again as it has been stuck.
+        // A port that accepts nothing is next tried after the time for which it has been stuck.
         let longest = self.byte_time.times(LONGEST_PAUSE);
         let stuck = self.clock.internal(now).since(self.moved_at);
         let pause = stuck.min(longest).max(self.byte_time);
@@ -254,9 +252,9 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
     }
 }
 
-/// Counters of one link since it was made; each stays at its maximum once it gets there.
+/// Counters of one link since it was created; each saturates at its maximum.
 ///
-/// What is wrong with frames that did arrive is counted in [`Stats`](crate::Stats).
+/// Errors in received frames are counted in [`Stats`](crate::Stats).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SerialStats {
@@ -268,20 +266,19 @@ pub struct SerialStats {
     pub parity: u32,
     /// Bytes from a noisy line.
     pub noise: u32,
-    /// Reads that failed for any other reason.
+    /// Reads that failed for another reason.
     pub other: u32,
-    /// Writes, and questions whether the last byte had left, that failed; the bytes are offered again.
+    /// Failed writes, and failed queries for the last byte's departure; the bytes are offered again.
     pub write: u32,
-    /// Times the driver-enable pin could not be set; it is tried again.
+    /// Failed attempts to set the driver-enable pin; it is tried again.
     pub pin: u32,
-    /// Frames that did not fit behind those that wait: the port takes nothing. The relay repeats what matters.
+    /// Frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats what matters.
     pub dropped: u32,
-    /// Frames for a port that is not there: the relay's [`Wiring`](crate::Wiring) is not the one of this driver.
+    /// Frames for a port that does not exist: the relay's [`Wiring`](crate::Wiring) does not match this driver.
     pub unrouted: u32,
 }
 
 impl SerialStats {
-    /// Counts a read that failed.
     pub(crate) fn read_failed(&mut self, fault: Fault) {
         bump(match fault {
             Fault::Overrun => &mut self.overrun,

@@ -1,33 +1,33 @@
-//! A relay on real serial ports: it moves bytes between a [`Relay`] and one or two ports, and never waits for them.
+//! Serial driver of a relay: moves bytes between a [`Relay`] and one or two ports without blocking.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`port`] | a port that never blocks, made of [`embedded_hal_nb`] ([`Nb`]) or [`embedded_io`] ([`Io`]) |
-//! | [`link`] | one port with the frames that wait for it and its driver-enable pin; local faults, counted |
-//! | [`queue`] | bytes between an interrupt and the main loop, for a UART that holds one byte |
-//! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
+//! | [`port`] | a port that never blocks, based on [`embedded_hal_nb`] ([`Nb`]) or [`embedded_io`] ([`Io`]) |
+//! | [`link`] | one port with its transmit queue, its driver-enable pin and counters of local faults |
+//! | [`queue`] | queues between an interrupt and the main loop, for a UART that holds one byte |
+//! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for
+//! [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One call
-//! `poll` reads up to 64 bytes a port into the relay, has it handle what is due, takes its frames, and writes
-//! what fits. The relay is drained by then: take its events, and sleep until the time that `poll` returned or until a byte
-//! comes in, whichever is first. The time is always later than `now`; with bytes still to be written or read, or a pin to be
-//! lowered, it is one byte time ahead, which keeps a line without a FIFO busy. A port that takes nothing is tried less and
-//! less often, at last every 128 byte times: wake up when it takes bytes again, if it can tell.
+//! `poll` reads up to 64 bytes per port into the relay, lets it handle due timers, polls its frames, and writes as
+//! many bytes as fit. Afterwards poll the relay's events, and sleep until the returned time or until a byte is received,
+//! whichever is first. The time is always later than `now`. With bytes still to be written or read, or a pin to be set low, it is
+//! one byte time ahead, which keeps a line without a FIFO busy. A port that accepts nothing is tried less and less often, at last
+//! every 128 byte times; if it can, let it wake the main loop when it accepts bytes again.
 //!
 //! # A UART that holds one byte
-//! Between two polls a relay may compute for 3 ms (16 MHz), and at 115 200 baud a byte lasts 87 us. A UART without a FIFO or DMA needs an
-//! interrupt that fetches bytes meanwhile: [`ByteQueues`] has both ends, and [`queue_depth`] says how deep. An executor with
-//! asynchronous ports is what `asynch` is for (feature `async`).
+//! Between two polls a relay may compute for 3 ms (16 MHz), and at 115 200 baud a byte lasts 87 us. A UART without a FIFO or DMA
+//! needs an interrupt that moves the bytes: [`ByteQueues`] has both ends, and [`queue_depth`] returns the required depth. For
+//! asynchronous ports use `asynch` (feature `async`).
 //!
 //! # What does not fit
-//! A link has room for two frames of full length. A frame that does not fit any more is dropped and counted in
-//! [`SerialStats::dropped`]: that neighbour's port takes nothing, and the other neighbour must not wait for it. With one
-//! shared port nothing is ever dropped: frames stay in the relay until there is room. Faults of the ports are counted,
-//! never returned.
+//! A link has room for two frames of maximum length. A frame that does not fit is dropped and counted in
+//! [`SerialStats::dropped`]: that neighbour's port accepts nothing, and the other neighbour must not wait for it. With one shared
+//! port no frame is dropped; frames stay in the relay until there is room. Faults of the ports are counted, never returned.
 //!
 //! # Example
-//! The main loop of a firmware, with a port that stands in for the HAL's. A HAL whose ports are of an older `embedded_io` (say
-//! 0.6) can be used through its [`embedded_hal_nb`] side.
+//! Main loop of a firmware, with a substitute for the HAL's port. A HAL with ports of an older `embedded_io` (such as 0.6) can be
+//! used through its [`embedded_hal_nb`] traits.
 //! ```
 //! use uav_relay::channel::{AirGround, Channel};
 //! use uav_relay::serial::{Nb, Pair, SerialLink};
@@ -121,14 +121,14 @@ use link::FrameLink;
 /// Two serial ports, one to each neighbour, full duplex unless a link has a pin.
 #[derive(Debug)]
 pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
-    /// The link toward the transmitter.
+    /// Link toward the transmitter.
     pub upstream: SerialLink<U, UPin>,
-    /// The link toward the receiver.
+    /// Link toward the receiver.
     pub downstream: SerialLink<D, DPin>,
 }
 
 impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, UPin, DPin> {
-    /// Two links for a relay whose settings say [`Wiring::Pair`](crate::Wiring::Pair).
+    /// Creates the links of a relay with [`Wiring::Pair`](crate::Wiring::Pair).
     pub const fn new(upstream: SerialLink<U, UPin>, downstream: SerialLink<D, DPin>) -> Self {
         Self {
             upstream,
@@ -144,17 +144,17 @@ impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, 
     }
 }
 
-/// One serial port to a channel that all neighbours hear: a radio modem, or a half-duplex bus with a driver-enable pin.
+/// Serial port to a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable pin.
 ///
-/// Whose turn it is on the channel is the modem's to find out; this crate only keeps relays from repeating in step.
+/// Medium access is the modem's task; this crate only prevents relays from retransmitting in step.
 #[derive(Debug)]
 pub struct Shared<P, Pin = NoPin> {
-    /// The link to the channel.
+    /// Link to the channel.
     pub channel: SerialLink<P, Pin>,
 }
 
 impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
-    /// A link for a relay whose settings say [`Wiring::Shared`](crate::Wiring::Shared).
+    /// Creates the link of a relay with [`Wiring::Shared`](crate::Wiring::Shared).
     pub const fn new(channel: SerialLink<P, Pin>) -> Self {
         Self { channel }
     }
@@ -164,20 +164,21 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
     }
 }
 
-/// The call that a firmware makes, with either wiring. As methods of a trait it would have to be imported beside the ports.
+/// `poll` for both wirings; as a trait's method it would have to be imported beside the ports.
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {
-            /// Moves what can be moved now, and says when to be called again at the latest, always later than `now`.
+            /// Moves all bytes that can be moved, and returns the latest time of the next call, always later than `now`.
             ///
-            /// Work: at most 64 bytes a port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
-            /// frames that the relay then has; of those for a shared port, as many as fit.
+            /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and
+            /// the relay's pending frames; for a shared port, as many as fit.
             pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
                 self.poll_keeping(now, relay, &mut |_| {})
             }
 
-            /// The same, with a call of `keep` between what comes in and what is sent: what has to be stored before others are told
-            /// it, see [`Relay::view_record`].
+            /// Does the same, with a call of `keep` between reception and transmission, to store state before it is sent.
+            ///
+            /// See [`Relay::view_record`].
             pub fn poll_keeping(
                 &mut self,
                 now: Instant,
@@ -193,7 +194,6 @@ macro_rules! polled {
 polled!([U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin] Pair<U, D, UPin, DPin>);
 polled!([P: SerialPort, Pin: OutputPin] Shared<P, Pin>);
 
-/// One round over all links.
 fn poll(
     now: Instant,
     relay: &mut Relay,
@@ -208,7 +208,7 @@ fn poll(
     }
     keep(relay);
     let mut frame = [0; MAX_FRAME];
-    // A link without room must not hold up the other one, so what is for it is counted and gone.
+    // A link without room must not block the other one, so its frames are counted and dropped.
     while links.iter().any(|(_, link)| link.has_room())
         && let Some(Transmit { port, len }) = relay.poll_transmit(now, &mut frame)
     {

@@ -1,22 +1,22 @@
-//! What the facade needs of a serial port, and the two families of ports that have it.
+//! Trait of a serial port, and its implementations for two families of HAL traits.
 
 use embedded_hal_nb::nb;
 use embedded_hal_nb::serial::{Error as _, ErrorKind};
 
-/// Something that went wrong in this relay's own serial port.
+/// Error of this relay's own serial port.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
-    /// A byte came before the one ahead of it had been read.
+    /// Byte received before the previous one was read.
     Overrun,
-    /// A byte without its stop bit: another baud rate, a break, a loose wire.
+    /// Byte without a stop bit: another baud rate, a break, a loose wire.
     Framing,
-    /// A byte with the wrong parity bit.
+    /// Byte with the wrong parity bit.
     Parity,
-    /// A byte sampled on a noisy line.
+    /// Byte sampled on a noisy line.
     Noise,
-    /// Anything else, or the port does not say.
+    /// Another error, or an unknown one.
     Other,
 }
 
@@ -34,30 +34,30 @@ impl core::fmt::Display for Fault {
 
 impl core::error::Error for Fault {}
 
-/// A serial port of which every call returns at once.
+/// Serial port whose calls never block.
 ///
-/// [`Nb`] and [`Io`] make one of what a HAL offers; a firmware with queues or DMA of its own may implement it directly.
+/// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA may implement it directly.
 pub trait SerialPort {
-    /// Moves bytes that have come in to the front of `into` (never empty) and says how many; 0 if none is there.
+    /// Moves received bytes to the front of `into` (never empty), and returns their number; 0 if there is none.
     ///
     /// # Errors
-    /// [`Fault`] for a byte that was received badly; the call after it goes on with the next one.
+    /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault>;
 
-    /// Takes bytes from the front of `bytes` (never empty) and says how many; 0 if there is no room now.
+    /// Accepts bytes from the front of `bytes` (never empty), and returns their number; 0 if there is no room.
     ///
     /// # Errors
-    /// [`Fault`] if nothing was taken and that is not for want of room; the same bytes are offered again later.
+    /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault>;
 
-    /// Whether the last bit of all that was taken is on the line; `None` if the port cannot tell.
+    /// Returns true if the last bit of all accepted bytes has left; `None` if the port does not know.
     ///
     /// # Errors
-    /// [`Fault`] if the port should know and does not; as good as `None`.
+    /// [`Fault`] if the query fails; it is treated as `None`.
     fn has_left(&mut self) -> Result<Option<bool>, Fault>;
 }
 
-/// A port that speaks [`embedded_hal_nb`]: a byte a call, and it knows when the last one has left.
+/// Port with [`embedded_hal_nb`] traits: one byte per call, and it knows when the last one has left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Nb<S>(pub S);
 
@@ -93,7 +93,7 @@ where
     }
 }
 
-/// What has come of an `nb` call; `None` if nothing has yet.
+/// Converts the result of an `nb` call; `None` for `WouldBlock`.
 fn ready<S, T>(result: nb::Result<T, S::Error>) -> Result<Option<T>, Fault>
 where
     S: embedded_hal_nb::serial::ErrorType,
@@ -111,12 +111,11 @@ where
     }
 }
 
-/// A port that speaks [`embedded_io`]. Its reads and writes may block, so each is made only where the port has just said
-/// that the next call will not; its `flush` may block as well and is never called.
+/// Port with [`embedded_io`] traits.
 ///
-/// That leaves no way to ask when the last byte has left, so a driver-enable pin goes by the time that the bytes take. For
-/// that the port must begin to send what it was given at once and without gaps: a UART with a FIFO or a ring buffer does,
-/// a USB adapter does not.
+/// Its reads and writes may block, so each is only called after the port has reported that it will not; its `flush` may block and
+/// is never called. So it cannot report when the last byte has left, and a driver-enable pin uses the byte time instead. For that
+/// the port must send at once and without gaps: a UART with a FIFO or a ring buffer does, a USB adapter does not.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Io<S>(pub S);
 

@@ -1,9 +1,10 @@
-//! Bytes between an interrupt and the main loop, for a UART without a FIFO.
+//! Byte queues between an interrupt and the main loop, for a UART without a FIFO.
 //!
-//! Such a UART holds one byte. At 115 200 baud the next one takes its place after 87 us, and a call of a [`Relay`](crate::Relay) may take 3 ms
-//! at 16 MHz: whoever reads the port between calls loses bytes. So an interrupt moves bytes between the UART and two queues, and the main
-//! loop has the other ends of them. Neither end waits for the other or keeps interrupts off. A UART with DMA, a FIFO as deep as
-//! [`queue_depth`] says, or a HAL whose driver has buffers (all of Embassy's `BufferedUart`s) needs none of this.
+//! Such a UART holds one byte. At 115 200 baud the next one overwrites it after 87 us, and a call of a [`Relay`](crate::Relay)
+//! may take 3 ms at 16 MHz, so a main loop that reads the port between calls loses bytes. An interrupt therefore moves bytes
+//! between the UART and two queues, whose other ends the main loop has. Neither end waits for the other or disables interrupts. A
+//! UART with DMA, with a FIFO as deep as [`queue_depth`] returns, or with a buffered HAL driver (all of Embassy's
+//! `BufferedUart`s) needs none of this.
 //!
 //! ```
 //! use core::cell::Cell;
@@ -11,7 +12,7 @@
 //! use uav_relay::serial::{ByteQueues, SerialPort, queue_depth};
 //!
 //! const BAUD: u32 = 115_200;
-//! /// The longest time that the main loop does not read: one call of the relay, and the work of the firmware.
+//! /// Longest time between two reads of the main loop: one call of the relay, and the work of the firmware.
 //! const LONGEST: Duration = Duration::from_millis(10);
 //!
 //! # let pended = &Cell::new(0);
@@ -24,7 +25,7 @@
 //! assert_eq!(port.write(&[1, 2, 0])?, 3);
 //! assert_eq!(pended.get(), 1, "the interrupt is to begin sending");
 //!
-//! // What the interrupt does: a byte has come in, and the UART takes one.
+//! // The interrupt handler: a byte has been received, and the UART accepts one.
 //! interrupt.received(Ok(7));
 //! let mut data_register = None;
 //! let more = interrupt.send(|byte| {
@@ -47,8 +48,10 @@ use super::port::{Fault, SerialPort};
 use super::ring::{Emptier, Filler, Marks, sides};
 use crate::time::Duration;
 
-/// The depth of the queue of received bytes at `baud` bit/s (10 bits a byte), for a main loop that comes to read at least every
-/// `longest`: one more than what comes in meanwhile, one for the byte that says that some were lost, and one that a queue never uses.
+/// Returns the depth of the receive queue at `baud` bit/s (10 bits a byte), for a main loop that reads at least every `longest`.
+///
+/// It is the number of bytes received meanwhile plus three: one byte more, a marker of lost bytes, and a slot that a queue never
+/// uses.
 ///
 /// | baud | 3 ms | 10 ms | 50 ms |
 /// | --- | --- | --- | --- |
@@ -57,7 +60,7 @@ use crate::time::Duration;
 /// | 230 400 | 73 | 234 | 1 155 |
 /// | 921 600 | 280 | 925 | 4 611 |
 ///
-/// Writing or erasing the flash may keep the main loop away for longer than any queue is deep: what is lost then the relay repeats.
+/// A flash write or erase may block the main loop for longer than any queue is deep; the relay retransmits what is lost then.
 /// ```
 /// use uav_relay::{Duration, serial::queue_depth};
 ///
@@ -79,9 +82,9 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// What has the interrupt of a UART come and send: a function, or for a port that is to have a name a type of its own.
+/// Trigger of a UART's interrupt: a closure, or a type of its own for a port whose type must be named.
 pub trait Pend {
-    /// Has it come: `NVIC::pend`, or its flag for an empty data register.
+    /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);
 }
 
@@ -91,11 +94,12 @@ impl<F: FnMut()> Pend for F {
     }
 }
 
-/// Bytes between an interrupt and the main loop: fewer than `IN` that have come in, and fewer than `OUT` on their way out (a frame of
-/// [`MAX_FRAME`](crate::wire::frame::MAX_FRAME) at least, so that the main loop can sleep meanwhile).
+/// Byte queues between an interrupt and the main loop: fewer than `IN` received bytes, and fewer than `OUT` to send.
+///
+/// `OUT` should hold a frame of [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can sleep meanwhile.
 #[derive(Debug)]
 pub struct ByteQueues<const IN: usize, const OUT: usize> {
-    /// Received bytes, or what went wrong instead, as [`coded`].
+    /// Received bytes or faults, as [`coded`].
     received: [AtomicU16; IN],
     outgoing: [AtomicU8; OUT],
     in_marks: Marks,
@@ -110,7 +114,7 @@ impl<const IN: usize, const OUT: usize> Default for ByteQueues<IN, OUT> {
 }
 
 impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
-    /// Empty queues.
+    /// Creates empty queues.
     pub const fn new() -> Self {
         Self {
             received: [const { AtomicU16::new(0) }; IN],
@@ -121,7 +125,7 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
         }
     }
 
-    /// The end of the interrupt, and that of the main loop, which uses `pend` to have the interrupt come and send.
+    /// Returns the interrupt's end and the main loop's end, which uses `pend` to trigger the interrupt.
     pub fn split<K: Pend>(&mut self, pend: K) -> (InterruptEnd<'_>, QueuedPort<'_, K>) {
         let (puts, takes) = sides(&self.received, &mut self.in_marks);
         let (queues, sends) = sides(&self.outgoing, &mut self.out_marks);
@@ -141,12 +145,12 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
     }
 }
 
-/// What the interrupt of a UART has. Every call takes constant work a byte.
+/// Interrupt's end of the queues. Every call takes constant work per byte.
 pub struct InterruptEnd<'q> {
     received: Filler<'q, AtomicU16>,
     outgoing: Emptier<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// Whether something was lost and the main loop has not been told.
+    /// True if bytes were lost and the main loop has not read that.
     gap: bool,
 }
 
@@ -159,22 +163,24 @@ impl fmt::Debug for InterruptEnd<'_> {
 }
 
 impl InterruptEnd<'_> {
-    /// Takes what the UART has received: a byte, or what went wrong instead. Without room it is lost, and counted; the main loop reads
-    /// one [`Fault::Overrun`] at that place.
+    /// Queues a received byte or a fault.
+    ///
+    /// Without room it is lost and counted, and the main loop reads one [`Fault::Overrun`] in its place.
     pub fn received(&mut self, item: Result<u8, Fault>) {
         if self.gap && self.received.put(coded(Err(Fault::Overrun))) {
             self.gap = false;
         }
         if self.gap || !self.received.put(coded(item)) {
             self.gap = true;
-            // Nobody else writes it, so this needs no more than a load and a store, which every core has.
+            // Only the interrupt writes it, so a load and a store are enough, which every core has.
             let lost = self.lost.load(Ordering::Relaxed).saturating_add(1);
             self.lost.store(lost, Ordering::Relaxed);
         }
     }
 
-    /// Hands bytes to `take` until it does not take one, or there are none; whether some are left. Then the interrupt for an empty
-    /// data register is to stay enabled, otherwise it is not.
+    /// Passes bytes to `take` until it rejects one or none is left; returns true if some are left.
+    ///
+    /// Then the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
     pub fn send(&mut self, mut take: impl FnMut(u8) -> bool) -> bool {
         while let Some(byte) = self.outgoing.peek() {
             if !take(byte) {
@@ -186,7 +192,7 @@ impl InterruptEnd<'_> {
     }
 }
 
-/// The main loop's end: a [`SerialPort`] of which nothing waits, whatever the UART does.
+/// Main loop's end of the queues: a [`SerialPort`] that never waits for the UART.
 pub struct QueuedPort<'q, K> {
     received: Emptier<'q, AtomicU16>,
     outgoing: Filler<'q, AtomicU8>,
@@ -204,25 +210,25 @@ impl<K> fmt::Debug for QueuedPort<'_, K> {
 }
 
 impl<K> QueuedPort<'_, K> {
-    /// How many bytes [`write`](SerialPort::write) would take now.
+    /// Number of bytes that [`write`](SerialPort::write) would accept now.
     pub fn room(&self) -> usize {
         self.outgoing.room()
     }
 
-    /// Received bytes that were lost for want of room, since the queues were made: the main loop was away for longer than they are deep.
+    /// Received bytes lost because the queue was full: the main loop did not read for longer than its depth.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
 }
 
 impl<K: Pend> SerialPort for QueuedPort<'_, K> {
-    #[inline(never)] // what it needs would stay on the stack of `SerialLink::receive`, below the relay's deepest call
+    #[inline(never)] // its stack would stay below the relay's deepest call in `SerialLink::receive`
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
         let mut count = 0;
         for place in into {
             match self.received.peek().map(decoded) {
                 Some(Ok(byte)) => *place = byte,
-                // What came before a fault is handed over first.
+                // Bytes before a fault are returned first.
                 Some(Err(fault)) if count == 0 => {
                     self.received.pop();
                     return Err(fault);
@@ -238,7 +244,7 @@ impl<K: Pend> SerialPort for QueuedPort<'_, K> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
         let fits = |&&byte: &&u8| self.outgoing.put(byte);
         let count = bytes.iter().take_while(fits).count();
-        // The interrupt owns the UART and sees to the rest.
+        // The interrupt owns the UART and sends the rest.
         self.pend.pend();
         Ok(count)
     }
@@ -248,7 +254,7 @@ impl<K: Pend> SerialPort for QueuedPort<'_, K> {
     }
 }
 
-/// A byte, or above them a fault.
+/// Encodes a byte, or a fault as a code above the bytes.
 const fn coded(item: Result<u8, Fault>) -> u16 {
     match item {
         Ok(byte) => byte as u16,
@@ -286,7 +292,7 @@ mod tests {
         assert_eq!(port.lost(), 5);
         let mut bytes = [0; 3];
         assert_eq!((port.read(&mut bytes), bytes), (Ok(3), [0, 1, 2]));
-        // Room for the overrun and for what comes behind it.
+        // Room for the overrun and the fault behind it.
         interrupt.received(Ok(9));
         interrupt.received(Err(Fault::Noise));
         assert_eq!((port.read(&mut bytes), bytes[0]), (Ok(1), 3));

@@ -1,11 +1,11 @@
-//! A ring that one side fills and the other empties, without a lock: what heapless's `spsc` is, but of atomic cells.
+//! Lock-free ring of atomic cells with one producer and one consumer.
 //!
-//! That one cannot be shown to be free of panics: its ends do not know its length, and so divide and index by what might be zero. And
-//! its cells are reached by unsafe code, where atomic ones need none.
+//! heapless's `spsc` is not used: it cannot be shown to be free of panics, because its ends do not know its length and so divide
+//! and index by a possible zero, and its cells are accessed by unsafe code.
 
 use core::sync::atomic::{AtomicU8, AtomicU16, AtomicUsize, Ordering};
 
-/// A place for one item. The indices say whose it is, so no order is asked of it.
+/// Cell of one item. The indices synchronise access, so its own ordering is relaxed.
 pub(super) trait Place {
     type Item: Copy;
 
@@ -37,12 +37,10 @@ impl Place for AtomicU16 {
     }
 }
 
-/// Where both sides are; the ring is empty when they are at one place, so one place is never used.
+/// Indices of both sides. The ring is empty if they are equal, so one cell is never used.
 #[derive(Debug)]
 pub(super) struct Marks {
-    /// The next place that is emptied.
     first: AtomicUsize,
-    /// The next place that is filled.
     end: AtomicUsize,
 }
 
@@ -55,22 +53,21 @@ impl Marks {
     }
 }
 
-/// One side of a ring.
 #[derive(Debug)]
 struct Side<'q, P> {
     places: &'q [P],
     marks: &'q Marks,
 }
 
-/// The side that fills.
+/// Producer.
 #[derive(Debug)]
 pub(super) struct Filler<'q, P>(Side<'q, P>);
 
-/// The side that empties.
+/// Consumer.
 #[derive(Debug)]
 pub(super) struct Emptier<'q, P>(Side<'q, P>);
 
-/// Both sides; whoever borrows the marks for itself has the only ones.
+/// Returns both sides; the exclusive borrow of the marks makes them the only ones.
 pub(super) fn sides<'q, P>(
     places: &'q [P],
     marks: &'q mut Marks,
@@ -90,7 +87,7 @@ impl<P> Side<'_, P> {
 }
 
 impl<P: Place> Filler<'_, P> {
-    /// Puts an item behind the others; whether there was room.
+    /// Appends an item; returns false if the ring is full.
     pub(super) fn put(&mut self, item: P::Item) -> bool {
         let Side { places, marks } = &self.0;
         let end = marks.end.load(Ordering::Relaxed);
@@ -106,7 +103,6 @@ impl<P: Place> Filler<'_, P> {
         true
     }
 
-    /// How many items would be taken now.
     pub(super) fn room(&self) -> usize {
         let Side { places, marks } = &self.0;
         let end = marks.end.load(Ordering::Relaxed);
@@ -121,7 +117,7 @@ impl<P: Place> Filler<'_, P> {
 }
 
 impl<P: Place> Emptier<'_, P> {
-    /// The first item, which stays.
+    /// Returns the first item without removing it.
     pub(super) fn peek(&self) -> Option<P::Item> {
         let Side { places, marks } = &self.0;
         let first = marks.first.load(Ordering::Relaxed);
@@ -131,7 +127,7 @@ impl<P: Place> Emptier<'_, P> {
         places.get(first).map(P::load)
     }
 
-    /// Takes the first item away, if there is one.
+    /// Removes the first item, if there is one.
     pub(super) fn pop(&mut self) {
         let marks = self.0.marks;
         let first = marks.first.load(Ordering::Relaxed);

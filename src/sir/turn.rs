@@ -1,4 +1,4 @@
-//! How SIR_1 behaves along x beyond Tx, x >= 0, at one altitude: the paper's Lemma 2, for any place of the interferer and with noise.
+//! Extrema of SIR_1 along x >= 0 at one altitude: the paper's Lemma 2, for any interferer position and with noise.
 //!
 //! With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of SIR_1 = A s / ((x^2 + h^2)(1 + nu s)) has the sign of
 //!
@@ -6,48 +6,48 @@
 //! X x^2 - q x - X h^2 - nu x s^2
 //! ```
 //!
-//! Without noise that is a quadratic, whose roots are (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X: one of them lies beyond Tx. With noise:
+//! Without noise this is a quadratic with the roots (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X, one of which is beyond Tx. With noise:
 //!
-//! - X < 0: it falls with x from -X h^2 > 0 at Tx, so SIR_1 still has one hill, nearer to Tx.
-//! - X = 0: it is negative.
-//! - X > 0: over x it is phi = X x - q - X h^2 / x - nu s^2, which is concave, for s is convex and not negative, and so is s^2. So
-//!   SIR_1 falls up to a valley, rises up to a hill and falls for good, or only falls. No root lies before the noise-free valley,
-//!   where the first three terms are negative.
+//! - X < 0: the expression falls with x from -X h^2 > 0 at Tx, so SIR_1 still has a single maximum, closer to Tx.
+//! - X = 0: the expression is negative.
+//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2, which is concave because s is convex and not negative, and so
+//!   is s^2. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only falls. No root is before the noise-free
+//!   minimum, where the sum of the first three terms is negative.
 //!
-//! The largest SIR_1 in [0, D] for X >= 0 is that right above Tx, as without noise: anywhere else s / (x^2 + h^2) is less; where s is
-//! larger, 1 / (1 + nu s) is less too, and where s is smaller, q(s) = s / (1 + nu s) is less and x^2 + h^2 is more.
+//! For X >= 0 the largest SIR_1 in [0, D] is at x = 0, as without noise: anywhere else s / (x^2 + h^2) is smaller. Where s is
+//! larger, 1 / (1 + nu s) is smaller too; where s is smaller, s / (1 + nu s) is smaller and x^2 + h^2 is larger.
 
 use super::{Sender, square};
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
 use crate::root::sqrt;
 
-/// Halvings of a stretch in which the slope changes its sign.
+/// Bisection steps in an interval in which the slope changes its sign.
 const HALVINGS: u8 = 32;
 
-/// Doublings until something that falls is below 0.
+/// Doublings of x at most until a falling function is below 0.
 const DOUBLINGS: u8 = 64;
 
-/// How SIR_1 behaves along x beyond Tx, x >= 0, at one altitude.
+/// Shape of SIR_1 along x >= 0 at one altitude.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extremum {
-    /// It falls up to there, m, the paper's Psi^x, and rises beyond: the interferer is ahead of Tx (X > 0).
+    /// SIR_1 falls up to this x, m (the paper's Psi^x), and rises beyond: the interferer is ahead of Tx (X > 0).
     Valley(f32),
-    /// It falls up to the first, rises up to the second, m, and falls beyond: so it is with noise and the interferer ahead of Tx.
+    /// SIR_1 falls up to the first x, m, rises up to the second and falls beyond: X > 0, with noise.
     ValleyAndHill(f32, f32),
-    /// It rises up to there, m, and falls beyond: the interferer is behind Tx (X < 0).
+    /// SIR_1 rises up to this x, m, and falls beyond: the interferer is behind Tx (X < 0).
     Hill(f32),
-    /// It falls for good: X = 0, or the interferer is ahead of Tx and drowned by the noise.
+    /// SIR_1 falls with x: X = 0, or X > 0 and the noise exceeds the interference.
     Falls,
-    /// It is the same everywhere: the interferer stands at Tx, X = Y = 0, and there is no noise.
+    /// SIR_1 is constant: the interferer is at Tx (X = Y = 0), and there is no noise.
     Level,
 }
 
-/// Where SIR_1 of a relay at `altitude_m` turns along x.
+/// Returns the extrema of SIR_1 along x for a relay at `altitude_m`.
 ///
-/// Without noise by the roots of a quadratic, for X < 0 written without cancellation; with it by at most 190 evaluations of the slope.
-/// Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
+/// Without noise they are roots of a quadratic, written without cancellation for X < 0; with noise they take at most 190
+/// evaluations of the slope. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
 pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> Extremum {
     let x = interferer.x_m;
     let q = square(x) + square(interferer.y_m);
@@ -70,9 +70,8 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// The slope's sign along x.
+/// Sign of the slope of SIR_1 along x.
 struct Slope {
-    /// X, m.
     x: f32,
     q: f32,
     /// h^2, m^2.
@@ -84,19 +83,19 @@ struct Slope {
 }
 
 impl Slope {
-    /// phi at `at` above 0.
+    /// Returns true if phi at `at` is above 0.
     fn sign(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s
     }
 
-    /// Half the slope of phi, for X > 0: it falls beyond X.
+    /// Returns half the derivative of phi, for X > 0; it falls beyond X.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
     }
 
-    /// For X < 0, with the hill that there is without noise.
+    /// Returns the maximum for X < 0; `peak` is the noise-free maximum.
     fn hill(&self, peak: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Hill(peak);
@@ -104,7 +103,7 @@ impl Slope {
         Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
     }
 
-    /// For X > 0, with the valley that there is without noise.
+    /// Returns the extrema for X > 0; `bottom` is the noise-free minimum.
     fn turns(&self, bottom: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Valley(bottom);
@@ -123,7 +122,7 @@ impl Slope {
     }
 }
 
-/// The last place in [`low`, `high`] at which `holds`, which does at `low` and changes once.
+/// Returns the last x in [`low`, `high`] at which `holds` is true; it is true at `low` and changes once.
 fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
     let (mut low, mut high) = (low, high);
     for _ in 0..HALVINGS {
@@ -137,7 +136,6 @@ fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
     low
 }
 
-/// A place beyond `from` at which it does not hold any more.
 fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
     let mut at = 2.0 * from;
     for _ in 0..DOUBLINGS {
@@ -149,10 +147,11 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
     at
 }
 
-/// The largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
+/// Returns the largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
 ///
-/// At x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), for X < 0 at the hill of [`first_hop_turn`]; so it is with noise. In a
-/// field it is a bound: the quietest place right above the transmitter. The lower the altitude, the larger it is.
+/// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of [`first_hop_turn`] for X
+/// < 0, with noise as well. In a field it is an upper bound: the largest Upsilon right above the transmitter. It is larger at
+/// lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

@@ -1,29 +1,30 @@
-//! What makes a frame one of a member's, and a fresh one: the tag, and which counters have been seen.
+//! Authentication of frames: the tag, and replay protection by counters.
 //!
-//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight bytes. A MAC and not
-//! a cipher: whoever can see the drones knows where they are, and a MAC keeps its promise even if a counter is ever used twice,
-//! which a stream cipher does not.
+//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight bytes. We
+//! use a MAC and not a cipher, because anyone who sees the drones knows their positions, and because a MAC remains secure even if
+//! a counter is used twice, which a stream cipher does not.
 
 #[cfg(feature = "auth")]
 use super::blake2s::mac;
 
-/// Bytes of a tag; none in a build without the feature `auth`.
+/// Length of a tag, bytes; 0 without the feature `auth`.
 pub const TAG: usize = if cfg!(feature = "auth") { 8 } else { 0 };
 
-/// The secret that the members of a network share.
+/// Secret key that the members of a network share.
 #[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key([u8; 32]);
 
 #[cfg(feature = "auth")]
 impl Key {
-    /// A key of 256 random bits. A password is none.
+    /// Creates a key of 256 random bits. Do not use a password.
     pub const fn new(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
 
-    /// The tag of `signed`, header and body of a frame, for the nonces of its sender and its receiver. Two to five blocks of
-    /// BLAKE2s.
+    /// Returns the tag of `signed`, header and body of a frame, for the nonces of its sender and its receiver.
+    ///
+    /// Work: two to five blocks of BLAKE2s.
     pub fn tag(&self, sender: u64, receiver: u64, signed: &[u8]) -> [u8; TAG] {
         let both = u128::from(receiver) << 64 | u128::from(sender);
         mac(&self.0, &both.to_le_bytes(), signed)
@@ -32,7 +33,7 @@ impl Key {
 
 #[cfg(feature = "auth")]
 impl core::fmt::Debug for Key {
-    /// Without the bytes: keys do not belong into logs.
+    /// Omits the bytes, since keys must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Key(..)")
     }
@@ -45,12 +46,12 @@ impl defmt::Format for Key {
     }
 }
 
-/// How a relay proves who it is, and that its frames are of today.
+/// Credentials with which a relay signs its frames.
 ///
 /// ```
 /// use uav_relay::{Auth, Key, Settings};
 ///
-/// // The network's key, and a number that is larger at every start.
+/// // The network's key, and a number that increases at every start.
 /// let auth = Auth { key: Key::new([7; 32]), epoch: 41 };
 /// let settings = Settings { auth: Some(auth), ..Settings::default() };
 /// # assert!(settings.auth.is_some());
@@ -59,31 +60,30 @@ impl defmt::Format for Key {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Auth {
-    /// The network's secret.
+    /// Secret key of the network.
     pub key: Key,
-    /// Larger at every start of this relay, from 1: a number kept in flash and raised before it is used, or the seconds of a
-    /// clock that never runs backward. With an epoch that has been used before, frames of that time are taken again.
+    /// Start counter of this relay, from 1, larger at every start: a number in flash that is incremented before use, or the
+    /// seconds of a clock that never runs backward. If an epoch is reused, frames recorded in it are accepted again.
     pub epoch: u32,
 }
 
-/// How a relay would prove who it is; there is none without the feature `auth`.
+/// Credentials; uninhabited without the feature `auth`.
 #[cfg(not(feature = "auth"))]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Auth {}
 
-/// The nonces of the two ends of a link. Each is an epoch and, below it, a number that counts links from the relay's claim number on.
+/// Nonces of the two ends of a link: an epoch, and below it a link number that starts at the relay's claim number.
 #[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
-    /// 0 in a handshake whose sender does not know it yet.
+    /// 0 in a handshake if the sender does not know it yet.
     pub(crate) receiver: u64,
 }
 
 #[cfg(feature = "auth")]
 impl Nonces {
-    /// As the other end sees them.
     pub(crate) const fn turned(self) -> Self {
         Self {
             sender: self.receiver,
@@ -92,7 +92,7 @@ impl Nonces {
     }
 }
 
-/// What makes the tags of the frames from one node to another.
+/// Key and nonces for the tags of the frames from one node to another.
 #[cfg(feature = "auth")]
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
@@ -108,7 +108,7 @@ impl Signer<'_> {
     }
 }
 
-/// What would make tags; there is none without the feature `auth`.
+/// Signer; uninhabited without the feature `auth`.
 #[cfg(not(feature = "auth"))]
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a>(core::convert::Infallible, core::marker::PhantomData<&'a ()>);
@@ -120,26 +120,26 @@ impl Signer<'_> {
     }
 }
 
-/// Whether two tags are the same, in a time that does not tell where they differ.
+/// Compares two tags in constant time.
 #[cfg(feature = "auth")]
 pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Which counters of one sender have been taken: the newest, and those up to 63 below it.
+/// Sliding window of the accepted counters of one sender: the newest, and those up to 63 below it.
 #[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[repr(C, packed(4))] // 12 bytes, of which a relay keeps eight times
+#[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
-    /// One more than the largest counter taken.
+    /// Largest accepted counter plus one.
     next: u32,
-    /// Bit i: `next` - 1 - i has been taken.
+    /// Bit i: `next` - 1 - i has been accepted.
     taken: u64,
 }
 
 #[cfg(feature = "auth")]
 impl Window {
-    /// Takes `counter`, once: `false` if it has been taken before, or is too old to tell. `u32::MAX` is never taken.
+    /// Accepts `counter` once; false if it was accepted before or is too old to know. `u32::MAX` is never accepted.
     pub(crate) const fn take(&mut self, counter: u32) -> bool {
         let Some(next) = counter.checked_add(1) else {
             return false;

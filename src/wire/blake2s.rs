@@ -1,16 +1,14 @@
 //! Keyed BLAKE2s (RFC 7693), for tags of eight bytes.
 //!
-//! Written out here because the crates leave a panic in the image, or take more flash than there is for `auth`. Of `blake2`
-//! 0.11 an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too. With `size_opt` and
-//! `opt-level = 3` it takes 1.6 KB more and makes the tag of a full sweep in 11 100 instructions instead of 12 800, without
+//! Implemented here because the available crates leave a panic in the image, or take more flash than `auth` may. In `blake2` 0.11
+//! an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too. With `size_opt` and
+//! `opt-level = 3` it takes 1.6 KB more, and 11 100 instead of 12 800 instructions for the tag of a full sweep; without
 //! `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac` with `sha2` takes several times
-//! the flash. The tests hold this one against `blake2`. It has neither branches nor places in memory that depend on the key or
-//! the message.
+//! the flash. The tests compare this implementation with `blake2`. No branch or address depends on key or message.
 
-/// Bytes of a block.
 const BLOCK: usize = 64;
 
-/// Where the state begins: the square roots of the first eight primes.
+/// Initial state: the square roots of the first eight primes.
 const START: [u32; 8] = [
     0x6A09_E667,
     0xBB67_AE85,
@@ -22,7 +20,7 @@ const START: [u32; 8] = [
     0x5BE0_CD19,
 ];
 
-/// Which words of a block each round takes: for columns, then for diagonals, two for each.
+/// Message words of each round: for columns, then for diagonals, two for each.
 const ORDER: [[[u8; 8]; 2]; 10] = [
     [[0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15]],
     [[14, 10, 4, 8, 9, 15, 13, 6], [1, 12, 0, 2, 11, 7, 5, 3]],
@@ -36,13 +34,12 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// The first eight bytes of a digest of that length, of `first` and then `second`, fewer than 2^32 bytes, under `key`.
-///
-/// Work: one block for the key, and one for every 64 bytes begun.
+/// Returns an eight-byte digest of `first` followed by `second`, fewer than 2^32 bytes, under `key`. Work: one block for the key,
+/// and one per 64 bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;
-    // The lengths of key and digest; no tree.
+    // Lengths of key and digest; no tree.
     *parameters ^= 0x0101_0000 ^ 32 << 8 ^ 8;
     let mut block = [0; BLOCK];
     for (place, byte) in block.iter_mut().zip(key) {
@@ -66,7 +63,7 @@ pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     (u64::from(high) << 32 | u64::from(low)).to_le_bytes()
 }
 
-/// Takes a block into the state; `count` bytes have been taken with it.
+/// Compresses a block into the state; `count` is the number of bytes including this block.
 #[inline(never)]
 fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     let mut words = [0; 16];
@@ -101,13 +98,13 @@ fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     }
 }
 
-/// The function G of the RFC on four columns, with two words for each.
+/// Applies the RFC's function G to four columns, with two words for each.
 #[inline(never)]
 fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     let [a, b, c, d] = rows;
     let columns = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
     for (((a, b), (c, d)), [first, second]) in columns.zip(order.as_chunks().0) {
-        // Every number in the table is below 16; the mask lets the compiler see it.
+        // Every number in the table is below 16; the mask shows that to the compiler.
         let word = |number: u8| words.get(usize::from(number & 15)).copied().unwrap_or(0);
         *a = a.wrapping_add(*b).wrapping_add(word(*first));
         *d = (*d ^ *a).rotate_right(16);
@@ -120,14 +117,13 @@ fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     }
 }
 
-/// Puts the diagonals into columns.
+/// Rotates the diagonals into columns.
 fn turn([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *b = [b[1], b[2], b[3], b[0]];
     *c = [c[2], c[3], c[0], c[1]];
     *d = [d[3], d[0], d[1], d[2]];
 }
 
-/// Puts them back.
 fn turn_back([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *b = [b[3], b[0], b[1], b[2]];
     *c = [c[2], c[3], c[0], c[1]];
@@ -141,7 +137,7 @@ mod tests {
     use blake2::digest::consts::U8;
     use blake2::digest::{FixedOutput, Mac};
 
-    /// Every length that a frame can have, cut at any place.
+    /// Frames of every length, split at any position.
     #[test]
     fn it_is_the_published_one() {
         let mut state = 1_u32;

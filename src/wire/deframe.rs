@@ -1,22 +1,21 @@
-//! Cuts a byte stream into frames: finds the delimiters and undoes COBS, a byte at a time.
+//! Splits a byte stream into frames: finds the delimiters and decodes COBS, byte by byte.
 //!
-//! The state depends on the bytes alone, so every way of cutting the stream into calls gives the same frames. A frame that
-//! is too long, or whose COBS is broken, latches: nothing is accepted until the next delimiter, so that its tail is never
-//! taken for a frame of its own.
+//! The state depends on the bytes only, so the frames do not depend on how the stream is cut into calls. After a frame that is
+//! too long, or whose COBS is invalid, everything is ignored until the next delimiter, so that its tail is not taken for a frame.
 //!
-//! Written out here because with the streaming decoder of `cobs` 0.5.1 a full sweep takes 5.6 % more instructions, 13 241, and
-//! is above its budget of 13 000; flash grows by 64 to 288 bytes.
+//! Implemented here because with the streaming decoder of `cobs` 0.5.1 a full sweep takes 5.6 % more instructions, 13 241, which
+//! exceeds its budget of 13 000, and 64 to 288 bytes more flash.
 
 use super::frame::MAX_DECODED;
 
-/// Why the bytes between two delimiters are no frame.
+/// Reason why the bytes between two delimiters are no frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// More bytes than the longest frame.
+    /// More bytes than a frame of maximum length.
     Oversized,
-    /// The delimiter came inside a COBS run.
+    /// Delimiter inside a COBS run.
     Truncated,
 }
 
@@ -31,20 +30,20 @@ impl core::fmt::Display for DeframeError {
 
 impl core::error::Error for DeframeError {}
 
-/// Collects one frame at a time from a byte stream.
+/// Decoder of frames from a byte stream.
 #[derive(Clone, Debug)]
 pub struct Deframer {
     plain: [u8; MAX_DECODED],
     len: usize,
-    /// Bytes left in the current COBS run; 0 when a code byte comes next.
+    /// Remaining bytes of the current COBS run; 0 if a code byte is next.
     run: u8,
-    /// Whether a zero follows the current run, unless the frame ends there.
+    /// True if a zero follows the current run, unless the frame ends there.
     zero_after: bool,
     oversized: bool,
 }
 
 impl Deframer {
-    /// A deframer at the start of a frame.
+    /// Creates a deframer at the start of a frame.
     pub const fn new() -> Self {
         Self {
             plain: [0; MAX_DECODED],
@@ -55,12 +54,12 @@ impl Deframer {
         }
     }
 
-    /// Takes in one byte: constant work. At a delimiter it gives the frame, decoded, or why there is none.
+    /// Decodes one byte; at a delimiter returns the frame or an error. Constant work.
     ///
-    /// Delimiters in a row are no frames and no errors.
+    /// Consecutive delimiters are neither frames nor errors.
     ///
     /// # Errors
-    /// [`DeframeError`], once, at the delimiter that ends the broken frame.
+    /// [`DeframeError`], once, at the delimiter that ends the invalid frame.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], DeframeError>> {
         if byte == 0 {
             return self.delimiter();

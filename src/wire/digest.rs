@@ -1,17 +1,16 @@
-//! The 16-bit digest of a mission, by which relays tell whether they fly the same one.
+//! Digest and identifier of a mission, by which relays detect different missions.
 
 use super::crc::CRC_32C;
 use crate::mission::{Interference, Mission, MissionConfig};
 use crate::sites::Sites;
 
-/// The low half of a CRC-32C over every parameter of `mission`; `FORMAT.md` has their order.
+/// Returns the low half of a CRC-32C over every parameter of `mission`, in the order of `FORMAT.md`.
 ///
-/// It tells mistakes apart, not adversaries: two different missions share a digest once in 65 536.
+/// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
 pub fn digest(mission: &Mission) -> u16 {
     of(mission.config())
 }
 
-/// The same of parameters alone.
 pub(super) fn of(c: &MissionConfig) -> u16 {
     let mut crc = CRC_32C.digest();
     crc.update(&c.relays.to_le_bytes());
@@ -30,7 +29,7 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
                 crc.update(&number.to_le_bytes());
             }
         }
-        // No interferer has a power of 0.
+        // An interferer's power is never 0.
         Interference::Unknown => crc.update(&[0; 12]),
         Interference::Field(field) => {
             for point in field.points() {
@@ -47,15 +46,15 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         crc.update(&band.least_m.to_le_bytes());
         crc.update(&band.most_m.to_le_bytes());
     }
-    // Nothing of what there is none of: a mission without noise has the digest it always had.
+    // Noise of 0 is omitted, so that missions without noise keep their earlier digest.
     if c.noise_w > 0.0 {
         crc.update(&c.noise_w.to_le_bytes());
     }
     low_half(crc.finalize())
 }
 
-/// `digest` with the sites of an upload beside it, if it has any: of a mission, which then counts as another one between other sites;
-/// of the mission that was loaded, for the line that places are along.
+/// Returns `digest` combined with the sites of an upload, or `digest` itself without sites. Other sites thus make another
+/// mission.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();
@@ -69,15 +68,15 @@ const fn low_half(crc: u32) -> u16 {
     u16::from_le_bytes([a, b])
 }
 
-/// Which mission somebody holds or flies: the newest of all that were uploaded, or the one that was loaded before flight.
+/// Identifier of a mission: the newest upload, or the mission loaded before flight.
 ///
-/// In the order of versions; of two missions with one version, the one with the larger digest counts as the newer one.
+/// Ordered by version; of two missions with the same version, the one with the larger digest counts as newer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionId {
-    /// The operator's number of an uploaded mission, from 1; 0 is the mission that was loaded before flight.
+    /// Operator's number of an uploaded mission, from 1; 0 for the mission loaded before flight.
     pub version: u16,
-    /// `digest` of the mission, with all its relays.
+    /// Digest of the mission, with all its relays.
     pub digest: u16,
 }
 

@@ -1,4 +1,4 @@
-//! One frame: header, body, CRC; then COBS and a zero byte that ends it.
+//! Frame: header, body, CRC, then COBS and a zero byte as delimiter.
 
 use super::auth::{Signer, TAG};
 use super::crc::CRC_32C;
@@ -8,45 +8,44 @@ pub use super::node_number::MAX_NODE;
 /// Version of the format, in the top four bits of the first word.
 pub const VERSION: u8 = 1;
 
-/// Bytes of the header.
+/// Length of the header, bytes.
 pub const HEADER: usize = 10;
 
-/// Bytes of the check sequence.
 const CHECK: usize = 4;
 
-/// The longest frame before COBS.
+/// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG + CHECK;
 
-/// The longest frame on the wire: COBS adds one byte to anything shorter than 254, the delimiter is another.
+/// Maximum length of a frame on the wire: COBS adds one byte below 254 bytes, the delimiter another one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
-/// The longest frame of a sweep on the wire: sixteen targets.
+/// Maximum length of a sweep on the wire, with sixteen targets.
 pub const MAX_SWEEP: usize = 100 + TAG;
 
 /// Flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Flag: the body is a handshake. Only with a tag.
+/// Flag: the body is a handshake; valid with a tag only.
 const HELLO: u16 = 0x2000;
 
-/// Room for one frame on its way to the link.
+/// Buffer for one encoded frame.
 pub type FrameBuf = [u8; MAX_FRAME];
 
-/// Who sends a frame to whom.
+/// Header of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// The network both belong to.
+    /// Network number.
     pub network: u16,
     /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
     pub sender: u16,
-    /// Node number of the one it is meant for.
+    /// Node number of the destination.
     pub destination: u16,
-    /// Counts the sender's frames, wrapping.
+    /// Frame counter of the sender, wrapping.
     pub counter: u32,
 }
 
-/// Why a frame was refused.
+/// Reason why a frame is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -55,9 +54,9 @@ pub enum FrameError {
     Short,
     /// The CRC does not match.
     Crc,
-    /// Another version of the format, or flags this version does not know.
+    /// Another version of the format, or unknown flags.
     Version,
-    /// The body is no message.
+    /// Invalid message in the body.
     Message(MessageError),
 }
 
@@ -74,7 +73,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Writes the frame for `message` into `out` and returns its length, delimiter included; 0 if a node number is too large.
+/// Encodes `message` into `out`; returns the length including the delimiter, or 0 if a node number is too large.
 ///
 /// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
 pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
@@ -82,7 +81,6 @@ pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     close(header, 0, len, None, out)
 }
 
-/// As [`encode`], with a tag.
 #[cfg(feature = "auth")]
 pub(crate) fn encode_signed(
     header: Header,
@@ -94,7 +92,6 @@ pub(crate) fn encode_signed(
     close(header, SIGNED, len, Some(signer), out)
 }
 
-/// The frame of a handshake, with its tag.
 #[cfg(feature = "auth")]
 pub(crate) fn encode_handshake(
     header: Header,
@@ -110,12 +107,12 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HELLO, len, Some(signer), out)
 }
 
-/// Where the body goes. The first byte and the last are for COBS and the delimiter.
+/// Returns the place of the body. The first byte and the last are for COBS and the delimiter.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
 
-/// Puts everything else around the first `body` bytes of the body.
+/// Completes a frame with the given length of its body.
 fn close(
     header: Header,
     flags: u16,
@@ -148,7 +145,7 @@ fn close(
     stuff(out, len)
 }
 
-/// Puts `bytes` at `at`, and says where they end.
+/// Writes `bytes` at `at`, and returns their end.
 fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
     if let Some(place) = plain.get_mut(at..at + N) {
         place.copy_from_slice(&bytes);
@@ -156,27 +153,27 @@ fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
     at + N
 }
 
-/// An intact frame, taken apart.
+/// Parsed intact frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Opened<'a> {
-    /// Who sends it to whom.
+    /// Addresses and counter.
     pub header: Header,
-    /// The body, which is a message unless the frame is a handshake.
+    /// Body: a message unless the frame is a handshake.
     pub body: &'a [u8],
-    /// Header and body: what the tag is of.
+    /// Header and body, which the tag covers.
     pub signed: &'a [u8],
-    /// The tag, if there is one. Whether it is right is not known yet.
+    /// Unverified tag, if there is one.
     pub tag: Option<[u8; TAG]>,
-    /// Whether the body is a handshake.
+    /// True if the body is a handshake.
     pub handshake: bool,
 }
 
-/// Takes apart `plain`, a frame without COBS and delimiter.
+/// Parses `plain`, a frame without COBS and delimiter.
 ///
-/// Whether the frame is meant for this node is the receiver's to say, before it decodes the body.
+/// The receiver checks the addresses before it decodes the body.
 ///
 /// # Errors
-/// [`FrameError`] says what is wrong; the CRC is looked at first, so every other error is one of an intact frame.
+/// [`FrameError`]. The CRC is checked first, so every other error is one of an intact frame.
 pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
     let (head, rest) = checked
@@ -215,10 +212,10 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     })
 }
 
-/// The header and the message in `plain`: [`open`], then [`Message::decode`]. Of a tag it says nothing.
+/// Decodes header and message: [`open`], then [`Message::decode`]. The tag is not verified.
 ///
 /// # Errors
-/// [`FrameError`] says what is wrong; a handshake is no message.
+/// [`FrameError`]; a handshake is not a message.
 pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     let Opened {
         header,
@@ -233,10 +230,10 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// COBS in place: the `len` bytes from the second on, fewer than 254, without their zeros, and the delimiter. Returns the
-/// length of all. The encoders of `cobs` write to a second buffer.
+/// Encodes COBS in place: the `len` bytes from the second one on, fewer than 254, then the delimiter; returns the total length.
+/// The encoders of `cobs` need a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
-    // From the end: every zero, and the byte before the first, becomes the way to the next.
+    // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;
     for byte in out.get_mut(1..=len).unwrap_or_default().iter_mut().rev() {
         if *byte == 0 {

@@ -1,6 +1,6 @@
-//! Bytes on the link: [`deframe`] cuts the byte stream at delimiters and undoes COBS, [`frame`] checks integrity and holds
-//! the addresses, [`message`] is what neighbours say, [`digest`] how they tell missions apart, [`auth`] how they tell
-//! members from others, `upload` how a newer mission is told, [`node_number`] which nodes there can be. `FORMAT.md` beside this file has byte tables and examples.
+//! Wire format: [`deframe`] splits the byte stream and decodes COBS, [`frame`] has addresses and the CRC, [`message`] the
+//! messages, [`digest`] the digest of a mission, [`auth`] the authentication, `endpoint` one node's frames, `upload` uploaded missions,
+//! [`node_number`] the range of node numbers. `FORMAT.md` in this folder has byte tables and examples.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -19,6 +19,7 @@ mod blake2s;
 pub mod crc;
 pub mod deframe;
 pub mod digest;
+pub(crate) mod endpoint;
 pub mod frame;
 pub mod message;
 pub mod node_number;

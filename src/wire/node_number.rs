@@ -1,4 +1,4 @@
-//! The numbers of nodes.
+//! Range of node numbers.
 
-/// The largest node number an address can hold; 4095 is kept for a broadcast.
+/// Largest node number of an address; 4095 is reserved for a broadcast.
 pub const MAX_NODE: u16 = 4094;

@@ -1,81 +1,79 @@
-//! Which frames a relay takes, and how it signs its own: one session with each node it talks to.
+//! Sessions: authentication of received frames and signing of sent ones, with one session per node.
 //!
-//! For each node it talks to, a relay has a *nonce*: its epoch, and below it a number that counts such entries from the relay's claim
-//! number on (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender, so a frame that was
-//! recorded before either of them was switched on, or had forgotten the other, is worth nothing. What a relay has to know
-//! for that, the other's nonce, comes in a *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the
-//! sender knows it, and whether the sender still lacks the proof that the receiver is there.
+//! For each such node, a relay has a *nonce*: its epoch, and below it a number that counts entries from the relay's claim number
+//! on (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender. So a
+//! frame that was recorded before either of them started, or had forgotten the other, is rejected. The other's nonce comes in a
+//! *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the sender knows it, and whether the sender
+//! still lacks the proof that the receiver is present.
 //!
-//! | a handshake with the right tag and | does |
+//! | handshake with the right tag and | action |
 //! | --- | --- |
-//! | a nonce below the one known, or a counter that has been taken | nothing; it is counted as a replay. Five of one older epoch in a row with rising counters, and nothing newer between them, are told: the node's epoch went back |
-//! | a nonce above the one known | the node has been switched on since: a new session begins |
-//! | a nonce below the one known, of the same epoch and of another claim number | another node of that number: it is answered, if it asks, so that it learns of the one that this relay believes |
-//! | the same, and the node of the nonce known was silent for `dead_after` | that node is forgotten, and a new session begins |
-//! | a nonce of this relay's number that is not its own | another node of this relay's number, which the sender believes: see `node::duplicate` |
-//! | this relay's own nonce | it is proof that the node is there now |
-//! | a question, and none of that to learn by it here | nothing but the answer |
+//! | a nonce below the known one, or a counter that was accepted before | none; it is counted as a replay. Five of one older epoch in a row with rising counters, and nothing newer between them, are reported: the node's epoch went back |
+//! | a nonce above the known one | the node has restarted: start a new session |
+//! | a nonce below the known one, of the same epoch and of another claim number | another node of that number: reply if it asks, so that it learns of the node that this relay accepts |
+//! | the same, and the node of the known nonce has been silent for `dead_after` | forget that node, and start a new session |
+//! | a foreign nonce of this relay's number | another node of this relay's number, which the sender accepts: see `node::duplicate` |
+//! | this relay's own nonce | proof that the node is present |
+//! | a request, and none of the above | reply only |
 //!
-//! A question that begins a session, that has not this relay's nonce, or that comes from a node already proven to be there is
-//! answered by one handshake; nothing else is. So whatever is played at a relay, it says at most one handshake for each frame that
-//! comes in, and with something else to say one in place of that.
+//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a proven
+//! node; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by another pending
+//! message, if there is one.
 //!
-//! A recorded handshake can be new to a relay only where the relay has just been switched on or had forgotten its sender. What
-//! it brings is no proof, as a recorded one can not have this relay's new nonce: it is no sign of life, nothing is sent on
-//! its account but a handshake, and a nonce of the past is overtaken by the true one, which is larger. So it does no lasting
-//! harm: until the true handshake comes there was nothing to be said to that node anyway.
+//! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It is no proof,
+//! because it does not contain this relay's new nonce: it is no sign of life, it causes nothing but a handshake, and an old nonce
+//! is replaced by the current one, which is larger. So it does no lasting harm: before the current handshake, nothing can be sent
+//! to that node.
 
 use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
 use crate::node::duplicate::{RAISED, Rival, Sender};
 use crate::time::{Duration, Instant};
 
-/// Bytes of the body of a handshake.
+/// Length of a handshake's body, bytes.
 pub(crate) const HELLO: usize = 17;
 
-/// Nodes that a relay remembers at once.
 const PEERS: usize = 8;
 
-/// Nonces of one epoch whose numbers are this far apart, or less, are taken for those of one node.
+/// Maximum difference of two numbers in nonces of one epoch that belong to the same node.
 const NEAR: u32 = 1 << 12;
 
-/// So many handshakes of an older epoch in a row are no delayed ones.
+/// Number of handshakes of an older epoch in a row that cannot be delayed ones.
 const WENT_BACK: u8 = 5;
 
-/// One node that this relay talks to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// Whether a handshake is to be sent.
+    /// True if a handshake is pending.
     handshake: bool,
-    /// Whether the handshake asks for an answer although the node is proven.
+    /// True if the handshake requests a reply although the node is proven.
     asks: bool,
-    /// Whether it has shown this relay's nonce: it is there, and both know each other.
+    /// True if the node has shown this relay's nonce: it is present, and both know each other.
     proven: bool,
-    /// When it was last used, on the session's own clock.
+    /// Time of the last use, on the session's own clock.
     used: u32,
     /// Time of its last proof, or of its first frame with a larger nonce.
     heard: Instant,
-    /// The lower half of this relay's nonce toward it; the upper one is the epoch.
+    /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own: u32,
-    /// The largest nonce it has shown, 0 before any.
+    /// Largest nonce that the node has shown; 0 before any.
     other: u64,
     taken: Window,
     older: Older,
 }
 
-/// Handshakes of an older epoch, or of the same one begun anew.
+/// Handshakes of an older epoch, or of the same one restarted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Older {
     epoch: u32,
-    /// One more than the counter of the last.
+    /// Counter of the last one, plus one.
     next: u32,
-    /// How many came in a row, one after the other by their counters.
+    /// Number of handshakes in a row with rising counters.
     times: u8,
 }
 
 impl Older {
-    /// One more; whether it is the last of so many that the node itself has to be there. A frame that is played again is none.
+    /// Counts a handshake; returns true at the `WENT_BACK`th. A replay of the same frame does not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -95,7 +93,6 @@ impl Older {
 }
 
 impl Peer {
-    /// The nonces of what is sent to it.
     const fn nonces(&self, epoch: u32) -> Nonces {
         Nonces {
             sender: (epoch as u64) << 32 | self.own as u64,
@@ -104,47 +101,46 @@ impl Peer {
     }
 }
 
-/// What an authenticated relay knows of the nodes it talks to.
 #[derive(Clone, Debug)]
 pub(crate) struct Session {
     auth: Auth,
-    /// Silence after which another node of the same number takes the place of the one that is believed.
+    /// Silence after which another node of the same number is accepted in place of the known one.
     gone_after: Duration,
-    /// Claim number: the lower halves of this relay's nonces are above it.
+    /// Claim number; the lower halves of this relay's nonces are above it.
     claim: u32,
-    /// Lower half of the last nonce made.
+    /// Lower half of the last created nonce.
     made: u32,
-    /// Claim to this relay's number that the last frame has shown.
+    /// Claim to this relay's number in the last frame.
     rival: Option<Rival>,
-    /// Counts uses of entries, wrapping.
+    /// Counter of uses of entries, wrapping.
     clock: u32,
-    /// Nodes whose entries are kept.
+    /// Nodes whose entries are not replaced.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
 }
 
-/// What a frame turned out to be.
+/// Result of a frame's authentication.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// A member's, and new: its body counts. Whether it is the first proof that the node is there.
+    /// Valid new frame of a member; `first` if it is the first proof that the node is present.
     Fresh { first: bool },
-    /// A handshake, new, and proof that the node is there; whether it is the first.
+    /// New handshake that proves that the node is present; `first` if it is the first proof.
     Handshake { first: bool },
-    /// A handshake with the right tag that proves nothing: it may have been recorded.
+    /// Handshake with the right tag but without proof: it may have been recorded.
     Unproven,
-    /// Without a tag.
+    /// Frame without a tag.
     Unsigned,
-    /// With a tag that is wrong, for these nonces at least.
+    /// Frame whose tag is wrong, at least for these nonces.
     Forged,
-    /// A member's, taken before or too old to tell.
+    /// Frame of a member that was received before or is too old to check.
     Replayed,
-    /// The same, and the last of so many in a row that the node itself goes on with an older epoch.
+    /// Replayed handshake, and the last of a row that shows that the node itself uses an older epoch.
     WentBack,
 }
 
 impl Session {
-    /// A session that knows nobody, of a node with claim number `claim`. A node that is silent for `gone_after` gives way to another one
-    /// with its number.
+    /// Creates a session without known nodes for a node with claim number `claim`. A node that is silent for `gone_after` is
+    /// replaced by another one with its number.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         Self {
             auth,
@@ -158,7 +154,7 @@ impl Session {
         }
     }
 
-    /// Keeps the entries of `nodes`, the present neighbours, and no others; those without one are greeted.
+    /// Pins the entries of `nodes`, the current neighbours, and schedules handshakes to those without an entry.
     pub(crate) fn pin(&mut self, nodes: [Option<u16>; 2]) {
         self.pinned = nodes;
         for node in nodes.into_iter().flatten() {
@@ -168,7 +164,7 @@ impl Session {
         }
     }
 
-    /// Owes a handshake to node `to`, with a new entry if there is none, and takes it for unproven until it has answered.
+    /// Schedules a handshake to node `to`, which is unproven until it replies.
     pub(crate) fn greet(&mut self, to: u16) {
         self.make(to);
         if let Some(peer) = self.touch(to) {
@@ -177,7 +173,7 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes. Nonces made from now on are above `claim`, if that is a new claim number.
+    /// Forgets all nodes. Later nonces are above `claim`, if that is a new claim number.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.made {
             self.claim = claim;
@@ -186,14 +182,14 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Owes a handshake to the known node `to`, for other nodes of this relay's number that receive it, too.
+    /// Schedules a handshake to the known node `to`, for other nodes of this relay's number that receive it too.
     pub(crate) fn show(&mut self, to: u16) {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             peer.handshake = true;
         }
     }
 
-    /// Owes a handshake to node `to` that asks for one in return, by which its nodes learn this relay's nonce, and this relay theirs.
+    /// Schedules a handshake to node `to` that requests a reply, by which both ends learn their nonces.
     pub(crate) fn ask(&mut self, to: u16) {
         self.make(to);
         if let Some(peer) = self.touch(to) {
@@ -202,8 +198,8 @@ impl Session {
         }
     }
 
-    /// Owes the same to a silent node, but not while its handshakes are those of a start with a used nonce: shown its own nonce, such a
-    /// node would pass for the one that it was, and its nonces and counters would be used twice.
+    /// Schedules such a handshake to a silent node, unless that node restarted with a used nonce. Shown its own nonce, such a
+    /// node would continue as its earlier start, and use nonces and counters twice.
     pub(crate) fn ask_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;
@@ -212,24 +208,23 @@ impl Session {
         }
     }
 
-    /// Returns the claim to this relay's number that the last frame has shown.
+    /// Returns the claim to this relay's number in the last frame, once.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
 
-    /// A node that a handshake is to be sent to: it then has been.
+    /// Returns a node with a pending handshake, and marks it as sent.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;
         Some(peer.node)
     }
 
-    /// Whether node `to` can read what it is sent.
+    /// Returns true if node `to` can verify this relay's frames.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.find(to).is_some_and(|peer| peer.proven)
     }
 
-    /// The body of a handshake to node `to`.
     pub(crate) fn handshake(&mut self, to: u16) -> [u8; HELLO] {
         let mut body = [0; HELLO];
         let epoch = self.auth.epoch;
@@ -246,7 +241,6 @@ impl Session {
         body
     }
 
-    /// What signs frames to node `to`.
     pub(crate) fn signer(&mut self, to: u16) -> Signer<'_> {
         let epoch = self.auth.epoch;
         let nonces = self
@@ -262,7 +256,7 @@ impl Session {
         }
     }
 
-    /// Checks an intact frame that says it is from node `sender`. Work: that of one tag.
+    /// Authenticates an intact frame with the sender address `sender`. Work: that of one tag.
     pub(crate) fn check(&mut self, now: Instant, sender: u16, frame: &Opened<'_>) -> Checked {
         let Some(told) = frame.tag else {
             return Checked::Unsigned;
@@ -292,7 +286,7 @@ impl Session {
         Checked::Fresh { first }
     }
 
-    /// A handshake; `None` if its tag is wrong.
+    /// Authenticates a handshake; `None` if its tag is wrong.
     fn meet(
         &mut self,
         now: Instant,
@@ -324,10 +318,10 @@ impl Session {
             peer.proven = false;
         }
         let proof = nonces.receiver == peer.nonces(epoch).sender;
-        // A node that has shown this relay's nonce does not forget it without a new one of its own.
+        // A node that has shown this relay's nonce forgets it only with a new nonce of its own.
         let old = nonces.sender < peer.other || peer.proven && !proof;
         if old {
-            // Another node of this number has to learn of the one that this relay believes.
+            // Another node of this number must learn of the node that this relay accepts.
             peer.handshake |= asks == 1 && is_rival(nonces.sender, peer.other);
             let [.., a, b, c, d] = nonces.sender.to_le_bytes();
             let epoch = u32::from_le_bytes([a, b, c, d]);
@@ -352,7 +346,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns what `frame`, under this relay's own number, says of its sender. Work: that of one tag.
+    /// Returns the sender of `frame`, which has this relay's own number. Work: that of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.auth.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -366,7 +360,7 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns which node of this relay's number has `nonce`; of an older epoch, or 0, it is not known.
+    /// Returns the node of this relay's number that has `nonce`; unknown for 0 or an older epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.auth.epoch {
@@ -388,7 +382,7 @@ impl Session {
         self.peers.iter().find(|peer| peer.node == node)
     }
 
-    /// The entry of `node`, used now.
+    /// Returns the entry of `node`, and updates its time of use.
     fn touch(&mut self, node: u16) -> Option<&mut Peer> {
         self.clock = self.clock.wrapping_add(1);
         let peer = self.peers.iter_mut().find(|peer| peer.node == node)?;
@@ -396,9 +390,8 @@ impl Session {
         Some(peer)
     }
 
-    /// Makes an entry for `node` if it has none: in a full table in place of one that is neither pinned nor proven, if there is
-    /// such a one, and of those the one that was not used for longest. After four billion of them there are no more: a nonce
-    /// is never used twice.
+    /// Creates an entry for `node` if it has none. A full table replaces an entry that is not pinned, preferably an unproven one,
+    /// and of those the least recently used. After four billion entries no more are created: a nonce is never used twice.
     fn make(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -433,7 +426,7 @@ impl Session {
     }
 }
 
-/// Returns the number and the epoch of a nonce.
+/// Splits a nonce into number and epoch.
 const fn halves(nonce: u64) -> [u32; 2] {
     let [a, b, c, d, e, f, g, h] = nonce.to_le_bytes();
     [
@@ -442,14 +435,14 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch are of two nodes: their numbers are farther apart than those that a node makes. What a node adds
-/// to its claim number to keep its place makes no other node of it.
+/// Returns true if two nonces of one epoch belong to two nodes: their numbers differ by more than one node's do. The increment by
+/// which a node raises its claim number is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR
 }
 
-/// The nonces of its sender and its receiver that stand in a handshake; `None` if `frame` is none.
+/// Returns the nonces in a handshake, of its sender and its receiver; `None` if `frame` is no handshake.
 fn said(frame: &Opened<'_>) -> Option<Nonces> {
     let (other, rest) = frame.body.split_first_chunk::<8>()?;
     let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {

@@ -1,8 +1,8 @@
-//! A mission that replaces the one the relays took off with: what an operator sends, and what a relay keeps across a reboot.
+//! Uploaded mission, which replaces the one loaded before flight; also the format in which a relay stores it across a reboot.
 //!
-//! An upload has a *version*, by which the newest is told, and the digest of its *base*, the mission that was loaded before
-//! flight: relays that were loaded with another one refuse it. It keeps the number of relays, because that is what nodes are
-//! numbered by, and it is of one interferer: a field does not fit into a frame.
+//! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before flight;
+//! relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it has one
+//! interferer, because a field does not fit into a frame.
 
 use super::digest::{MissionId, between, digest, of};
 use super::message::UPLOAD;
@@ -10,41 +10,40 @@ use crate::line::{self, LineError};
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 use crate::sites::Sites;
 
-/// A mission with a version.
+/// Mission with a version.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Checked: a mission can be made of it, with one interferer.
+    /// Checked parameters of a mission with one interferer.
     config: MissionConfig,
-    /// Where it is flown, if not between the sites that the relays were loaded with. On earth; whether they fit the mission is for
-    /// every relay to say.
+    /// Sites of the mission's line, if not the configured ones. Valid positions; every relay checks that they fit the mission.
     sites: Option<Sites>,
 }
 
-/// Why an upload was refused.
+/// Reason why an upload is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum UploadError {
-    /// The version is 0, which is that of the mission loaded before flight.
+    /// The version is 0, which identifies the mission loaded before flight.
     Version,
-    /// The number of relays is not that of the base.
+    /// The number of relays differs from that of the base.
     Relays,
-    /// The base or the new mission is in a field of interference, and not of one interferer.
+    /// The base or the new mission is in a field.
     Field,
     /// A parameter is outside its range.
     Mission(MissionError),
-    /// It is for relays that were loaded with another mission.
+    /// The upload is for relays with another base.
     Base,
-    /// There is no line on earth for it.
+    /// The mission does not fit its line on earth.
     Line(LineError),
-    /// A mission as new as that is held already.
+    /// The relay already has this mission or a newer one.
     Old,
-    /// Frames are not signed: `Settings::auth` is not set.
+    /// Frames are not signed, because `Settings::auth` is not set.
     Unsigned,
-    /// The relay has begun already: what is newer is for `Relay::handle_upload`.
+    /// The relay has already started: use `Relay::handle_upload`.
     Begun,
 }
 
@@ -69,14 +68,15 @@ impl core::fmt::Display for UploadError {
 impl core::error::Error for UploadError {}
 
 impl Upload {
-    /// Bytes of an encoded upload.
+    /// Length of an encoded upload, bytes.
     pub const LENGTH: usize = UPLOAD;
 
-    /// `config` as version `version`, 1 to 65535, for relays that were loaded with `base`. Where rounding has put eta of its channel
-    /// a bit outside of the other two factors, it becomes the nearer of them.
+    /// Creates an upload of `config` with `version`, 1 to 65535, for relays with the mission `base`.
+    ///
+    /// If rounding has put eta of its channel outside of the other two factors, it is clamped to the nearer one.
     ///
     /// # Errors
-    /// [`UploadError`] names what is wrong.
+    /// [`UploadError`] names the problem.
     pub fn new(base: &Mission, version: u16, config: MissionConfig) -> Result<Self, UploadError> {
         if base.field().is_some() {
             return Err(UploadError::Field);
@@ -89,11 +89,12 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// The same, flown between `sites`: relays turn places into latitudes and longitudes along the line between these from then on. An
-    /// upload without sites is flown between those that the relays were loaded with, wherever they flew since.
+    /// Adds the sites between which the mission is flown; relays then use the line between them for latitudes and longitudes.
+    ///
+    /// An upload without sites is flown between the configured ones, wherever the relays flew since.
     ///
     /// # Errors
-    /// [`UploadError::Line`] where they make no line, or not one as long as the mission's distance.
+    /// [`UploadError::Line`] if they define no line, or one of another length than the mission's distance.
     pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
         let valid = sites.are_valid().then_some(sites);
         let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;
@@ -104,7 +105,6 @@ impl Upload {
         })
     }
 
-    /// Of parameters as they are.
     pub(super) fn checked(
         version: u16,
         base: u16,
@@ -126,27 +126,27 @@ impl Upload {
         })
     }
 
-    /// Its number, from 1: the larger one is the newer one.
+    /// Version, from 1; the larger one is newer.
     pub const fn version(&self) -> u16 {
         self.version
     }
 
-    /// The digest of the mission that it replaces, as that was loaded before flight.
+    /// Digest of the mission loaded before flight, which the upload replaces.
     pub const fn base(&self) -> u16 {
         self.base
     }
 
-    /// Its parameters, in which [`Mission::try_new`] finds nothing wrong.
+    /// Parameters, which [`Mission::try_new`] accepts.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }
 
-    /// Between which sites it is flown; `None` for those that the relays were loaded with.
+    /// Sites of the mission's line; `None` for the configured ones.
     pub const fn sites(&self) -> Option<Sites> {
         self.sites
     }
 
-    /// By what relays tell which mission they hold.
+    /// Identifier of the mission.
     pub fn id(&self) -> MissionId {
         MissionId {
             version: self.version,

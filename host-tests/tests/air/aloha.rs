@@ -1,17 +1,17 @@
-//! Throughput by Poisson traffic against the textbook: Abramson (1970) for pure ALOHA, Roberts (1975) for slotted ALOHA.
+//! Throughput of pure and slotted ALOHA, compared with Abramson (1970) and Roberts (1975).
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
 
-/// Nodes that send to one that only listens: so many that none has two frames at once.
+/// Number of senders to one listener: large enough that none has two frames at once.
 const NODES: usize = 400;
 
-/// Bytes of a frame, with which it takes a round number of microseconds.
+/// Frame length for an air time of whole microseconds.
 const BYTES: usize = 90;
 
-/// One node hears them all, and they each other where `in_range`.
+/// Creates senders with one listener that receives all; with `in_range` they also receive each other.
 fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
     let listener = NODES;
     let hearers = |node| {
@@ -23,8 +23,7 @@ fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
     Bench::new(access, (0..=NODES).map(hearers).collect(), seed)
 }
 
-/// The share of the time that the listener receives frames whole, with `offered` frames begun per frame time over `frames` frame times.
-/// With `slots` they begin at multiples of a frame time.
+/// Returns the fraction of time with intact frames at the listener, for `offered` frames per frame time.
 fn throughput(mut bench: Bench, offered: f64, frames: u64, slots: bool) -> f64 {
     let frame = bench.medium.air_time(BYTES).as_micros();
     let mut rng = ChaCha8Rng::seed_from_u64(7);

@@ -1,4 +1,4 @@
-//! Losses in runs.
+//! Losses in bursts.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

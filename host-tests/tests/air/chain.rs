@@ -1,4 +1,4 @@
-//! Chains on the air.
+//! Chains on a simulated radio channel.
 
 use host_tests::fixtures::mission;
 use uav_relay::Side;
@@ -20,7 +20,7 @@ fn a_chain_takes_the_same_places_by_any_channel() {
             let outcome = run(setup.clone()).unwrap();
             assert_eq!(outcome.ending, Ending::Settled, "{access:?}, seed {seed}");
             assert_eq!(outcome.bits(), ideal.bits(), "{access:?}, seed {seed}");
-            // When the run ends some are still waiting.
+            // Some frames are still queued at the end.
             let waiting = outcome.messages - outcome.air.sent;
             assert!(waiting <= 8, "{access:?}, seed {seed}: {waiting}");
             let again = run(setup).unwrap();

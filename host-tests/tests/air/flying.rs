@@ -1,9 +1,9 @@
-//! Which groups fly an agreement of their own.
+//! Number of groups that fly different agreements.
 
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::flying::{Seen, groups, has_agreed};
 
-/// Relay `index` of `relays` in view `view`.
+/// Returns the state of relay `index` of `relays` in view `view`.
 fn seen(view: u32, relays: u16, index: u16) -> Seen {
     Seen {
         is_on: true,
@@ -24,7 +24,7 @@ fn relays_of_one_view_are_one_group_and_of_two_views_two() {
     assert_eq!(groups(&all), 1);
     all[3] = seen(1, 1, 1);
     assert_eq!(groups(&all), 2);
-    // The same number for two views that each part has agreed to by itself.
+    // Both parts use the same view number, each for its own view.
     let parts = [(2, 1), (2, 2), (3, 1), (3, 2), (3, 3)];
     let parts = parts.map(|(relays, index)| seen(1, relays, index));
     assert_eq!(groups(&parts), 2);
@@ -32,7 +32,7 @@ fn relays_of_one_view_are_one_group_and_of_two_views_two() {
     assert_eq!(groups(&halves), 2);
 }
 
-/// What becomes of a relay.
+/// Change of a relay's state.
 type Change = fn(&mut Seen);
 
 #[test]
@@ -48,7 +48,7 @@ fn who_is_off_has_no_place_or_no_lease_flies_nothing() {
         change(&mut all[1]);
         assert_eq!(groups(&all), 1, "{all:?}");
     }
-    // Whatever it says otherwise, it flies until its lease has run out.
+    // A relay flies until its lease has expired, whatever its phase is.
     let mut part = vec![seen(0, 3, 1), seen(0, 3, 2)];
     part[0].phase = Phase::NoQuorum;
     assert_eq!(groups(&part), 1);

@@ -1,4 +1,4 @@
-//! An hour on a bad channel: the table in `RESULTS.md`.
+//! Availability over an hour on a bad channel: the table in `RESULTS.md`.
 
 use host_tests::fixtures::mission;
 use uav_relay_sim::report::{self, ChainReport};
@@ -7,14 +7,14 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// So many runs of each kind; `SEEDS` in the environment takes other numbers.
+/// Runs of each kind; the environment variable `SEEDS` overrides it.
 const SEEDS: u64 = 200;
 
-/// Of the runs in which it dies, when relay 4 does, and how long they go on, s.
+/// Time of relay 4's loss and end of the run, s, in the runs with a loss.
 const DIES_S: u64 = 60;
 const ENDS_S: u64 = 900;
 
-/// Eight relays by CSMA at 57 600 baud, frames signed.
+/// Returns eight relays with CSMA at 57 600 baud and signed frames.
 fn losing(share: f64, burst: f64) -> Setup {
     let mut setup = Setup::on_air(mission(8), Access::Csma);
     setup.link.baud = 57_600;
@@ -24,7 +24,7 @@ fn losing(share: f64, burst: f64) -> Setup {
     setup
 }
 
-/// Shortest, median, 99 % and longest.
+/// Returns the minimum, median, 99th percentile and maximum as text.
 fn spread(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];

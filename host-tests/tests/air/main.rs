@@ -1,7 +1,6 @@
-//! The air as a medium: what is lost on a channel that all share, losses in runs, relays that do not hear each other, and how much of
-//! the time a chain is right in spite of them.
+//! Radio channel: collisions, burst losses, hidden nodes, and the availability of chains.
 //!
-//! `cargo test --test air -- --ignored --nocapture` prints how chains do on bad channels.
+//! `cargo test --test air -- --ignored --nocapture` prints the results of chains on bad channels.
 
 mod aloha;
 mod bursts;
@@ -19,21 +18,21 @@ use uav_relay::{Duration, Instant};
 use uav_relay_sim::simulator::link::LinkSpec;
 use uav_relay_sim::simulator::medium::{Access, Agenda, AirCounts, AirEvent, Medium, Sent};
 
-/// A medium on a clock of its own, and what has got through.
+/// Medium with its own clock, and the frames received.
 struct Bench {
     medium: Medium,
-    /// Who hears a node.
+    /// Receivers of each node.
     hearers: Vec<Vec<usize>>,
     due: BinaryHeap<Reverse<(Instant, u64, usize, u8)>>,
     order: u64,
-    /// When a frame was over, and what it was.
+    /// Completed frames with their end times.
     sent: Vec<(Instant, Sent)>,
 }
 
 const BAUD: u32 = 9_600;
 
 impl Bench {
-    /// `hearers[node]` are the nodes that hear `node`.
+    /// Creates a medium on which `hearers[node]` receive `node`.
     fn new(access: Access, hearers: Vec<Vec<usize>>, seed: u64) -> Self {
         let link = LinkSpec {
             baud: BAUD,
@@ -48,13 +47,13 @@ impl Bench {
         }
     }
 
-    /// All hear each other.
+    /// Creates a medium on which all nodes receive each other.
     fn in_one_range(access: Access, nodes: usize, seed: u64) -> Self {
         let others = |node| (0..nodes).filter(move |by| *by != node).collect();
         Self::new(access, (0..nodes).map(others).collect(), seed)
     }
 
-    /// Goes on to `at` and hands `node` a frame then.
+    /// Advances to `at` and passes a frame to `node`.
     fn offer(&mut self, at: Instant, node: usize, frame: &[u8]) -> bool {
         self.go_on(at);
         let mut agenda = Agenda::new();
@@ -75,7 +74,7 @@ impl Bench {
         }
     }
 
-    /// All that is due before `until` happens.
+    /// Processes all events before `until`.
     fn go_on(&mut self, until: Instant) {
         while let Some(Reverse((at, _, node, kind))) = self.due.peek().copied()
             && at < until
@@ -91,7 +90,7 @@ impl Bench {
         }
     }
 
-    /// All that is to come happens; who sent and who heard it, in order, and the counters.
+    /// Processes all remaining events. Returns senders with their receivers in order, and the counters.
     fn end(mut self) -> (Vec<(usize, Vec<usize>)>, AirCounts) {
         self.go_on(Instant::from_micros(u64::MAX));
         let sent = self.sent.into_iter();
@@ -100,7 +99,7 @@ impl Bench {
     }
 }
 
-/// How long `bytes` bytes take, µs.
+/// Returns the air time of `bytes` bytes, µs.
 fn micros(bytes: u64) -> u64 {
     (bytes * 10_000_000).div_ceil(u64::from(BAUD))
 }

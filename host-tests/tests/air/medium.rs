@@ -1,4 +1,4 @@
-//! Frames that meet on the air.
+//! Collisions of frames.
 
 use super::*;
 use uav_relay_sim::simulator::medium::access::{HEADER, QUEUE, TURNAROUND};
@@ -20,7 +20,7 @@ fn a_frame_takes_its_bytes_its_header_and_the_turnaround() {
 
 #[test]
 fn two_frames_that_overlap_are_both_lost_where_both_are_heard() {
-    // 0 and 1 hear only each other's neighbours: 2 hears both, 3 hears 0 alone, 4 hears 1 alone.
+    // Nodes 0 and 1 do not receive each other: 2 receives both, 3 only 0, 4 only 1.
     let hearers = vec![vec![2, 3], vec![2, 4], vec![], vec![], vec![]];
     for later in [0, 10, micros(50), micros(106) - 1] {
         let mut bench = Bench::new(Access::Aloha, hearers.clone(), 1);
@@ -30,7 +30,7 @@ fn two_frames_that_overlap_are_both_lost_where_both_are_heard() {
         assert_eq!(who, [(0, vec![3]), (1, vec![4])], "{later} us later");
         assert_eq!((counts.collided, counts.unheard), (2, 0));
     }
-    // One that begins as the other ends is in nobody's way.
+    // A frame that starts as the other ends does not collide.
     let mut bench = Bench::new(Access::Aloha, hearers, 1);
     bench.offer(at(0), 0, &[1; 100]);
     bench.offer(at(micros(106)), 1, &[2; 100]);
@@ -56,7 +56,7 @@ fn of_three_frames_in_a_row_the_one_in_the_middle_takes_both_others_with_it() {
 
 #[test]
 fn who_sends_does_not_hear() {
-    // 1 begins to send while 0 does; 0 has long stopped hearing then, and 2 hears 1 alone.
+    // Node 1 starts to send during 0's frame, which it therefore loses; 2 receives 1 alone.
     let hearers = vec![vec![1], vec![0, 2], vec![]];
     let mut bench = Bench::new(Access::Aloha, hearers.clone(), 1);
     bench.offer(at(0), 0, &[1; 100]);
@@ -64,7 +64,7 @@ fn who_sends_does_not_hear() {
     let (who, counts) = bench.end();
     assert_eq!(who, [(1, vec![2]), (0, vec![])]);
     assert_eq!((counts.collided, counts.unheard), (0, 2));
-    // It hears nothing while it turns, either: 0 begins just when 1 is about to.
+    // A node is deaf during its turnaround, too: 0 starts just as 1 is about to.
     let mut bench = Bench::new(Access::Aloha, hearers, 1);
     bench.offer(at(0), 1, &[2; 5]);
     bench.offer(at(1), 0, &[1; 100]);
@@ -76,15 +76,14 @@ fn who_sends_does_not_hear() {
 #[test]
 fn a_hidden_node_does_not_wait_and_one_in_range_does() {
     for seed in 0..200 {
-        // In a row: 0 and 2 do not hear each other.
+        // Nodes in a row: 0 and 2 do not receive each other.
         let mut bench = Bench::new(Access::Csma, vec![vec![1], vec![0, 2], vec![1]], seed);
         bench.offer(at(0), 0, &[0; 200]);
-        // The longest first wait, and the frame is on the air for twice as long.
+        // The frame is on the air for twice the longest first wait.
         bench.offer(at(micros(100)), 2, &[2; 20]);
         let (who, counts) = bench.end();
         assert_eq!(who, [(2, vec![]), (0, vec![])], "seed {seed}");
         assert_eq!((counts.collided, counts.deferred), (2, 0));
-        // All in one range.
         let mut bench = Bench::in_one_range(Access::Csma, 3, seed);
         bench.offer(at(0), 0, &[0; 200]);
         bench.offer(at(micros(100)), 2, &[2; 20]);
@@ -108,7 +107,7 @@ fn two_that_begin_in_the_same_slot_collide_and_in_different_slots_do_not() {
         assert!(lost == 0 || lost == 2, "seed {seed}");
         same += u64::from(lost == 2);
     }
-    // Eight slots to choose from; who finds the channel busy chooses again, and the other is done by then or later.
+    // There are eight slots; a node that finds the channel busy draws again, and the other one has finished by then or later.
     let share = same as f64 / runs as f64;
     assert!((share - 1.0 / 8.0).abs() < 0.02, "{share}");
 }
@@ -124,7 +123,6 @@ fn a_queue_holds_a_few_frames_in_order_and_drops_the_newest() {
     let tags: Vec<u8> = bench.sent.iter().map(|(_, sent)| sent.frame[0]).collect();
     assert_eq!((tags.as_slice(), QUEUE), (&[0, 1, 2, 3][..], 4));
     assert_eq!(bench.medium.counts().dropped, 2);
-    // There is room again.
     assert!(bench.offer(seconds(61), 0, &[9; 30]));
 }
 
@@ -135,7 +133,7 @@ fn a_radio_that_is_switched_off_sends_nothing_more() {
     bench.offer(at(1), 0, &[2; 100]);
     bench.go_on(at(micros(50)));
     bench.medium.switch_off(0);
-    // Switched on again at once, it sends what it has then.
+    // After an immediate restart it sends its new frames.
     bench.offer(at(micros(50)), 0, &[3; 100]);
     bench.go_on(seconds(60));
     let heard: Vec<(u8, bool)> = bench
@@ -156,8 +154,7 @@ fn who_finds_the_channel_busy_again_and_again_waits_longer_and_longer() {
         bench.offer(at(micros(100)), 1, &[1; 20]);
         times += bench.end().1.deferred;
     }
-    // Of a channel that is busy for 300 bytes to 370 more, waits of 35, 75 and 155 bytes on average take up three; waits of 35 would take
-    // nine.
+    // The channel is busy for 300 to 370 more bytes: waits grow to 35, 75 and 155 bytes on average, so three fit.
     let mean = times as f64 / runs as f64;
     assert!((2.5..4.5).contains(&mean), "{mean}");
 }

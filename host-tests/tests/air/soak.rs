@@ -1,4 +1,4 @@
-//! How much of the time a chain is right, how many groups fly at once, how near relays come to each other.
+//! Availability of chains, number of groups in flight, and distances between relays.
 
 use host_tests::fixtures::mission;
 use uav_relay_sim::report::ChainReport;
@@ -71,7 +71,7 @@ fn the_optimum_is_that_of_exactly_those_who_are_left() {
     assert_eq!(places.len(), 7);
 }
 
-/// Relays 1 to 4 of eight, and the others, for good.
+/// Returns a chain split for good between relays 4 and 5.
 fn split(quorum: bool) -> Setup {
     let mut setup = Setup::on_shared_channel(mission(8));
     setup.settings.quorum = quorum;
@@ -87,7 +87,7 @@ fn split(quorum: bool) -> Setup {
 fn without_a_quorum_two_groups_fly_at_once() {
     let (_, both) = watched(split(false));
     assert_eq!(both.most_flying, 2);
-    // Either half is as large as the other, and right.
+    // Both halves have the same size, and each is right.
     assert!(both.availability.unwrap() > 0.85, "{both:?}");
 }
 

@@ -1,4 +1,4 @@
-//! How chains do on bad channels: figures to compare, printed on demand.
+//! Figures of chains on bad channels, printed on demand.
 
 use std::time;
 
@@ -9,7 +9,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Eight relays by CSMA at 57 600 baud.
+/// Returns eight relays with CSMA at 57 600 baud.
 fn usual() -> Setup {
     let mut setup = Setup::on_air(mission(8), Access::Csma);
     setup.link.baud = 57_600;

@@ -1,4 +1,4 @@
-//! The link to an autopilot beside a relay, each a future of one task that is polled when it is woken and never else.
+//! Autopilot link and relay as futures of one task that is polled only after a wake-up.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -33,7 +33,7 @@ use crate::wire::BAUD;
 
 const START: Placement = Placement::on_line(100.0, 20.0);
 
-/// Bytes on their way, and who waits for them.
+/// Queue of bytes with the wakers of its readers.
 #[derive(Clone, Default)]
 struct Uart(Rc<Queue>);
 
@@ -41,7 +41,7 @@ struct Uart(Rc<Queue>);
 struct Queue {
     bytes: RefCell<VecDeque<u8>>,
     waits: RefCell<Option<Waker>>,
-    /// Writes never complete.
+    /// True while writes never complete.
     stuck: Cell<bool>,
 }
 
@@ -84,13 +84,13 @@ impl Write for Uart {
     }
 }
 
-/// A PX4 that flies where it is told, at once. Its pilot has it until `given_at`, and gives it to its companion then.
+/// PX4 that reaches targets at once; its pilot flies it until `given_at`, then its companion.
 struct Vehicle {
     mute: Cell<bool>,
     given_at: Cell<Instant>,
     place: Cell<Placement>,
     told: RefCell<Vec<(Instant, Placement)>>,
-    /// Commands of a ground station to forward, and the results that have come back.
+    /// Ground station commands to forward, and their results.
     commands: RefCell<VecDeque<MavMessage>>,
     results: RefCell<Vec<u32>>,
 }
@@ -118,7 +118,7 @@ fn raw(number: u8, message: &MavMessage) -> Vec<u8> {
     raw.raw_bytes().to_vec()
 }
 
-/// Says every 200 ms how it is, and flies.
+/// Sends the vehicle's state every 200 ms and flies.
 async fn fly(vehicle: &Vehicle, time: &Time, mut to: Uart, from: Uart) -> Infallible {
     let mut number = 0;
     let mut waiting: Vec<u8> = Vec::new();
@@ -198,7 +198,7 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// The first of so many relays between the sites, with a guard.
+/// Creates the first of `relays` relays between the sites, with a guard.
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -215,7 +215,7 @@ fn relay(relays: u16) -> Relay {
     fixtures::relay(mission, 1, settings)
 }
 
-/// What the firmware has seen of it.
+/// State observed by the firmware.
 #[derive(Default)]
 struct Seen {
     events: Vec<AutopilotEvent>,
@@ -232,12 +232,12 @@ struct Scene {
 }
 
 impl Scene {
-    /// With `tells` the firmware hands the link the relay's events.
+    /// Creates a single relay; with `tells` the firmware passes the relay's events to the link.
     fn new(tells: bool) -> Self {
         Self::of(1, tells)
     }
 
-    /// The same of the first of so many relays.
+    /// Creates the first of `relays` relays.
     fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();
@@ -304,7 +304,7 @@ impl Scene {
     }
 }
 
-/// To the place that the relay alone would take; with and without the relay's events.
+/// Checks that the drone reaches the single relay's position, with and without the relay's events.
 #[test]
 fn it_is_engaged_and_led_to_its_place() {
     for tells in [true, false] {
@@ -317,7 +317,7 @@ fn it_is_engaged_and_led_to_its_place() {
             AutopilotEvent::Ready,
             AutopilotEvent::State(State::Engaged),
         ];
-        // Between two polls it was on the ground: of several states the last is told.
+        // Of the states between two polls only the last is reported.
         assert_eq!(seen.events, expected);
         assert!(seen.flown);
         let (place, setpoint) = (scene.vehicle.place.get(), seen.setpoint.unwrap());
@@ -337,7 +337,7 @@ fn it_is_engaged_and_led_to_its_place() {
     }
 }
 
-/// An autopilot that falls silent is one that flies nowhere; the relay is told so, and so is the firmware. It may come back.
+/// Checks that a silent autopilot counts as not flown, to the relay and the firmware, until it returns.
 #[test]
 fn it_falls_silent_and_comes_back() {
     let mut scene = Scene::new(true);
@@ -353,7 +353,7 @@ fn it_falls_silent_and_comes_back() {
     assert_eq!(scene.vehicle.told.borrow().len(), before, "nobody is told");
     scene.vehicle.mute.set(false);
     scene.run(5_000);
-    // It is in OFFBOARD, and nobody has chosen that since.
+    // The autopilot is in OFFBOARD, which the pilot has not chosen again.
     assert!(!scene.seen.borrow().flown);
     assert_eq!(scene.vehicle.told.borrow().len(), before, "nobody is told");
     let now = scene.time.now();
@@ -366,14 +366,14 @@ fn it_falls_silent_and_comes_back() {
     assert!(scene.vehicle.told.borrow().len() > before + 20);
 }
 
-/// A writer that never completes: what the autopilot says is heard all the same, and the relay goes on.
+/// Checks a writer that never completes: received messages are still processed, and the relay continues.
 #[test]
 fn a_stuck_writer_keeps_nobody_from_hearing() {
     let mut scene = Scene::new(true);
     scene.run(10_000);
     scene.from_link.0.stuck.set(true);
     scene.run(10_000);
-    // No target leaves, so that the autopilot is in its failsafe before long: the drone is not flown any more.
+    // Without targets the autopilot enters its failsafe, and the drone is released.
     let seen = scene.seen.borrow();
     let release = Release {
         cause: ReleaseCause::Link,
@@ -392,7 +392,7 @@ fn a_stuck_writer_keeps_nobody_from_hearing() {
     );
 }
 
-/// Scene of a board: the firmware hands on the relay's events, and nothing else.
+/// Checks a clearance on a board whose firmware passes the relay's events to the link.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

@@ -1,4 +1,4 @@
-//! Chains of relays on asynchronous ports, each a task of one executor; and the same chain on ports that are polled, to compare with.
+//! Chains of relays on asynchronous ports, each a task of one executor, compared with polled ports.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use uav_relay::{Event, Instant, Mission, Placement, Port, Relay, Settings, Wirin
 use crate::time::Time;
 use crate::wire::{BAUD, Fate, Heard, Rx, Shared, Tx, line};
 
-/// Relay `index` of `relays` in the paper's scenario.
+/// Creates relay `index` of `relays` in the paper's scenario.
 pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     let mission = Mission::try_new(fixtures::paper(relays)).unwrap();
     let settings = Settings {
@@ -23,7 +23,7 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Whose writer has what fate: its relay, and its port.
+/// Fault of a writer, with its relay and port.
 pub(crate) type Trouble = Option<(u16, Port, Fate)>;
 
 fn fate(trouble: Trouble, index: u16, port: Port) -> Fate {
@@ -33,24 +33,24 @@ fn fate(trouble: Trouble, index: u16, port: Port) -> Fate {
     }
 }
 
-/// What has become of one relay.
+/// Result of one relay.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Drone {
     pub(crate) setpoint: Option<Placement>,
     pub(crate) events: Vec<(Instant, Event)>,
     pub(crate) rejected: u32,
-    /// Upstream or shared, and downstream.
+    /// Counters of the upstream or shared port, and of the downstream port.
     pub(crate) counted: [SerialStats; 2],
 }
 
-/// What has become of a chain.
+/// Result of a chain.
 pub(crate) struct Flown {
     pub(crate) drones: Vec<Drone>,
-    /// What was said on each line, in the order along the chain; those toward the receiver first.
+    /// Frames of each line, ordered along the chain, lines toward the receiver first.
     pub(crate) lines: Vec<Vec<Heard>>,
 }
 
-/// A task for every relay, and one for the firmware beside it, until this time.
+/// Runs a task for every relay and its firmware until a time.
 pub(crate) fn fly(
     wiring: Wiring,
     relays: u16,
@@ -81,7 +81,7 @@ pub(crate) fn fly(
             time: time.clone(),
             fate: fate(trouble, index, port),
         };
-        // Every wire has its sender at end 0.
+        // The sender of every wire is at end 0.
         let task: std::pin::Pin<Box<dyn Future<Output = ()>>> = match wiring {
             Wiring::Pair => {
                 let [from_up, to_down] = [&lines[at - 1], &lines[at]];
@@ -141,7 +141,7 @@ pub(crate) fn fly(
     }
 }
 
-/// Takes note of what happens.
+/// Records a relay's events.
 async fn firmware(relay: &AsyncRelay<'_>, time: &Time, drone: &RefCell<Drone>) {
     use uav_relay::asynch::Clock as _;
     loop {

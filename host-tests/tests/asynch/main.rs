@@ -1,4 +1,4 @@
-//! Relays on asynchronous ports: a chain on an executor with virtual time, ports that are stuck, fail, or never have enough.
+//! Relays on asynchronous ports in virtual time, including ports that block, fail, or are always ready.
 
 mod autopilot;
 mod chain;
@@ -30,7 +30,7 @@ fn five_settle_where_the_polled_ones_do() {
     }
 }
 
-/// A block of the guide below the name of a file is a part of that file, or all of it; `cargo ci` builds the files.
+/// Checks that each named block of the guide is a part of that file, which `cargo ci` builds.
 #[test]
 fn the_guide_shows_what_is_built() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -41,7 +41,7 @@ fn the_guide_shows_what_is_built() {
         let (name, rest) = part.split_once(" -->\n```").unwrap();
         let (language, rest) = rest.split_once('\n').unwrap();
         let block = rest.split("```").next().unwrap();
-        // A line that only the documentation test has.
+        // Lines with `# ` are in the documentation test only.
         let visible = |line: &&str| !line.starts_with("# ");
         let block: String = if language.is_empty() {
             (block.split_inclusive('\n').filter(visible)).collect()
@@ -81,15 +81,14 @@ fn the_guide_shows_what_is_built() {
     }
 }
 
-/// The lines that were said something on at other times, or something else.
+/// Returns the lines whose frames or times differ.
 fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
     let lines = one.lines.iter().zip(&other.lines);
     let all = lines.enumerate().filter(|(_, (one, other))| one != other);
     all.map(|(at, _)| at).collect()
 }
 
-/// A writer that is stuck for good and one whose bytes get lost are the same to everybody else: every frame of every other line, and
-/// every event, comes at the same microsecond.
+/// Checks that a blocked writer affects others no more, to the microsecond, than one that loses its bytes.
 #[test]
 fn a_stuck_port_delays_nobody() {
     let until = Instant::from_millis(60_000);
@@ -106,7 +105,7 @@ fn a_stuck_port_delays_nobody() {
         for (stuck, cut) in stuck.drones.iter().zip(&cut.drones) {
             assert_eq!((&stuck.events, stuck.setpoint), (&cut.events, cut.setpoint));
         }
-        // It hears at the port where it cannot speak, and the neighbour there cannot hear it.
+        // The relay still receives at the blocked port, but its neighbour there does not receive it.
         let lost = |drone: usize, side| {
             let mut events = stuck.drones[drone].events.iter();
             events.any(

@@ -1,4 +1,4 @@
-//! The chain on ports that are polled, of `uav_relay::serial`.
+//! Chain on polled ports of `uav_relay::serial`.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -15,7 +15,7 @@ use crate::wire::{BAUD, BYTE_TIME};
 
 type Bytes = Rc<RefCell<VecDeque<u8>>>;
 
-/// Hears one queue and fills others.
+/// Port that reads one queue and writes several.
 struct End {
     from: Bytes,
     to: Vec<Bytes>,
@@ -52,7 +52,7 @@ fn link(from: &Bytes, to: Vec<Bytes>) -> SerialLink<Nb<End>> {
 
 type Polled = Box<dyn FnMut(Instant, &mut Relay) -> Option<Instant>>;
 
-/// Where its relays go.
+/// Returns the final positions of the chain.
 pub(crate) fn places(wiring: Wiring, relays: u16) -> Vec<Option<Placement>> {
     let count = usize::from(relays);
     let queues: Vec<Bytes> = (0..2 * (count + 1)).map(|_| Bytes::default()).collect();

@@ -1,5 +1,4 @@
-//! What one runner promises of its ports: bytes that are read get to the relay, a frame that is cut short is ended, nobody starves, and
-//! the pin is high while bytes leave.
+//! Guarantees of the port runner: delivery, termination of truncated frames, fairness, pin timing.
 
 use std::cell::{Cell, RefCell};
 use std::future::{pending, poll_fn};
@@ -18,20 +17,20 @@ use crate::chain::relay;
 use crate::time::Time;
 use crate::wire::{BAUD, BYTE_TIME, Fate, Rx, Tx, line};
 
-/// Takes so many bytes of each write, and of some writes none, or fails.
+/// Writer that accepts part of each write, or blocks, or fails.
 #[derive(Default)]
 struct Taker {
     taken: Rc<RefCell<Vec<u8>>>,
-    /// Writes until one that never completes.
+    /// Number of writes until one that never completes.
     writes: Rc<Cell<usize>>,
-    /// Every so many writes one fails.
+    /// Interval of failing writes.
     fails: usize,
     done: usize,
 }
 
 struct Silent;
 
-/// Never waits: there is always another byte, or another error.
+/// Reader that never waits: it always has a byte or an error.
 struct Flood {
     fails: bool,
 }
@@ -82,12 +81,11 @@ impl Read for Flood {
     }
 }
 
-/// Polls a future that never completes.
 fn poll<F: Future>(future: std::pin::Pin<&mut F>, cx: &mut Context<'_>) {
     assert!(future.poll(cx).is_pending());
 }
 
-/// Frames that arrive whole, and those that do not.
+/// Returns the numbers of intact and damaged frames.
 fn deframed(bytes: &[u8]) -> [usize; 2] {
     let mut deframer = Deframer::new();
     let mut counted = [0; 2];
@@ -105,7 +103,7 @@ fn deframed(bytes: &[u8]) -> [usize; 2] {
     counted
 }
 
-/// Dropped behind any write, and run again: one frame is cut short, and all that come after it arrive.
+/// Checks a runner that is dropped during any write and run again: at most one frame is truncated.
 #[test]
 fn a_frame_that_is_cut_short_is_ended_before_the_next() {
     for cut in 1..12 {
@@ -148,7 +146,7 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
         println!("dropped behind {before} bytes: {whole} whole frames, {spoiled} cut short");
         assert!(whole > 5, "{cut}: {whole}");
         assert_eq!(spoiled, usize::from(half), "{cut}");
-        // What is sent again begins behind a delimiter.
+        // The repeated frame starts behind a delimiter.
         assert_eq!(taken[before], 0, "{cut}");
     }
 }
@@ -185,11 +183,11 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
     assert!(stats.write > 5 && spoiled > 0);
     assert!(spoiled <= usize::try_from(stats.write).unwrap());
     let sent = relay.with(|relay| relay.stats().sent).unwrap();
-    // Every frame for this port but those that wait.
+    // Every frame for this port except queued ones.
     assert!(whole + 3 >= usize::try_from(sent).unwrap() / 2, "{sent}");
 }
 
-/// A port that always has something, or fails at once, gives the executor back, and the relay and the other port have their turns.
+/// Checks that a port that is always ready, or always fails, yields to all others.
 #[test]
 fn a_port_that_is_always_ready_starves_nobody() {
     for fails in [false, true] {
@@ -219,7 +217,7 @@ fn a_port_that_is_always_ready_starves_nobody() {
     }
 }
 
-/// Every edge, and when.
+/// Edges of the pin with their times.
 #[derive(Clone)]
 struct Pin {
     time: Time,
@@ -255,7 +253,7 @@ impl OutputPin for Pin {
     }
 }
 
-/// By a writer whose `flush` does not know of a FIFO of 4 bytes.
+/// Checks a writer whose `flush` ignores a FIFO of 4 bytes.
 #[test]
 fn the_pin_is_high_while_bytes_leave_and_little_longer() {
     for capacity in [1, 4, 16, 1_000] {
@@ -286,7 +284,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
                 let mut relay = relay(2, 1, Wiring::Shared);
                 let relay = AsyncRelay::new(&mut relay);
                 let counted = poll_fn(|_| {
-                    // Looked at whenever this task is polled.
+                    // The statistics are checked at every poll.
                     assert!(relay.stats(Port::Shared).pin <= 3);
                     Poll::<()>::Pending
                 });
@@ -313,7 +311,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
                 down.is_none_or(|(at, high)| !high && at >= left),
                 "{capacity}"
             );
-            // Two byte times behind the last byte; a frame that follows at once keeps it high.
+            // The pin falls two byte times after the last byte, unless another frame follows at once.
             let follows = heard.iter().find(|next| next.0 > *left);
             let alone = follows.is_none_or(|(at, frame)| {
                 let begun = at.as_micros() - BYTE_TIME.as_micros() * frame.len() as u64;

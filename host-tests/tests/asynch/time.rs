@@ -1,4 +1,4 @@
-//! Virtual time for any executor: it moves when nobody has anything to do, to the next thing that somebody waits for.
+//! Virtual time for any executor: when all tasks are idle, it jumps to the next timer.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
@@ -17,7 +17,7 @@ pub(crate) struct Time(Rc<Inner>);
 #[derive(Default)]
 struct Inner {
     now: Cell<Instant>,
-    /// Who is to be woken when; the number keeps those of one instant apart, the last asked first.
+    /// Wakers by time; the number separates those of the same instant, latest first.
     sleepers: RefCell<BTreeMap<(Instant, Reverse<u64>), Waker>>,
     asked: Cell<u64>,
 }
@@ -42,7 +42,7 @@ impl Clock for Time {
 }
 
 impl Time {
-    /// Runs the tasks of `pool` until this time.
+    /// Runs the tasks of `pool` until a time.
     pub(crate) fn run(&self, pool: &mut LocalPool, until: Instant) {
         loop {
             pool.run_until_stalled();

@@ -1,4 +1,4 @@
-//! Asynchronous ports in memory: wires, and a channel that everybody hears, on which a byte takes its time.
+//! Asynchronous ports in memory: wires and a shared channel, with the transmission time of each byte.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -18,41 +18,41 @@ pub(crate) const BAUD: u32 = 115_200;
 /// Time of a byte at [`BAUD`].
 pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
-/// A frame, and when its last byte had arrived.
+/// Frame with the arrival time of its last byte.
 pub(crate) type Heard = (Instant, Vec<u8>);
 
-/// What is wrong with a writer.
+/// Fault of a writer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Fate {
     Well,
-    /// From its first byte on: `write` never completes.
+    /// `write` never completes, from the first byte on.
     Stuck,
-    /// Its bytes take their time and arrive nowhere.
+    /// Bytes take their time and are lost.
     Cut,
 }
 
-/// What has arrived at one reader.
+/// Bytes that have arrived at one reader.
 #[derive(Default)]
 struct Inbox {
     bytes: VecDeque<(Instant, u8)>,
     waits: Option<Waker>,
 }
 
-/// One line that one end speaks on at a time, a frame long.
+/// Line on which one end at a time sends a frame.
 pub(crate) struct Line {
     inboxes: Vec<Inbox>,
-    /// When each byte that was taken has left, of those that may not have.
+    /// Departure times of accepted bytes that may still be in the buffer.
     leaving: VecDeque<Instant>,
     capacity: usize,
     talker: Option<usize>,
     frame: Vec<u8>,
-    /// Every frame that anybody has sent.
+    /// Frames sent by any end.
     pub(crate) heard: Vec<Heard>,
 }
 
 pub(crate) type Shared = Rc<RefCell<Line>>;
 
-/// A line among so many ends, which takes so many bytes ahead.
+/// Creates a line with `ends` ends and a buffer of `capacity` bytes.
 pub(crate) fn line(ends: usize, capacity: usize) -> Shared {
     Rc::new(RefCell::new(Line {
         inboxes: (0..ends).map(|_| Inbox::default()).collect(),
@@ -146,7 +146,7 @@ impl Write for Tx {
         }
     }
 
-    /// As that of a HAL with a FIFO of 4 bytes, which it does not know of.
+    /// Ignores the last 4 bytes, like a HAL that does not know of its FIFO.
     async fn flush(&mut self) -> Result<(), Infallible> {
         let left = {
             let line = self.line.borrow();
@@ -161,7 +161,7 @@ impl Write for Tx {
 }
 
 impl Line {
-    /// Puts bytes on the line, up to the end of a frame.
+    /// Sends bytes up to the end of a frame.
     fn put(&mut self, from: usize, bytes: &[u8], now: Instant, fate: Fate) -> usize {
         let mut count = 0;
         for &byte in bytes {

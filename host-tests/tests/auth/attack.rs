@@ -1,5 +1,4 @@
-//! A million attacks on a chain that settles, holds, settles again, is rebooted and given newer missions: none is taken, nothing
-//! is changed.
+//! A million attacks on a chain with reboots and uploads: none is accepted, and none has an effect.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +7,7 @@ use uav_relay::{Instant, Phase, Side, Wiring};
 use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
 use super::net::{Deed, Net};
 
-/// A relay in the middle is rebooted, the chain agrees again; a mission is uploaded, relays are rebooted that have stored it and
-/// others that have not, then the leader; a newer mission comes from the other end, and a relay next to either is rebooted.
+/// Schedule: a reboot; an upload and reboots of relays and leader; another upload and reboots at both ends.
 const DEEDS: [(u64, Deed); 11] = [
     (6_000, Deed::Reboot(4)),
     (6_500, Deed::Restart),
@@ -104,7 +102,7 @@ fn under_attack(wiring: Wiring, count: u64) {
         assert!(of_it > count / 100, "{kind:?}: {of_it}");
     }
     assert_eq!(table.values().sum::<u64>(), count);
-    // Not a byte that was sent is another one, and nothing was taken but what members sent.
+    // Every sent byte is the same as without attacks, and only members' frames were accepted.
     assert_eq!(net.heard, calm.heard);
     assert_eq!(net.bits(), calm.bits());
     for (relay, calm) in net.relays.iter().zip(&calm.relays) {
@@ -125,7 +123,7 @@ fn under_attack(wiring: Wiring, count: u64) {
     }
 }
 
-/// The number of attacks, a million by default.
+/// Returns the number of attacks.
 fn count() -> u64 {
     std::env::var("COUNT")
         .ok()

@@ -1,4 +1,4 @@
-//! Authenticated chains settle at the very places of others, through a bad day and reboots too.
+//! Authenticated chains: their positions equal those of plain chains, also with faults and reboots.
 
 use host_tests::fixtures::mission;
 use uav_relay::{
@@ -47,7 +47,7 @@ fn places_are_the_same_and_only_handshakes_are_added() {
                     .sum()
             };
             let links = u64::from(relays - 1);
-            // A pass there and back, and perhaps the first two pulses; without a key claims to the relays' numbers.
+            // A pass there and back, and perhaps the first two lease renewals; without a key also claims of relay numbers.
             let messages = sum(|stats| stats.received);
             assert!([2 * links, 6 * links].contains(&messages));
             assert!(plain.messages >= messages);
@@ -61,7 +61,7 @@ fn places_are_the_same_and_only_handshakes_are_added() {
                 outcome.bytes, plain.bytes
             );
             assert!(sum(|stats| stats.handshakes) <= handshakes);
-            // Three make a link known at both ends; two that cross take four, and the head has something to say before that.
+            // A link is authenticated by three handshakes, or four that cross; the leader has messages to send before that.
             assert!((3 * links..=4 * links + 3).contains(&handshakes));
         }
     }
@@ -112,7 +112,7 @@ fn other_methods_choose_the_same() {
     }
 }
 
-/// A relay in flight that is switched off and on, with the next epoch, is one of the chain again; so is the leader.
+/// Checks that a relay, or the leader, rejoins the chain after a reboot with the next epoch.
 #[test]
 fn whoever_is_rebooted_rejoins() {
     let deeds = [
@@ -127,7 +127,7 @@ fn whoever_is_rebooted_rejoins() {
         assert!(places.iter().all(Option::is_some));
         net.run(Instant::from_millis(3_999));
         assert_eq!(net.bits()[3], None, "the relay begins anew");
-        // A leader that has forgotten its view is no member of it any more: its places are not taken before the lease of the others is over.
+        // A leader that forgot its view is no member of it: its positions are not used before the others' lease has expired.
         for end in [7_999, 40_000] {
             net.run(Instant::from_millis(end));
             assert_eq!(net.bits(), places);
@@ -148,7 +148,7 @@ fn whoever_is_rebooted_rejoins() {
     }
 }
 
-/// A neighbour with another key, or with none, is not heard, and both count why.
+/// Checks that frames of a neighbour with another key, or none, are refused and counted by their cause.
 #[test]
 fn a_stranger_is_not_heard() {
     let stranger = Key::new([1; 32]);

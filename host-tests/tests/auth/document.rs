@@ -1,4 +1,4 @@
-//! What `FORMAT.md` works out for frames with a tag, byte by byte.
+//! Worked examples of frames with a tag in `FORMAT.md`, byte by byte.
 
 use host_tests::fixtures::mission;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings};
@@ -18,7 +18,7 @@ fn bytes(text: &str) -> Vec<u8> {
         .collect()
 }
 
-/// The bytes of the table of the section, without the CRC at its end, and the frame on the wire.
+/// Returns the bytes in the section's table, without the CRC, and the frame on the wire.
 fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
     let title = format!("### Worked: {name}\n");
     let section = DOCUMENT.split(&title).nth(1).unwrap();
@@ -62,7 +62,7 @@ fn the_worked_frames_are_what_the_rules_say() {
     }
 }
 
-/// And they are what relays take: relay 2 of 3, which greets relay 1 first, has its first nonce there and not its second.
+/// Checks that relays accept the worked frames: relay 2 of 3 uses its first nonce for relay 1.
 #[test]
 fn the_worked_handshake_is_taken_and_the_crate_makes_the_same_tags() {
     let settings = Settings {
@@ -85,7 +85,6 @@ fn the_worked_handshake_is_taken_and_the_crate_makes_the_same_tags() {
     assert_eq!(Key::new(key()).tag(nonce(5, 1), nonce(9, 2), signed), tag);
 }
 
-/// The lengths that the document names.
 #[test]
 fn the_lengths_of_the_document_are_those_of_the_crate() {
     let (table, wire) = worked("a handshake");

@@ -1,4 +1,4 @@
-//! Counters and epochs at their limits, with frames that only somebody who has the key can make.
+//! Counters and epochs at their limits, by frames that require the key.
 
 use host_tests::fixtures::mission;
 use uav_relay::MAX_FRAME;
@@ -11,14 +11,14 @@ use super::net::{KEY, NETWORK, relay};
 
 const NOW: Instant = Instant::from_millis(5);
 
-/// Relay 2 of 3, and somebody who has the key and says to be relay 1.
+/// Relay 2 of 3, and a peer with the key that acts as relay 1.
 struct Link {
     relay: Relay,
     nonces: [u64; 2],
 }
 
 impl Link {
-    /// Both know each other.
+    /// Creates a link on which both have authenticated each other.
     fn new() -> Self {
         let mut relay = relay(3, 2, Wiring::Pair, (4, Instant::ZERO));
         let mut out = [0; MAX_FRAME];
@@ -46,7 +46,7 @@ impl Link {
         self.give(&handshake.signed(&KEY, nonces))
     }
 
-    /// A heartbeat with this counter.
+    /// Sends a heartbeat with the given counter.
     fn say(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);
@@ -81,7 +81,7 @@ fn the_last_counter_is_never_taken_and_nothing_comes_after() {
     assert_eq!(link.say(u32::MAX - 1), Some("received"));
     assert_eq!(link.say(u32::MAX), Some("replayed"));
     assert_eq!(link.say(0), Some("replayed"));
-    // A new session begins from 0.
+    // A new session starts at 0.
     link.nonces[0] = nonce(10, 1);
     assert_eq!(link.handshake(0, link.nonces), Some("handshakes"));
     assert_eq!(link.say(1), Some("received"));
@@ -135,19 +135,18 @@ fn what_is_signed_for_other_nonces_is_forged() {
     assert_eq!(link.say(5), Some("received"));
 }
 
-/// What the documentation of `Auth::epoch` warns of: with an epoch that has been used before, a relay is not heard until its
-/// counter is past where it was, and what was sent to it then can be played back.
+/// Checks the warning at `Auth::epoch`: a relay with a reused epoch is ignored, and accepts old frames.
 #[test]
 fn an_epoch_used_twice_is_no_fresh_start() {
     let mut link = Link::new();
     for counter in 1..=100 {
         assert_eq!(link.say(counter), Some("received"));
     }
-    // The same epoch and the same claim number, and so the same nonce: the counter begins again.
+    // The same epoch and claim number give the same nonce, but the counter restarts.
     assert_eq!(link.handshake(0, link.nonces), Some("replayed"));
     assert_eq!(link.say(1), Some("replayed"));
     assert_eq!(link.say(101), Some("received"));
-    // Relay 2 is switched on again with the epoch it had: frame 50 was taken, and is again.
+    // Relay 2 restarts with its old epoch: frame 50 is accepted again.
     let mut again = Link::new();
     assert_eq!(again.say(50), Some("received"));
 }
@@ -169,7 +168,7 @@ fn epoch_0_is_refused() {
     assert_eq!(relay.err(), Some(SetupError::Epoch));
 }
 
-/// Keys do not belong into logs.
+/// Checks that logs do not show the key.
 #[test]
 fn a_key_is_not_shown() {
     let shown = format!("{:?}", relay(3, 2, Wiring::Pair, (4, Instant::ZERO)));

@@ -1,4 +1,4 @@
-//! Frames taken apart and put together by the rules of `FORMAT.md`, with CRC, COBS and BLAKE2s of other crates.
+//! Encoding and decoding of frames by the rules of `FORMAT.md`, with CRC, COBS and BLAKE2s of other crates.
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
@@ -12,11 +12,11 @@ pub(crate) const HELLO: u16 = 0x2000;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
-/// A frame without COBS, delimiter and CRC.
+/// Frame without COBS, delimiter and CRC.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Plain(pub(crate) Vec<u8>);
 
-/// What is in a frame on the wire, which is intact.
+/// Decodes an intact frame.
 pub(crate) fn plain(wire: &[u8]) -> Plain {
     let mut bytes = cobs::decode_vec(&wire[..wire.len() - 1]).unwrap();
     let checked = bytes.len() - 4;
@@ -71,19 +71,19 @@ impl Plain {
         self.flags() == SIGNED | HELLO
     }
 
-    /// The nonces in a handshake: its sender's, its receiver's.
+    /// Returns a handshake's nonces: the sender's and the receiver's.
     pub(crate) fn nonces(&self) -> [u64; 2] {
         [10, 18].map(|at| u64::from_le_bytes(self.0[at..at + 8].try_into().unwrap()))
     }
 
-    /// The same with a tag by `key`, for nonces of sender and receiver.
+    /// Appends a tag by `key` for the nonces of sender and receiver.
     pub(crate) fn signed(mut self, key: &[u8; 32], nonces: [u64; 2]) -> Self {
         let tag = tag(key, nonces, &self.0);
         self.0.extend(tag);
         self
     }
 
-    /// On the wire, with the CRC that belongs to it.
+    /// Encodes the frame with its CRC.
     pub(crate) fn wire(&self) -> Vec<u8> {
         let mut bytes = self.0.clone();
         bytes.extend(CRC.checksum(&self.0).to_le_bytes());
@@ -102,7 +102,7 @@ pub(crate) fn tag(key: &[u8; 32], nonces: [u64; 2], signed: &[u8]) -> [u8; TAG] 
     mac.finalize_fixed().into()
 }
 
-/// A handshake as a relay would write it.
+/// Creates a handshake as a relay does.
 pub(crate) fn handshake(
     addresses: (u16, u16, u16),
     counter: u32,
@@ -118,7 +118,7 @@ pub(crate) fn handshake(
     handshake
 }
 
-/// The epoch of a nonce in the upper half, how many links were begun before in the lower.
+/// Returns a nonce: epoch in the upper half, number of earlier links in the lower.
 pub(crate) fn nonce(epoch: u32, made: u32) -> u64 {
     u64::from(epoch) << 32 | u64::from(made)
 }

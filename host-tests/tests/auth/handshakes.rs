@@ -1,4 +1,4 @@
-//! What recorded handshakes can do: at most delay a first contact until the true one comes.
+//! Replayed handshakes: at most they delay a first contact until the genuine handshake arrives.
 
 use rand::seq::IndexedRandom;
 use uav_relay::MAX_FRAME;
@@ -12,7 +12,7 @@ fn is_handshake(heard: &Heard) -> bool {
     plain(&heard.wire).is_handshake()
 }
 
-/// At every moment, and above all while relays get to know each other again.
+/// Replays handshakes at all times, and especially while relays authenticate each other again.
 #[test]
 fn recorded_handshakes_at_any_time_change_no_place() {
     let mut deeds = vec![(6_000, Deed::Reboot(4))];
@@ -43,7 +43,7 @@ fn recorded_handshakes_at_any_time_change_no_place() {
                         refused += 1;
                     }
                     Some("handshakes") => {
-                        // One that has been taken is answered by one at most.
+                        // An accepted handshake is answered at most once.
                         assert!(sent <= 1);
                         answered += sent;
                         taken += 1;
@@ -65,7 +65,7 @@ fn recorded_handshakes_at_any_time_change_no_place() {
     }
 }
 
-/// A relay that has just been switched on takes each recorded handshake once, for what it may be; the true one overtakes them all.
+/// Checks that a booted relay accepts each recorded handshake at most once, and then the genuine one.
 #[test]
 fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -100,14 +100,14 @@ fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
     );
     assert!((9..=recorded.len()).contains(&taken));
     assert_eq!(net.stats(2).received, 0);
-    // Had the flood not been, it would be the same: the leader has the chain agree, and relay 2 holds its place.
+    // The result is the same as without the flood: the chain agrees, and relay 2 holds its position.
     net.relay(1).restart(Instant::from_millis(10_000));
     net.run(Instant::from_millis(12_000));
     assert!(net.bits().iter().all(Option::is_some));
     assert!(net.stats(2).received > 0);
 }
 
-/// The true handshake comes while the relay believes a recorded one, and the answer to that is lost.
+/// Checks a genuine handshake that arrives while the relay trusts a recorded one and whose answer is lost.
 #[test]
 fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -129,13 +129,13 @@ fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
     *net.relay(2) = fresh;
     net.genuine[1] = 0;
     net.lives[1] = 2;
-    // Nobody has anything to say until somebody asks for a sign of life; that brings handshakes, the next one an answer.
+    // No messages are due until a relay asks for a sign of life; that leads to handshakes, and the next question to an answer.
     net.run(Instant::from_millis(14_000));
     assert!(net.is_proven(1, 2) && net.is_proven(2, 1));
     assert_eq!(net.stats(2).received, net.genuine[1]);
 }
 
-/// Recorded handshakes keep nobody alive.
+/// Checks that replayed handshakes are no signs of life.
 #[test]
 fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -155,8 +155,7 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     assert!((15_000..15_100).contains(&lost_after), "{lost_after}");
 }
 
-/// After how many milliseconds relay 1 of two has lost the other one, which is silent, while these are played back; and how many
-/// handshakes it has taken.
+/// Returns the time until relay 1 loses its silent neighbour, ms, and the number of handshakes accepted.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut frame = [0; MAX_FRAME];

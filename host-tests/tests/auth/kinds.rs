@@ -1,4 +1,4 @@
-//! The attacks, and which counter each has to raise, by `FORMAT.md` alone.
+//! Kinds of attacks, and the counter that each must increment according to `FORMAT.md`.
 
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
@@ -9,42 +9,40 @@ use uav_relay_oracle::random::seed;
 use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, handshake, nonce, plain};
 use super::net::{Heard, NETWORK, Net};
 
-/// A way to get a frame taken.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Recorded since both ends were switched on.
+    /// Frame recorded since both ends started.
     Replayed,
-    /// Recorded before either end was.
+    /// Frame recorded before a start of either end.
     FromBefore,
-    /// Bits flipped anywhere.
+    /// Frame with flipped bits.
     Flipped,
-    /// A field of the header changed.
+    /// Frame with a changed header field.
     Header,
-    /// A tag cut off, and the flag that says there is one.
+    /// Frame without its tag and the flag for it.
     Stripped,
-    /// A tag that is too short.
+    /// Frame with a truncated tag.
     Truncated,
     RandomTag,
-    /// Signed properly, by another key.
+    /// Frame signed with another key.
     OtherKey,
-    /// A handshake by another key, with a larger epoch.
+    /// Handshake by another key, with a larger epoch.
     ForgedHandshake,
     RecordedHandshake,
-    /// Random bytes.
     Noise,
-    /// A valid message of any kind, without a tag.
+    /// Valid message of any kind, without a tag.
     Bare,
-    /// A valid message of any kind, with a tag of random bytes.
+    /// Valid message of any kind, with a random tag.
     Dressed,
-    /// An offer of a newer mission that was recorded since both ends were switched on, played to any relay.
+    /// Offer of a newer mission, recorded since both ends started, played to any relay.
     OfferReplayed,
-    /// One from before either end was.
+    /// Offer from before a start of either end.
     OfferFromBefore,
-    /// One with another counter, body or tag.
+    /// Offer with another counter, body or tag.
     OfferAltered,
-    /// One of a mission that nobody has uploaded, from any node.
+    /// Offer of a mission that was never uploaded, from any node.
     OfferForged,
-    /// A valid message, or one that was recorded, as if the ground had sent it.
+    /// Valid or recorded message with the ground station's address.
     FromGround,
 }
 
@@ -70,7 +68,7 @@ pub(crate) const KINDS: [Kind; 18] = [
 ];
 
 impl Kind {
-    /// Whether it needs an offer that was recorded.
+    /// Returns true if the attack needs a recorded offer.
     fn is_of_an_offer(self) -> bool {
         matches!(
             self,
@@ -79,7 +77,7 @@ impl Kind {
     }
 }
 
-/// One attack: where, with what, and the counter that it raises.
+/// Attack: receiver, bytes, and the counter that it increments.
 pub(crate) struct Attack {
     pub(crate) to: u16,
     pub(crate) port: Port,
@@ -87,7 +85,7 @@ pub(crate) struct Attack {
     pub(crate) raises: &'static str,
 }
 
-/// Counters by name, of those that an attack may raise or must not.
+/// Returns the counters that attacks may or must not increment, by name.
 pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     [
         ("received", stats.received),
@@ -105,7 +103,7 @@ pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     ]
 }
 
-/// Which of them has gone up, by one; `malformed` and the rest would be `None`.
+/// Returns the counter that increased by one; `None` for `malformed` and other counters.
 pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
     let (mut name, mut ups) = (None, 0);
     for ((of, before), (_, after)) in counters(before).into_iter().zip(counters(after)) {
@@ -117,7 +115,7 @@ pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
     name.filter(|_| ups == 1)
 }
 
-/// What an intact frame raises at relay `to`, if its tag is wrong.
+/// Returns the counter that an intact frame with a wrong tag increments at relay `to`.
 fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
     let flags = frame.flags();
     if frame.version() != 1 || ![0, SIGNED, SIGNED | HELLO].contains(&flags) {
@@ -133,9 +131,9 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
         return "overheard";
     }
     let sender = frame.sender();
-    // On a shared channel the four nearest on either side may have something to say.
+    // On a shared channel the four nearest nodes of either side are possible senders.
     let far = if port == Port::Shared { 4 } else { 1 };
-    // The ground is beyond either end, and nowhere else.
+    // The ground stations are beyond the ends.
     let there = sender <= relays + 1 && sender.abs_diff(to) <= far;
     let before = port != Port::Downstream && there && sender < to;
     let after = port != Port::Upstream && there && sender > to;
@@ -145,10 +143,10 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
     if flags == 0 { "unsigned" } else { "forged" }
 }
 
-/// Whoever sends the attacks.
+/// Random generator of attacks.
 pub(crate) struct Attacker {
     pub(crate) rng: ChaCha8Rng,
-    /// Bodies of every message.
+    /// Frames with every kind of message.
     pub(crate) messages: Vec<Plain>,
 }
 
@@ -176,7 +174,7 @@ impl Attacker {
         Self { rng, messages }
     }
 
-    /// An attack of `kind` on the net as it is now, if what that takes has been heard.
+    /// Creates an attack of `kind`; `None` if no suitable frame has been recorded.
     pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
         let heard = if kind.is_of_an_offer() {
             &net.heard[*net.offers.choose(&mut self.rng)?]
@@ -193,7 +191,7 @@ impl Attacker {
             }
             _ => (heard.from, self.target(net, kind, heard.to)?, None),
         };
-        // Mostly where such a frame belongs.
+        // Usually the port of that sender.
         let port = if self.rng.random_bool(0.9) {
             net.port(from, to)
         } else {
@@ -221,7 +219,7 @@ impl Attacker {
         })
     }
 
-    /// The frame of an attack, and what it raises where its addresses are right.
+    /// Returns an attack's frame, and the counter that it increments if its addresses are valid.
     fn frame(&mut self, net: &Net, kind: Kind, heard: &Heard) -> Option<(Plain, &'static str)> {
         let Heard {
             from,
@@ -238,7 +236,7 @@ impl Attacker {
             Kind::Replayed | Kind::FromBefore | Kind::OfferReplayed | Kind::OfferFromBefore => {
                 let since = matches!(kind, Kind::Replayed | Kind::OfferReplayed);
                 let fits = since == (*lives == now);
-                // What is still under way has not been taken there.
+                // Frames in transit have not been accepted yet.
                 let usable = fits && !is_handshake && net.has_arrived(heard);
                 let raises = if net.is_of_now(heard) {
                     "replayed"
@@ -300,7 +298,7 @@ impl Attacker {
         Some((frame, "forged"))
     }
 
-    /// A counter that is old, new, or anything.
+    /// Draws a counter: old, new or arbitrary.
     pub(crate) fn counter(&mut self, recorded: &Plain) -> u32 {
         match self.rng.random_range(0..3) {
             0 => recorded.counter(),
@@ -350,7 +348,7 @@ impl Attacker {
         frame
     }
 
-    /// Random bytes, with a CRC or without; what they raise is what the rules for a stream say.
+    /// Draws random bytes, with or without a CRC; the counter follows from the rules for streams.
     fn noise(&mut self, to: u16, port: Port) -> Attack {
         let len = self.rng.random_range(1..300);
         let bytes: Vec<u8> = (0..len).map(|_| self.rng.random()).collect();

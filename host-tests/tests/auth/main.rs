@@ -1,7 +1,6 @@
-//! Authenticated chains: they settle where others do, and nothing that is not a member's, and new, is ever taken.
+//! Authenticated chains: same positions as plain chains, and only new frames of members are accepted.
 //!
-//! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints; `COUNT` is the number of
-//! attacks.
+//! Random tests use `SEED` (1 if unset), which each prints, and `COUNT`, the number of attacks.
 
 mod attack;
 mod chain;

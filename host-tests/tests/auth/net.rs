@@ -1,5 +1,4 @@
-//! A chain on a clock of its own, and the ground at both ends, every frame of which can be listened to and added to: what an
-//! attacker has.
+//! Simulated chain with ground stations at both ends, on which an attacker records and injects frames.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -13,10 +12,10 @@ use uav_relay::{
 pub(crate) const NETWORK: u16 = 7;
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
 
-/// From one relay to the next.
+/// Latency between neighbours.
 const ON_THE_WAY: Duration = Duration::from_millis(10);
 
-/// Version `version` of a mission: the interferer is somewhere else in each.
+/// Returns mission version `version`, each with another position of the interferer.
 pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
     let config = MissionConfig {
         interference: Interference::Source(Interferer {
@@ -29,55 +28,53 @@ pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// A frame that was sent, as somebody heard it who listens everywhere.
+/// Recorded frame.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Heard {
     pub(crate) from: u16,
     pub(crate) to: u16,
-    /// How often each end had been switched on.
+    /// Numbers of starts of sender and receiver.
     pub(crate) lives: (u32, u32),
-    /// Frames that were heard before it.
+    /// Index among the recorded frames.
     pub(crate) number: usize,
     pub(crate) wire: Vec<u8>,
 }
 
-/// What happens to the chain at a time.
+/// Scheduled event.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Deed {
-    /// Relay of this index is switched off and on.
+    /// The relay reboots.
     Reboot(u16),
-    /// The same, and it has stored what was uploaded.
+    /// The relay reboots with its stored upload.
     Resume(u16),
-    /// The ground at that end uploads a mission of this version.
+    /// The ground station at the given end uploads a mission of the given version.
     Upload(Side, u16),
-    /// The leader has the chain agree again.
+    /// The leader restarts the agreement.
     Restart,
 }
 
 #[derive(Clone)]
 pub(crate) struct Net {
     pub(crate) relays: Vec<Relay>,
-    /// The transmitter and the receiver.
+    /// Ground stations at the transmitter and the receiver.
     pub(crate) grounds: [Ground; 2],
-    /// What each relay has stored of uploads.
     stored: Vec<Option<Upload>>,
-    /// How often each relay has been switched on; its epoch.
+    /// Number of starts of each relay, its epoch.
     pub(crate) lives: Vec<u32>,
     pub(crate) now: Instant,
     pub(crate) heard: Vec<Heard>,
-    /// Which of them are offers of a newer mission.
+    /// Indices of offers of a newer mission.
     pub(crate) offers: Vec<usize>,
-    /// Which are handshakes.
     pub(crate) handshakes: Vec<usize>,
-    /// Messages that genuine frames have brought, for each relay since it was switched on.
+    /// Genuine messages received by each relay since its start.
     pub(crate) genuine: Vec<u32>,
-    /// Links (from, to) on which a message has been taken since both ends were switched on.
+    /// Lives of both ends of each link (from, to) on which a message was accepted last.
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// For each of them, the sender's life that the receiver has heard of last, and its own at that time.
+    /// Sender's life that the receiver of each link learned last, with its own life then.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Frames that were signed before their sender knew of the receiver's last start.
+    /// Frames signed before their sender knew of the receiver's last start.
     outdated: BTreeSet<usize>,
-    /// When frames arrive, and which; in order.
+    /// Arrival times and indices of frames in transit.
     under_way: VecDeque<(Instant, usize)>,
     pub(crate) deeds: VecDeque<(Instant, Deed)>,
     wiring: Wiring,
@@ -85,7 +82,7 @@ pub(crate) struct Net {
 }
 
 impl Net {
-    /// Switches on `relays` of them at time 0; `deeds` in the order of their times.
+    /// Starts `relays` relays at time 0; `deeds` must be in order of time.
     pub(crate) fn new(relays: u16, wiring: Wiring, deeds: &[(u64, Deed)]) -> Self {
         let mut net = Self {
             relays: (1..=relays)
@@ -127,7 +124,7 @@ impl Net {
         *self.relays[usize::from(index) - 1].stats()
     }
 
-    /// How often a node has been switched on; the ground has been once.
+    /// Returns a node's number of starts; 1 for the ground.
     pub(crate) fn life(&self, node: u16) -> u32 {
         if self.is_relay(node) {
             self.lives[usize::from(node) - 1]
@@ -144,7 +141,7 @@ impl Net {
         u16::try_from(self.relays.len()).unwrap()
     }
 
-    /// The port of `to` at which frames from `from` come in.
+    /// Returns the port at which `to` receives frames of `from`.
     pub(crate) fn port(&self, from: u16, to: u16) -> Port {
         match self.wiring {
             Wiring::Shared => Port::Shared,
@@ -153,19 +150,18 @@ impl Net {
         }
     }
 
-    /// Whether both ends of the link have proven to each other that they are there.
+    /// Returns true if both ends of the link have authenticated each other.
     pub(crate) fn is_proven(&self, from: u16, to: u16) -> bool {
         self.proven.get(&(from, to)) == Some(&(self.life(from), self.life(to)))
     }
 
-    /// Whether a frame has arrived.
     pub(crate) fn has_arrived(&self, heard: &Heard) -> bool {
         self.under_way
             .front()
             .is_none_or(|(_, next)| heard.number < *next)
     }
 
-    /// Whether the receiver of a frame would still know its nonces: both ends are as they were, as far as it has heard.
+    /// Returns true if the nonces of a frame are still valid at its receiver.
     pub(crate) fn is_of_now(&self, heard: &Heard) -> bool {
         let Heard {
             from, to, lives, ..
@@ -175,7 +171,7 @@ impl Net {
             && !self.outdated.contains(&heard.number)
     }
 
-    /// Does what is next, unless that is later than `until`; whether something was.
+    /// Processes the next event unless it is later than `until`. Returns false if there is none.
     pub(crate) fn step(&mut self, until: Instant) -> bool {
         let wake = (1..=self.len())
             .filter_map(|index| Some((self.relay(index).poll_timeout()?, index)))
@@ -211,7 +207,6 @@ impl Net {
         true
     }
 
-    /// Runs on until `until`.
     pub(crate) fn run(&mut self, until: Instant) {
         while self.step(until) {}
     }
@@ -286,7 +281,7 @@ impl Net {
         }
     }
 
-    /// Hands bytes to a relay, and lets it answer; how many frames that makes it send.
+    /// Delivers bytes to a relay. Returns the number of frames that it sends in response.
     pub(crate) fn give(&mut self, to: u16, port: Port, wire: &[u8]) -> usize {
         let now = self.now;
         self.relay(to).handle_bytes(now, port, wire);
@@ -329,7 +324,7 @@ impl Net {
         }
     }
 
-    /// A frame goes on its way.
+    /// Sends a frame.
     fn say(&mut self, from: u16, to: u16, wire: Vec<u8>) {
         let lives = (self.life(from), self.life(to));
         let number = self.heard.len();
@@ -349,7 +344,7 @@ impl Net {
         });
     }
 
-    /// Where the relays were told to fly, and for which target, to the bit.
+    /// Returns the bits of the relays' setpoints and targets.
     pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()
@@ -369,12 +364,12 @@ fn proof(epoch: u32) -> Auth {
     }
 }
 
-/// Relay `index` of `of`, switched on with an epoch at a time.
+/// Creates relay `index` of `of`, started with an epoch at a time.
 pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, start: (u32, Instant)) -> Relay {
     started(of, index, wiring, start, None)
 }
 
-/// The same of a relay that has stored an upload, if it has.
+/// Creates relay `index` of `of` with its stored upload, if any.
 fn started(
     of: u16,
     index: u16,

@@ -1,4 +1,4 @@
-//! Newer missions that nobody has uploaded, or that were uploaded before: who forges them, and what becomes of them.
+//! Forged and replayed offers of newer missions.
 
 use host_tests::fixtures::mission;
 use rand::RngExt;
@@ -11,24 +11,24 @@ use super::frames::{HEADER, Plain, SIGNED, TAG, nonce, plain};
 use super::kinds::{Attacker, Kind, raised};
 use super::net::{Deed, Heard, NETWORK, Net, newer};
 
-/// The first byte of the body of an offer.
+/// First byte of an offer's body.
 const OFFER: u8 = 14;
 
 pub(crate) fn is_offer(frame: &Plain) -> bool {
     !frame.is_handshake() && frame.0.get(HEADER) == Some(&OFFER)
 }
 
-/// The body of an offer of a mission that is none of those that were uploaded.
+/// Returns the body of an offer of a mission that was never uploaded.
 fn offered(relays: u16, version: u16) -> Vec<u8> {
     let mut body = [0; Upload::LENGTH];
     let len = newer(&mission(relays), version).encode(&mut body).unwrap();
     assert_eq!((len, body[0]), (Upload::LENGTH, OFFER));
-    // Which hello it answers is not kept with an upload.
+    // The number of the hello that it answers is not part of the stored upload.
     [&body[..], &version.to_le_bytes()].concat()
 }
 
 impl Attacker {
-    /// Which relay a frame for node `to` is played to; `None` where that is no relay.
+    /// Returns the relay to which a frame for node `to` is played; `None` if there is none.
     pub(crate) fn target(&mut self, net: &Net, kind: Kind, to: u16) -> Option<u16> {
         if kind == Kind::OfferReplayed && self.rng.random_bool(0.5) {
             return Some(self.rng.random_range(1..=net.len()));
@@ -36,14 +36,14 @@ impl Attacker {
         Some(to).filter(|to| net.is_relay(*to))
     }
 
-    /// A recorded frame with one byte after its addresses changed.
+    /// Changes one byte behind the frame's addresses.
     pub(crate) fn altered(&mut self, mut frame: Plain) -> Plain {
         let at = self.rng.random_range(HEADER - 4..frame.0.len());
         frame.0[at] ^= self.rng.random_range(1..=u8::MAX);
         frame
     }
 
-    /// An offer from any node, or any frame as if it was the ground's: from whom, to whom, and which.
+    /// Returns sender, receiver and frame of a forged offer or of a frame with the ground station's address.
     pub(crate) fn pretended(
         &mut self,
         net: &Net,
@@ -75,7 +75,7 @@ impl Attacker {
             if self.rng.random() {
                 recorded.set(0, 0x1000 | from);
                 recorded.set(2, recorded.flags() | to);
-                // That would be a replay.
+                // An unchanged frame would be a replay.
                 let own = heard.from == from && heard.to == to;
                 return Some((from, to, recorded)).filter(|_| !own);
             }
@@ -102,7 +102,7 @@ impl Attacker {
     }
 }
 
-/// Without a key anybody could be the ground: there is no ground then, and no neighbour is believed.
+/// Checks a chain without a key, which accepts missions neither from the ground nor from neighbours.
 #[test]
 fn a_chain_without_tags_takes_no_mission_from_anybody() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -132,7 +132,7 @@ fn a_chain_without_tags_takes_no_mission_from_anybody() {
                 let before = *relay.stats();
                 relay.handle_bytes(Instant::ZERO, port, &frame.wire());
                 let mut after = *relay.stats();
-                // From a neighbour it is a sign of life, whatever it says.
+                // Any message of a neighbour is a sign of life.
                 let heard = after.received - before.received;
                 assert_eq!(heard, u32::from(raises == "unsigned"));
                 after.received = before.received;
@@ -145,7 +145,7 @@ fn a_chain_without_tags_takes_no_mission_from_anybody() {
     }
 }
 
-/// Answers of relays that were recorded, altered or made up do not tell the ground that an upload is done.
+/// Checks that recorded, altered or forged answers do not complete an upload at the ground station.
 #[test]
 fn the_ground_is_not_told_lies_either() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -161,7 +161,7 @@ fn the_ground_is_not_told_lies_either() {
             .cloned()
             .collect();
         assert!(told.len() >= 3);
-        // A newer one, of which no relay has heard yet.
+        // The newer mission has not reached any relay.
         let mut ground = net.grounds[0].clone();
         ground.upload(net.now, newer(&mission(8), 2)).unwrap();
         let mut attacker = Attacker::new(3);

@@ -1,5 +1,4 @@
-//! Whatever an autopilot says, and whatever the relay wants: no target leaves that is not finite, near the line, and of a state that
-//! sends one.
+//! Fuzz test of the link: targets are finite, near the line, and sent only in states that permit them.
 
 use mavlink::dialects::common::MavLandedState;
 use rand::{RngExt, SeedableRng};
@@ -10,7 +9,7 @@ use super::*;
 
 const RUNS: u64 = 300;
 
-/// Any number that a relay or a fault may hand in.
+/// Draws a number, valid or not, for a position.
 fn number(rng: &mut ChaCha8Rng) -> f32 {
     match rng.random_range(0..8) {
         0 => f32::NAN,

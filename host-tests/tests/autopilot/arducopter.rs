@@ -1,4 +1,4 @@
-//! An ArduCopter: a target holds for good, and one too many makes it wobble.
+//! ArduCopter: a target holds until the next, and redundant ones make the drone wobble.
 
 use super::vehicle::Mode;
 use super::*;
@@ -55,7 +55,7 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
 }
 
-/// Whoever says nothing of what it flies to has refused nothing.
+/// Checks that an autopilot that does not report its target does not count as refusing.
 #[test]
 fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
     let mut vehicle = flying();
@@ -70,7 +70,6 @@ fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
     assert_eq!(vehicle.targets_since(from), [], "told often enough");
 }
 
-/// The companion is told at once, and not when its target stands.
 #[test]
 fn a_moving_target_that_is_not_taken_is_an_event() {
     let mut vehicle = flying();
@@ -104,7 +103,7 @@ fn back_in_its_mode_the_target_is_told_anew() {
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
 
-/// Whenever it says what it flies to: it is told to stop, and not left with the velocity of the last target that moved.
+/// Checks that the last target has no velocity, whenever the autopilot reports it.
 #[test]
 fn the_last_target_stands_whenever_it_is_confirmed() {
     for late in 0..100_u16 {

@@ -7,7 +7,7 @@ use uav_relay::{Event, Side};
 
 use crate::vehicle::{SYSTEM, Said, Vehicle};
 
-/// QGroundControl.
+/// Address of QGroundControl.
 const STATION: [u8; 2] = [255, 190];
 
 const FROM: Address = Address {
@@ -27,7 +27,7 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// The answers so far: result, and to whom.
+/// Returns the results and recipients of the answers so far.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.said.iter();
     said.filter_map(|(_, said)| match said {
@@ -51,7 +51,7 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
             .link
             .handle_event(Event::NeighbourLost { side, node: 3 });
         let own = [SYSTEM, 191];
-        // To the autopilot, to another system, to nobody by name: not for this companion.
+        // Commands to the autopilot, another system or a broadcast address are not for this companion.
         for to in [[SYSTEM, 1], [SYSTEM + 1, 191], [0, 0], [SYSTEM, 0]] {
             vehicle.say_from(STATION, &command(to, [3.0, 0.0], 0));
         }
@@ -59,7 +59,6 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
         assert_eq!(answers(&vehicle), []);
         assert_eq!(vehicle.link.poll_cleared(), None);
 
-        // Relay 4 is not lost.
         vehicle.say_from(STATION, &command(own, [4.0, 0.0], 0));
         vehicle.run(1_000);
         assert_eq!(answers(&vehicle), [(2, STATION)], "denied");
@@ -81,14 +80,13 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
         };
         assert!(vehicle.events.contains(&cleared), "{:?}", vehicle.events);
 
-        // The answer was lost.
+        // The operator's station repeats the command because the answer was lost.
         vehicle.events.clear();
         vehicle.say_from(STATION, &command(own, [3.0, 0.0], 1));
         vehicle.run(1_000);
         assert_eq!(answers(&vehicle)[2..], [(0, STATION)], "accepted again");
         assert_eq!(vehicle.link.poll_cleared(), None);
         assert_eq!(vehicle.events, []);
-        // The operator reads both.
         for line in [
             "relay: denied, name all lost relays of one side",
             "relay: lost relays are cleared",

@@ -1,5 +1,4 @@
-//! Random flights of autopilots that do what the real ones do: failsafes, restarts of either, cables that keep bytes, silences, a
-//! companion that is paused, and a pilot who chooses modes. No drone is engaged that its pilot has not given.
+//! Random flights with failsafes, restarts, delays and pilots: no drone is engaged without its pilot.
 
 use std::collections::VecDeque;
 
@@ -17,26 +16,25 @@ use super::*;
 
 const STEP: Duration = Duration::from_millis(20);
 
-/// One flight, s.
+/// Duration of a flight, s.
 const FLIGHT_S: u64 = 240;
 
-/// A mode is known within a second, and a link that is later than 2 s is not believed.
+/// Time in which the link learns of a mode: a second, with at most 2 s of delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 
-/// What a cable does to bytes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Fault {
     None,
-    /// It keeps them, and delivers all at once.
+    /// The cable stores the bytes and then delivers them at once.
     Keeps,
     Cut,
-    /// It delivers them so much later, µs.
+    /// The cable delays the bytes by so many µs.
     Delay(u64),
 }
 
-/// One direction of a cable: bytes stay in order.
+/// Direction of a cable, which keeps the order of bytes.
 struct Cable {
-    /// When they come, when they were sent, and the bytes.
+    /// Times of arrival and sending, and the bytes.
     waiting: VecDeque<(Instant, Instant, Vec<u8>)>,
     kept: Vec<(Instant, Vec<u8>)>,
     fault: Fault,
@@ -83,7 +81,7 @@ impl Cable {
     }
 }
 
-/// A companion that is polled, or on the asynchronous runner.
+/// Companion that is polled, or uses the asynchronous runner.
 enum Companion {
     Polled(Box<Autopilot>),
     Async(Runner),
@@ -97,14 +95,14 @@ struct Flight {
     to: Cable,
     from: Cable,
     companion: Option<Companion>,
-    /// When the companion was started; when it is started again, or goes on.
+    /// Times of the companion's last start, next start, and end of its pause.
     started: Instant,
     starts_at: Option<Instant>,
     paused_until: Instant,
     mends_at: Instant,
     gps_until: Instant,
     setpoint: Option<Placement>,
-    /// When the pilot chose OFFBOARD or GUIDED last, and when it was last flown.
+    /// Times of the pilot's last choice of OFFBOARD or GUIDED, and of the last flight in it.
     given_at: Option<Instant>,
     flown_at: Instant,
     texts: Vec<(Instant, String)>,
@@ -122,7 +120,7 @@ impl Flight {
         if rng.random_bool(0.3) {
             real.slow = 0.01;
         }
-        // Both real ones do.
+        // PX4 and ArduCopter both answer TIMESYNC.
         real.echoes = rng.random_bool(0.9);
         let is_async = rng.random_bool(0.25);
         let mut flight = Self {
@@ -150,7 +148,6 @@ impl Flight {
         flight
     }
 
-    /// Starts the companion.
     fn start(&mut self) {
         let link = Autopilot::new(axis(), Pace::default(), self.now);
         self.started = self.now;
@@ -176,7 +173,7 @@ impl Flight {
             4 => self.choose(Mode::Hold),
             5 => self.choose(Mode::Sticks),
             6 if self.now >= self.mends_at => {
-                // Without echoes nothing tells a link that is late for good from a clock that is behind.
+                // Without TIMESYNC answers a constant delay and a slow clock look the same.
                 let kinds = if self.real.echoes { 3 } else { 2 };
                 let fault = match self.rng.random_range(0..kinds) {
                     0 => Fault::Keeps,
@@ -251,7 +248,7 @@ impl Flight {
             self.starts_at = None;
             self.start();
             self.texts.clear();
-            // What came meanwhile is flushed when the port is opened.
+            // Bytes received before are flushed when the port is opened.
             while self.from.take(now).is_some() {}
         }
         self.drive();
@@ -280,7 +277,7 @@ impl Flight {
                 self.wrong
                     .push(format!("engaged by what was long ago at {now:?}"));
             }
-            // It was given since the companion was started, but for what is known late.
+            // The pilot's choice must be later than the companion's start.
             if self.given_at.is_none_or(|at| at < self.started) {
                 self.wrong
                     .push(format!("engaged without a pilot at {now:?}"));
@@ -288,7 +285,7 @@ impl Flight {
         }
     }
 
-    /// Returns true if the drone becomes engaged.
+    /// Polls the link. Returns true if the drone becomes engaged.
     fn poll(&mut self, link: &mut Autopilot) -> bool {
         let now = self.now;
         let before = link.state();
@@ -317,7 +314,7 @@ impl Flight {
         engages
     }
 
-    /// The same on the asynchronous runner. Its setpoint is its relay's.
+    /// Runs the asynchronous runner with its relay's setpoint. Returns true if the drone becomes engaged.
     fn run(&mut self, runner: &mut Runner) -> bool {
         let before = runner.is_flown();
         let mut engages = false;
@@ -339,7 +336,7 @@ impl Flight {
         engages
     }
 
-    /// Puts a frame of the companion on the cable, and checks texts.
+    /// Sends a frame of the companion and checks its texts.
     fn send(&mut self, frame: &[u8]) {
         let now = self.now;
         if frame[7] == 253 {
@@ -366,7 +363,7 @@ impl Flight {
     }
 }
 
-/// Returns the faults of a flight, the number of engagements, and true if it was on the asynchronous runner.
+/// Returns the faults of a flight, the number of engagements, and true if it used the asynchronous runner.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

@@ -1,4 +1,4 @@
-//! The link to an autopilot, against one that says what it is told to say, in frames of another codec.
+//! Link to a scripted autopilot that uses another MAVLink codec.
 
 mod any;
 mod arducopter;
@@ -24,7 +24,7 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
         vehicle.run(2_000);
         assert_eq!(vehicle.events[0], AutopilotEvent::Found(kind));
         assert_eq!(vehicle.link.state(), State::Grounded);
-        // What a PX4 does not send it is not asked for.
+        // A PX4 is not asked for messages that it does not send.
         let is_px4 = kind == Kind::Px4;
         for (id, times) in [
             (33, 1),
@@ -55,7 +55,7 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
     }
 }
 
-/// Found by an attacker with a clock of its own: the heartbeat stayed due.
+/// Checks frames at the last representable instants, at which the heartbeat once remained due.
 #[test]
 fn the_frames_of_one_instant_end_at_the_last_instant_too() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -95,7 +95,7 @@ fn heartbeats_of_others_are_not_the_mode() {
     vehicle.engage();
     vehicle.run(3_000);
     assert_eq!(vehicle.link.state(), State::Engaged);
-    // A gimbal of the same vehicle, a ground station, and another vehicle.
+    // Heartbeats of a gimbal of the same vehicle, a ground station, and another vehicle.
     for (system, component, kind, autopilot) in [
         (vehicle::SYSTEM, 154, 26, 8),
         (255, 190, 6, 8),
@@ -108,7 +108,7 @@ fn heartbeats_of_others_are_not_the_mode() {
 
 #[test]
 fn a_plane_is_no_copter() {
-    // Mode 4 of a plane flown by ArduPilot is ACRO.
+    // Mode 4 of an ArduPlane is ACRO.
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.mute = true;
     for _ in 0..5 {
@@ -281,7 +281,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
     assert!(last.0 > stopped.0);
 }
 
-/// A relay never wants such a place. Were it taken, the target would be lost for good, and with it the mode of a PX4.
+/// Checks setpoints that are not finite or too far away: they must not end a PX4's stream.
 #[test]
 fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -302,7 +302,7 @@ fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
     }
 }
 
-/// Which way to look is an angle, or is left to the autopilot.
+/// Checks that a bearing that is no angle is omitted.
 #[test]
 fn a_bearing_that_is_none_is_left_out() {
     use uav_relay::pointing::Bearing;
@@ -330,7 +330,7 @@ fn a_bearing_that_is_none_is_left_out() {
     }
 }
 
-/// OFFBOARD is refused by a PX4 that hears no stream.
+/// Checks that nothing is streamed in standby, so that a PX4 refuses OFFBOARD.
 #[test]
 fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     let mut vehicle = Vehicle::new(Kind::Px4);
@@ -341,7 +341,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     vehicle.run(5_000);
     assert_eq!(vehicle.targets_since(from), []);
     vehicle.link.handle_ready(vehicle.now, true);
-    // From the next heartbeat on, which comes within a second.
+    // Targets start with the next heartbeat, within a second.
     vehicle.run(3_000);
     assert!(vehicle.targets_since(from).len() >= 8);
     vehicle.engage();
@@ -353,7 +353,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     assert!(vehicle.targets_since(from).len() > 20, "it stays engaged");
 }
 
-/// A new view: one text on each drone that flies, and none on a drone that waits or stands.
+/// Checks the text on a new view: one on each drone in flight, none on others.
 #[test]
 fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
     use uav_relay::Event;
@@ -395,7 +395,7 @@ fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
         [""; 0],
         "it was told why it waits"
     );
-    // The places of one view move while the chain listens: not a word.
+    // Position updates within a view cause no text.
     let from = vehicle.now;
     for _ in 0..20 {
         vehicle.link.handle_event(Event::Converged);
@@ -412,7 +412,7 @@ fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
     );
 }
 
-/// Reasons come and go while an agreement spreads.
+/// Checks that reasons which change while an agreement spreads cause no text.
 #[test]
 fn a_reason_that_does_not_last_is_not_told() {
     use uav_relay::HoldReason::Close;
@@ -445,7 +445,7 @@ fn the_operator_reads_why_the_guard_holds_the_relay_back() {
     assert!(!vehicle.heard(order), "on the ground nobody asks");
     vehicle.fly_off();
     for i in 0..3_000 {
-        // For 4 s, and for 3.5 s.
+        // The reasons last 4 s and 3.5 s in turn.
         let reason = if i % 375 < 200 { Order } else { Unheard };
         vehicle.link.handle_hold(vehicle.now, [None, Some(reason)]);
         vehicle.run(20);

@@ -1,4 +1,4 @@
-//! How far and how fast bodies fly that behave as the real ones do.
+//! Overshoot and speed of drones modelled on real ones.
 
 use uav_relay::Duration;
 use uav_relay::flight::autopilot::carrot::Pace;
@@ -20,12 +20,11 @@ pub(crate) struct Rig {
     pub(crate) targets: u32,
     pub(crate) fastest_m_s: f64,
     pub(crate) farthest_x_m: f64,
-    /// While true nothing goes over the cable.
     pub(crate) is_cut: bool,
 }
 
 impl Rig {
-    /// In the air at x = 100, in its pilot's hands.
+    /// Creates a drone in the air at x = 100, flown by its pilot.
     pub(crate) fn new(kind: Kind) -> Self {
         let now = Instant::from_millis(1_000_000);
         let mut rig = Self {
@@ -50,7 +49,6 @@ impl Rig {
         self.real.choose(self.now, mode)
     }
 
-    /// A companion that was started anew.
     pub(crate) fn restart(&mut self) {
         self.link = Autopilot::new(axis(), Pace::default(), self.now);
     }
@@ -109,7 +107,7 @@ impl Rig {
     }
 }
 
-/// The model, before anything is judged by it: told a target that moves at 5 m/s and stops dead, a real PX4 flies 2.1 to 2.7 m past it.
+/// Checks the model: at the sudden stop of a 5 m/s target, a real PX4 overshoots by 2.1 to 2.7 m.
 #[test]
 fn the_models_px4_flies_as_far_past_a_dead_stop_as_the_real_one() {
     let mut body = Body::default();
@@ -148,7 +146,7 @@ fn what_was_set_is_the_most_that_is_flown() {
     }
 }
 
-/// The guard withdraws a setpoint: the carrot loses speed as it gained it.
+/// Checks that the target decelerates as gently as it accelerated when the guard withdraws the setpoint.
 #[test]
 fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -166,7 +164,7 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
                 farthest - end
             );
             assert!(
-                // Less than the position error that the guard is told.
+                // The limit is the position error configured in the guard.
                 farthest - end < 1.0,
                 "{kind:?} {after_ms}: {farthest}, {end}"
             );
@@ -175,7 +173,7 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     }
 }
 
-/// The guard counts on the stopping time: after it a drone flies on by less than 0.5 m, and no longer away from a setpoint behind it.
+/// Checks that after the guard's stopping time a drone moves less than 0.5 m, and not away from its setpoint.
 #[test]
 fn a_drone_has_stopped_after_the_stopping_time() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -201,7 +199,7 @@ fn a_drone_has_stopped_after_the_stopping_time() {
     }
 }
 
-/// A companion that is started again finds OFFBOARD granted or a failsafe, and ends neither.
+/// Checks that a restarted companion that finds OFFBOARD granted, or a failsafe, changes neither.
 #[test]
 fn a_restarted_companion_engages_nothing_that_it_finds() {
     for (kind, away_ms) in [
@@ -237,7 +235,7 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
     }
 }
 
-/// GPS is lost for 30 s and comes back: a PX4 lands, and resumes nothing.
+/// Checks a GPS outage of 30 s: the PX4 lands and does not resume.
 #[test]
 fn a_px4_whose_gps_is_back_resumes_nothing() {
     let mut rig = Rig::new(Kind::Px4);
@@ -253,7 +251,7 @@ fn a_px4_whose_gps_is_back_resumes_nothing() {
     assert!(rig.events.iter().any(failsafe), "{:?}", rig.events);
 }
 
-/// The autopilot's clock runs 1 % slow, or loses 1.5 s: the link does not change its mind all the time, and is not blind for good.
+/// Checks clocks that are 1 % slow or lose 1.5 s: the link is blind for seconds at most.
 #[test]
 fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -295,7 +293,7 @@ fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     }
 }
 
-/// A simulator that stops for 1.5 s, as one on a loaded machine: its clock has lost that for good.
+/// Checks a simulator that pauses for 1.5 s, as on a loaded machine, and loses that time for good.
 #[test]
 fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
     for echoes in [true, false] {
@@ -320,12 +318,12 @@ fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
         let states = states.filter(|it| matches!(it, AutopilotEvent::State(_)));
         assert_eq!(states.count(), 2, "blind, and flown on: {:?}", rig.events);
         assert_eq!(rig.link.state(), State::Engaged);
-        // The other one was lost while nothing was heard.
+        // The other text was lost during the silence.
         assert_eq!(rig.texts.len(), 1, "{:?}", rig.texts);
     }
 }
 
-/// The requests in ten minutes of flight.
+/// Checks the number of requests in ten minutes of flight.
 #[test]
 fn what_an_autopilot_does_not_send_it_is_not_asked_for_again_and_again() {
     for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 9)] {
@@ -342,7 +340,7 @@ fn what_an_autopilot_does_not_send_it_is_not_asked_for_again_and_again() {
     }
 }
 
-/// Outside of its fence it takes no target and flies on with the last velocity: the link says so, and names the return.
+/// Checks a target outside the fence: the ArduCopter flies on, and the link reports refusal and return.
 #[test]
 fn a_fence_that_a_moving_target_leaves_is_named() {
     let mut rig = Rig::new(Kind::ArduCopter);
@@ -361,7 +359,7 @@ fn a_fence_that_a_moving_target_leaves_is_named() {
     assert_eq!(rig.says("relay: released, returns (RTL): fence"), 1);
 }
 
-/// As an adversary would: a pilot gives the drone back at full speed. It goes on by its way to stop, and is led from there.
+/// Checks a drone given back at full speed: it overshoots and is led on from there.
 #[test]
 fn a_drone_that_is_given_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -384,7 +382,7 @@ fn a_drone_that_is_given_back_at_full_speed_stops() {
     }
 }
 
-/// As an adversary would: positions are half a second older than they are said to be. It arrives, and no faster than allowed.
+/// Checks positions that are half a second older than reported: the drone arrives within the speed limit.
 #[test]
 fn positions_that_are_later_than_stated_do_no_harm_to_the_flight() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -403,7 +401,7 @@ fn positions_that_are_later_than_stated_do_no_harm_to_the_flight() {
     }
 }
 
-/// As an adversary would: the drone drifts while the link is blind. It is led on from where it is, and not back to where it was.
+/// Checks a drone that drifts while the link is blind: it is led on from its new position.
 #[test]
 fn a_drone_that_drifts_while_blind_is_led_from_where_it_is() {
     let mut rig = Rig::new(Kind::ArduCopter);
@@ -414,7 +412,7 @@ fn a_drone_that_drifts_while_blind_is_led_from_where_it_is() {
     assert_eq!(rig.link.state(), State::Blind);
     rig.real.body.at[0] += 20.0;
     rig.real.is_mute_of_positions = false;
-    // What its controller flies back meanwhile is its own affair.
+    // The autopilot's own controller flies back for a moment.
     rig.run(1_300);
     let at = rig.at()[0];
     rig.run(20_000);

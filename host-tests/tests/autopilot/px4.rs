@@ -1,4 +1,4 @@
-//! A PX4: targets are streamed, or it leaves its mode.
+//! PX4: it leaves its mode unless targets are streamed.
 
 use mavlink::dialects::common::MavLandedState;
 
@@ -11,7 +11,7 @@ fn flying() -> Vehicle {
     vehicle
 }
 
-/// The longest gap between targets from `from` on, ms.
+/// Returns the longest gap between targets from `from` on, ms.
 fn longest_gap(vehicle: &Vehicle, from: Instant) -> u64 {
     let times: Vec<Instant> = vehicle
         .targets_since(from)
@@ -84,7 +84,7 @@ fn it_is_led_to_its_place_and_held_there() {
     let last = targets.last().unwrap().1;
     assert_eq!(last.type_mask, 0x0DF8, "a position alone to end with");
     assert!((last.place().x_m - 180.0).abs() < 0.02);
-    // The velocity is that of the target: 80 m toward the north-east.
+    // The velocity is that of the target, 80 m toward the north-east.
     let (_, quick) = moving[moving.len() / 2];
     let [north, east, _] = quick.velocity_m_s;
     assert!(north > 1.0 && east > 1.0 && north.hypot(east) <= 5.01);
@@ -119,7 +119,7 @@ fn a_failsafe_is_not_ended_by_the_link() {
     vehicle.setpoint = Some(place(500.0));
     vehicle.engage();
     vehicle.run(3_000);
-    // The cable breaks: the autopilot returns by itself, and the cable holds again.
+    // The cable breaks until after the autopilot has started its return.
     vehicle.mute = true;
     vehicle.run(5_000);
     (vehicle.mode, vehicle.status) = (Mode::Hold, 5);
@@ -127,7 +127,7 @@ fn a_failsafe_is_not_ended_by_the_link() {
     let from = vehicle.now;
     vehicle.run(10_000);
     assert_eq!(vehicle.targets_since(from), [], "a stream would end it");
-    // The pilot takes the sticks, and gives it back.
+    // The pilot takes control with the sticks, and gives it back.
     (vehicle.mode, vehicle.status) = (Mode::Position, 4);
     vehicle.run(2_000);
     assert!(vehicle.targets_since(from).len() > 4);

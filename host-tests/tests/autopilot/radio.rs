@@ -1,4 +1,4 @@
-//! What a SiK radio hears between frames, and where the drone was.
+//! Noise measured by a SiK radio, with the drone's position.
 
 use mavlink::dialects::common::{MavLandedState, MavMessage, RADIO_STATUS_DATA};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
@@ -36,7 +36,7 @@ fn a_radio_in_the_air_tells_what_is_heard_there() {
     };
     let (_, known) = vehicle.positions.last().unwrap();
     assert_eq!(at, known.place);
-    // (100 / 1.9 - 127) dBm.
+    // The power is (100 / 1.9 - 127) dBm.
     assert!((power_w / 3.657_e-11 - 1.0).abs() < 1e-3, "{power_w:e}");
     assert_eq!(noise_w(100), Some(power_w));
     for unknown in [0, 255] {

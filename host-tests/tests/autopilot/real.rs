@@ -1,9 +1,9 @@
-//! Autopilots that do what the real ones were seen to do, with a body that follows targets as theirs does.
+//! Models of a PX4 and an ArduCopter after the real ones, with bodies that follow targets like theirs.
 //!
-//! PX4: refuses OFFBOARD without a stream; is in its failsafe (`system_status` 5) a second after the last target, or when GPS is lost; resumes
-//! OFFBOARD by itself once a stream has been back for 1.2 s; ends a failsafe only when a pilot chooses a mode. ArduCopter: takes GUIDED
-//! always, flies a velocity on for 3 s after the last target, ignores targets outside of its fence in silence, returns when the fence is
-//! breached, flies on for 8 s without GPS and lands then. Both answer TIMESYNC and requests for messages.
+//! PX4: refuses OFFBOARD without a stream; enters its failsafe (`system_status` 5) a second after the last target or when GPS is
+//! lost; resumes OFFBOARD on its own once a stream has lasted for 1.2 s; ends a failsafe only when a pilot chooses a mode.
+//! ArduCopter: always accepts GUIDED, keeps a velocity for 3 s after the last target, silently ignores targets outside its
+//! fence, returns at a fence breach, flies for 8 s without GPS and then lands. Both answer TIMESYNC and message requests.
 
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
@@ -13,17 +13,17 @@ use uav_relay::{Duration, Geodetic, Instant, Placement};
 
 pub(crate) type Point = [f64; 3];
 
-/// The body's step, s.
+/// Time step of the body, s.
 pub(crate) const STEP_S: f64 = 0.02;
 
-/// A PX4's loss of a stream, and how long the stream has to be back.
+/// Timeout of a PX4's stream, and time of renewed streaming before it resumes.
 const LOST: Duration = Duration::from_millis(1_000);
 const RESUMES: Duration = Duration::from_millis(1_200);
 
-/// A companion knows of a failsafe that soon, by the heartbeat or since the link is late.
+/// Time in which a companion learns of a failsafe, by the heartbeat or the link's delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(1_300);
 
-/// An ArduCopter's velocity without a target, and its dead reckoning without GPS.
+/// Duration of an ArduCopter's velocity without a target, and of its dead reckoning without GPS.
 const VELOCITY: Duration = Duration::from_millis(3_000);
 const RECKONS: Duration = Duration::from_millis(8_000);
 
@@ -36,7 +36,7 @@ pub(crate) enum Mode {
     Land,
 }
 
-/// How a vehicle flies: gains of its controller, as PX4's defaults (MPC_XY_P, MPC_XY_VEL_P_ACC, _I_ACC, _D_ACC), and of the air.
+/// Controller gains (PX4's MPC_XY_P, MPC_XY_VEL_P_ACC, _I_ACC, _D_ACC) and air drag of a vehicle.
 struct Gains {
     place: f64,
     speed: f64,
@@ -59,7 +59,7 @@ const PX4: Gains = Gains {
     most_m_s2: 5.0,
 };
 
-/// By what was measured: behind a target that gains and loses speed by 1 m/s², up to 5 m/s, it reached 6.2 m/s, and flew 1.1 m too far.
+/// Gains fitted to a flight behind a target of 5 m/s and 1 m/s²: 6.2 m/s and 1.1 m of overshoot.
 const ARDUCOPTER: Gains = Gains {
     place: 1.0,
     speed: 0.7,
@@ -106,7 +106,7 @@ impl Body {
     }
 }
 
-/// A target as it was told.
+/// Received target.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Told {
     pub(crate) to: Point,
@@ -123,39 +123,38 @@ pub(crate) struct Real {
     pub(crate) body: Body,
     pub(crate) armed: bool,
     pub(crate) in_air: bool,
-    /// The pilot's choice, and what is flown.
+    /// Mode chosen by the pilot, and mode in effect.
     pub(crate) chosen: Mode,
     pub(crate) mode: Mode,
     pub(crate) is_critical: bool,
     pub(crate) gps: bool,
     gps_lost_at: Instant,
-    /// The x beyond which an ArduCopter takes no target, m.
+    /// x beyond which an ArduCopter ignores targets, m.
     pub(crate) fence_x_m: f64,
     pub(crate) is_breached: bool,
     told: Option<Told>,
     told_at: Option<Instant>,
     stream_since: Instant,
-    /// Where it holds, in its own modes.
+    /// Holding point in the autopilot's own modes.
     hold: Point,
     began: Instant,
     pub(crate) away_until: Option<Instant>,
-    /// The clock: what it gains in a second, and what it has lost, µs.
+    /// Clock error: drift as a fraction, and time lost, µs.
     pub(crate) slow: f64,
     slow_since: Instant,
     pub(crate) lost_us: i64,
     pub(crate) echoes: bool,
-    /// No position is said.
+    /// True while no position is sent.
     pub(crate) is_mute_of_positions: bool,
-    /// The newest position is this much older than it is said to be.
+    /// Steps by which positions are older than reported.
     pub(crate) hidden_lag: usize,
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
     sequence: u8,
-    /// When its failsafe began, and when the newest target of the stream was sent.
+    /// Start of the failsafe, and sending time of the stream's newest target.
     fell_at: Instant,
     sent_at: Instant,
-    /// How often OFFBOARD was resumed without a pilot: by a target that was sent when the companion could know, and by one that was on its
-    /// way before.
+    /// Resumptions of OFFBOARD without a pilot, by targets sent after the failsafe was known, and before.
     pub(crate) resumed: u32,
     pub(crate) resumed_late: u32,
     pub(crate) requests: Vec<u32>,
@@ -211,7 +210,7 @@ impl Real {
         (self.armed, self.in_air) = (true, true);
     }
 
-    /// The pilot chooses a mode; returns true if the autopilot takes it.
+    /// Sets the pilot's mode. Returns true if the autopilot accepts it.
     pub(crate) fn choose(&mut self, now: Instant, mode: Mode) -> bool {
         if self.away_until.is_some() || !self.in_air {
             return false;
@@ -259,7 +258,7 @@ impl Real {
         (self.told, self.told_at) = (None, None);
     }
 
-    /// Flies on for a step; returns the bytes that it says.
+    /// Advances by one step. Returns the bytes sent.
     pub(crate) fn step(&mut self, now: Instant) -> Vec<u8> {
         if self.in_air {
             self.decide(now);
@@ -301,7 +300,7 @@ impl Real {
                     if !streamed {
                         self.fail(now, Mode::Hold);
                     } else if self.is_critical && now.since(self.stream_since) >= RESUMES {
-                        // It says so within a second, and is heard within 0.3 s.
+                        // The failsafe is reported within a second and received within 0.3 s.
                         let known_at = self.fell_at + KNOWN_WITHIN;
                         if self.sent_at > known_at {
                             self.resumed += 1;
@@ -342,7 +341,7 @@ impl Real {
                     if self.told_at.is_some_and(|at| now.since(at) > VELOCITY) {
                         told.velocity = [0.0; 3];
                     }
-                    // Its target goes on with its velocity.
+                    // The target continues with its velocity.
                     for i in 0..3 {
                         told.to[i] += told.velocity[i] * STEP_S;
                     }
@@ -351,20 +350,20 @@ impl Real {
             }
             (Mode::Return, _) => self.body.fly([0.0, 0.0, 30.0], [0.0; 3], gains),
             (Mode::Land, _) if !self.gps => {
-                // Nobody knows where it goes.
+                // The drone drifts in an unknown direction.
                 self.body.fly_at([0.6, 0.3, 0.0], gains);
             }
             _ => self.body.fly(self.hold, [0.0; 3], gains),
         }
     }
 
-    /// The sticks: at once at that velocity.
+    /// Applies the sticks: the velocity is reached at once.
     pub(crate) fn push(&mut self, velocity: Point) {
         self.body.fly_at(velocity, &PX4);
         self.hold = self.body.at;
     }
 
-    /// Its clock runs slow from now on.
+    /// Makes the clock run slow from now on.
     pub(crate) fn runs_slow(&mut self, now: Instant, slow: f64) {
         self.slow = slow;
         self.slow_since = now;
@@ -403,7 +402,7 @@ impl Real {
                 payload.extend([2, autopilot, armed, status, 3]);
             }
             33 => {
-                // A PX4 says none without GPS; an ArduCopter reckons.
+                // Without GPS a PX4 sends no position; an ArduCopter uses dead reckoning.
                 if self.is_mute_of_positions || !self.gps && self.kind == Kind::Px4 {
                     return None;
                 }
@@ -449,7 +448,7 @@ impl Real {
         frame
     }
 
-    /// Hears a frame that was sent at `sent_at`; returns the bytes of its answer.
+    /// Receives a frame that was sent at `sent_at`. Returns the bytes of its answer.
     pub(crate) fn hear(&mut self, now: Instant, sent_at: Instant, frame: &[u8]) -> Vec<u8> {
         if self.away_until.is_some() {
             return Vec::new();
@@ -503,7 +502,7 @@ impl Real {
         let to = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
         let mut velocity = [0.0; 3];
         if mask & 0b11_1000 == 0 {
-            // The axis points that way: taken back from north, east and down.
+            // Conversion from north, east and down to the axis.
             let unit = |way| self.axis.to_ned(place.x_m, way).map(f64::from);
             let [x, y] = [unit([1.0, 0.0, 0.0]), unit([0.0, 1.0, 0.0])];
             let ned = [16, 20, 24].map(|at| f64::from(float(at)));
@@ -520,7 +519,7 @@ impl Real {
             self.told = Some(Told { to, velocity });
             self.told_at = Some(now);
         } else if self.kind == Kind::Px4 {
-            // A PX4 in its failsafe flies to it once it resumes.
+            // A PX4 in its failsafe flies to the target once it resumes.
             self.told = Some(Told { to, velocity });
             self.told_at = Some(now);
         }

@@ -1,4 +1,4 @@
-//! A companion on the asynchronous runner, beside a relay that is alone: each step polls it as often as it may get on.
+//! Companion on the asynchronous runner with a single relay, polled as long as it makes progress.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -14,7 +14,7 @@ use uav_relay::asynch::{AsyncAutopilot, AsyncRelay, Clock};
 use uav_relay::flight::autopilot::Autopilot;
 use uav_relay::{Instant, Settings, Sites};
 
-/// Polls in one step: more than a frame in, a turn and a dozen frames out take.
+/// Polls per step: enough for a received frame, a turn and a dozen sent frames.
 const POLLS: u32 = 64;
 
 #[derive(Clone)]
@@ -37,7 +37,6 @@ impl Clock for Now {
     }
 }
 
-/// One direction of a UART.
 #[derive(Clone, Default)]
 struct Uart(Rc<RefCell<VecDeque<u8>>>);
 
@@ -107,7 +106,7 @@ impl Runner {
         self.incoming.0.borrow_mut().extend(bytes);
     }
 
-    /// Runs the task at `now`, and returns what it has written.
+    /// Runs the task at `now`. Returns the bytes written.
     pub(crate) fn run(&mut self, now: Instant) -> Vec<u8> {
         self.now.set(now);
         let mut cx = Context::from_waker(Waker::noop());

@@ -1,4 +1,4 @@
-//! With a key the two believe each other and nobody else, and what does not fit is told once.
+//! MAVLink signing: both sides accept only frames with their key, and each mismatch is reported once.
 
 use sha2::{Digest as _, Sha256};
 use uav_relay::flight::autopilot::trust::Mistrust;
@@ -11,13 +11,13 @@ use super::*;
 const OURS: [u8; 32] = [7; 32];
 const OTHER: [u8; 32] = [8; 32];
 
-/// 2026, in units of a stamp.
+/// Year 2026 in time stamp units.
 const STAMP: u64 = 37_527_840_000_000;
 
-/// The autopilot's key.
+/// Key and signing state of the autopilot.
 pub(crate) struct Key {
     bytes: [u8; 32],
-    /// Its time when this one's clock was at 0, and the stamp of its last frame.
+    /// Stamp at the autopilot's start, and stamp of the last frame.
     zero: u64,
     last: u64,
     heard: u64,
@@ -33,13 +33,13 @@ impl Key {
         }
     }
 
-    /// The frame, signed, as the definition has it.
+    /// Appends a signature as defined by MAVLink.
     pub(crate) fn sign(&mut self, now: Instant, mut frame: Vec<u8>) -> Vec<u8> {
         self.last = (self.zero + now.as_micros() / 10).max(self.last + 1);
         frame.truncate(frame.len() - 2);
         frame[2] = 1;
         let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
-        // What the link does not know it does not look at.
+        // The link ignores unknown messages.
         let sum = table::find(id).map_or(0, |known| checksum(&frame[1..], known));
         frame.extend(sum.to_le_bytes());
         frame.push(0);
@@ -49,7 +49,7 @@ impl Key {
         frame
     }
 
-    /// Whether a frame of the companion is to be taken.
+    /// Returns true if a frame of the companion has a valid signature.
     pub(crate) fn believes(&mut self, frame: &[u8]) -> bool {
         let Some((covered, tag)) = frame.split_last_chunk::<6>().filter(|_| frame[2] == 1) else {
             return false;
@@ -83,12 +83,12 @@ fn mistrust(vehicle: &Vehicle) -> Vec<Mistrust> {
     .collect()
 }
 
-/// The link has `ours`, the autopilot `theirs`.
+/// Creates a vehicle with the key `theirs` and a link with the key `ours`.
 fn keyed(kind: Kind, ours: Option<[u8; 32]>, theirs: Option<[u8; 32]>) -> Vehicle {
     let mut vehicle = Vehicle::new(kind);
     vehicle.key = theirs.map(Key::new);
     if let Some(key) = ours {
-        // As a board without a clock.
+        // A board without a clock has no time stamp.
         let signing = Signing::new(key, 0, Stamp::UNKNOWN, vehicle.now);
         vehicle.link.sign(signing);
     }
@@ -132,7 +132,7 @@ fn what_does_not_fit_is_told_once_and_without_a_key_there_is_no_flight() {
     }
 }
 
-/// Two heartbeats that do not fit are another vehicle's, or noise.
+/// Checks that two mismatched heartbeats, of another vehicle or by noise, raise no event.
 #[test]
 fn one_frame_that_does_not_fit_is_no_event() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));
@@ -167,7 +167,7 @@ fn a_clock_that_goes_back_is_told_of_and_not_believed() {
     assert_eq!(vehicle.link.state(), State::Silent);
 }
 
-/// What was recorded in flight and is played on the ground does not make it fly.
+/// Checks that frames recorded in flight and replayed on the ground do not engage the drone.
 #[test]
 fn what_was_recorded_is_refused() {
     let mut vehicle = keyed(Kind::ArduCopter, Some(OURS), Some(OURS));
@@ -195,7 +195,7 @@ fn what_was_recorded_is_refused() {
     assert_eq!(vehicle.link.refused(), 3);
 }
 
-/// A SiK radio has no key.
+/// Checks RADIO_STATUS of a SiK radio, which has no key.
 #[test]
 fn what_a_radio_says_needs_no_signature() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));

@@ -1,4 +1,4 @@
-//! A vehicle with an autopilot of one of the two kinds: it hovers, or flies to the last target in its mode.
+//! Simulated vehicle with a PX4 or ArduCopter: it hovers, or flies to the companion's last target.
 
 use mavlink::dialects::common::{
     COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState,
@@ -17,10 +17,10 @@ use crate::signed::Key;
 
 pub(crate) const SYSTEM: u8 = 7;
 
-/// From one step to the next, ms.
+/// Time step, ms.
 const STEP_MS: u64 = 20;
 
-/// How fast it flies, m/s.
+/// Speed, m/s.
 const SPEED: f32 = 8.0;
 
 pub(crate) const fn place(x_m: f32) -> Placement {
@@ -38,7 +38,7 @@ pub(crate) fn axis() -> Axis {
     Axis::between(sites()).unwrap()
 }
 
-/// What the link says.
+/// Message sent by the link.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Said {
     Heartbeat,
@@ -51,7 +51,7 @@ pub(crate) enum Said {
         name: String,
         value: f32,
     },
-    /// The answer to a command: which one, its result, and to whom.
+    /// Answer to a command: its id, its result and the recipient.
     Ack {
         command: u32,
         result: u32,
@@ -83,12 +83,12 @@ impl Target {
     }
 }
 
-/// Modes, as both number them.
+/// Flight modes with PX4's and ArduCopter's numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Mode {
-    /// The pilot has the sticks.
+    /// Flown by the pilot's sticks.
     Position,
-    /// Hold, a mission, a return: the autopilot flies by itself.
+    /// Flown by the autopilot: hold, mission or return.
     Hold,
     /// OFFBOARD or GUIDED.
     Companion,
@@ -108,20 +108,19 @@ pub(crate) struct Vehicle {
     pub(crate) mode: Mode,
     pub(crate) place: Placement,
     pub(crate) setpoint: Option<Placement>,
-    /// Where it was told to fly.
+    /// Target in effect.
     goal: Option<Target>,
     pub(crate) mute: bool,
     pub(crate) takes_targets: bool,
-    /// It says what it flies to.
     pub(crate) says_targets: bool,
-    /// It answers TIMESYNC.
+    /// True if the autopilot answers TIMESYNC.
     pub(crate) echoes: bool,
-    /// `MAV_STATE`: 4 is active, 5 a failsafe.
+    /// `MAV_STATE`: 4 for active, 5 for a failsafe.
     pub(crate) status: u8,
     pub(crate) position_every_ms: u64,
     pub(crate) late_ms: u64,
     number: u8,
-    /// With one it signs what it says, and believes nobody else.
+    /// Signing key; with a key, unsigned frames are ignored.
     pub(crate) key: Option<Key>,
     pub(crate) said: Vec<(Instant, Said)>,
     pub(crate) systems: Vec<u8>,
@@ -159,7 +158,7 @@ impl Vehicle {
         }
     }
 
-    /// In the air, in the pilot's hands.
+    /// Takes off under the pilot's control.
     pub(crate) fn fly_off(&mut self) {
         self.run(2_000);
         self.armed = true;
@@ -169,13 +168,13 @@ impl Vehicle {
         self.run(2_000);
     }
 
-    /// The pilot chooses the mode.
+    /// Chooses the companion mode, as the pilot does.
     pub(crate) fn engage(&mut self) {
         self.mode = Mode::Companion;
         self.run(1_100);
     }
 
-    /// It is switched off and on, on the ground.
+    /// Reboots the autopilot on the ground.
     pub(crate) fn reboot(&mut self) {
         self.began = self.now;
         self.armed = false;
@@ -211,7 +210,7 @@ impl Vehicle {
         self.drive();
     }
 
-    /// What a firmware's loop does.
+    /// Runs a firmware's main loop once.
     pub(crate) fn drive(&mut self) {
         self.link.handle_setpoint(self.now, self.setpoint);
         if self.link.poll_timeout(self.now) <= self.now {
@@ -267,7 +266,7 @@ impl Vehicle {
         self.heartbeat_of(SYSTEM, 1, 2, autopilot, self.custom_mode());
     }
 
-    /// A heartbeat by numbers, since not every one of them is of an enum.
+    /// Sends a heartbeat given by numbers, which need not be in an enum.
     pub(crate) fn heartbeat_of(
         &mut self,
         system: u8,
@@ -311,7 +310,7 @@ impl Vehicle {
         }));
     }
 
-    /// An ArduCopter says in its mode what it flies to; a PX4 does not.
+    /// Reports the target, as an ArduCopter does in its mode and a PX4 does not.
     fn say_target(&mut self) {
         if self.kind == Kind::Px4 || self.mode != Mode::Companion || !self.says_targets {
             return;
@@ -328,7 +327,6 @@ impl Vehicle {
         }
     }
 
-    /// Told nothing, it holds its place.
     fn own_goal(&self) -> Option<Target> {
         let Geodetic {
             lat_e7,
@@ -397,7 +395,7 @@ impl Vehicle {
             MavMessage::COMMAND_ACK(ack) => Said::Ack {
                 command: ack.command as u32,
                 result: ack.result as u32,
-                // An extension of the message, which the decoder does not read.
+                // The recipient is an extension field, which the decoder does not read.
                 to: frame[18..20].try_into().unwrap(),
             },
             MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => Said::Target(self.told(&target)),
@@ -437,7 +435,6 @@ impl Vehicle {
         target
     }
 
-    /// All targets so far.
     pub(crate) fn targets(&self) -> Vec<(Instant, Target)> {
         let all = self.said.iter();
         all.filter_map(|(at, said)| match said {
@@ -447,14 +444,13 @@ impl Vehicle {
         .collect()
     }
 
-    /// Targets since `from`.
     pub(crate) fn targets_since(&self, from: Instant) -> Vec<(Instant, Target)> {
         let mut all = self.targets();
         all.retain(|(at, _)| *at > from);
         all
     }
 
-    /// How often a message was asked for.
+    /// Returns the number of requests for a message.
     pub(crate) fn intervals(&self, id: u32) -> usize {
         let asked = self.said.iter();
         asked

@@ -1,4 +1,4 @@
-//! Places along a line on earth, held against geodesics.
+//! Coordinates along a line on earth, compared with geodesics.
 
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use rand::{RngExt, SeedableRng};
@@ -7,13 +7,12 @@ use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
 
-/// How far x or y may be off, by the length of the line, m.
+/// Largest permitted error of x and y by the length of the line, m.
 const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];
 
-/// Lines of each length.
 const LINES: usize = 10_000;
 
-/// A point beside a line, and where it is along it.
+/// Point near a line, and its exact coordinates.
 #[derive(Deserialize)]
 struct Beside {
     tx_lat: i32,
@@ -44,7 +43,7 @@ impl Beside {
         Axis::try_new(tx, rx).unwrap()
     }
 
-    /// How far off D, x and y are, m, less what f32 rounds of a place.
+    /// Returns the errors of D, x and y beyond f32 rounding, m.
     fn off(&self) -> [f64; 3] {
         let axis = self.axis();
         let place = axis.place(ground(self.lat, self.lon)).unwrap();
@@ -58,7 +57,7 @@ impl Beside {
     }
 }
 
-/// The library that the points are from, and a port of it that is quick enough for all the lines.
+/// Line with a geodesic library: a port of GeographicLib that is fast enough for all lines.
 struct Line {
     earth: Geodesic,
     tx: [f64; 2],
@@ -66,14 +65,14 @@ struct Line {
 }
 
 impl Line {
-    /// The point that far along it, and the direction of the line there.
+    /// Returns the point at distance x along the line, and the line's azimuth there.
     fn at(&self, x: f64) -> [f64; 3] {
         let (lat, lon, azimuth): (f64, f64, f64) =
             self.earth.direct(self.tx[0], self.tx[1], self.azimuth, x);
         [lat, lon, azimuth]
     }
 
-    /// How far along the line its foot is, and how far beside it the point is.
+    /// Returns a point's distance along the line and beside it.
     fn foot(&self, lat: f64, lon: f64, mut x: f64) -> [f64; 2] {
         let mut y = 0.0;
         for _ in 0..20 {
@@ -98,7 +97,7 @@ fn around(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// A line of that length anywhere on earth, and a point up to 500 m beside it.
+/// Draws a line of that length anywhere on earth, and a point up to 500 m beside it.
 fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
     let earth = Geodesic::wgs84();
     let degrees = |unit: i32| f64::from(unit) / 1e7;
@@ -138,7 +137,7 @@ fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
     }
 }
 
-/// Every point of `points.csv` is where GeographicLib says; as far as the port of it says the same, it may judge the rest.
+/// Compares the crate, and the port of GeographicLib, with the points that GeographicLib computed.
 #[test]
 fn the_points_that_geographiclib_made() {
     let mut reader = csv::Reader::from_reader(&include_bytes!("points.csv")[..]);
@@ -205,7 +204,7 @@ fn there_and_back_is_within_one_unit() {
             let axis = point.axis();
             let place = axis.place(from).unwrap();
             let back = axis.point(place).unwrap();
-            // A place is f32: what it rounds of x is that many units.
+            // Rounding of x to f32, in units of 1e-7 degrees.
             let rounded = f64::from(place.x_m.abs()) * f64::from(f32::EPSILON) / 2.0 / 0.0111;
             let shrunk = f64::from(from.lat_e7).mul_add(1e-7, 0.0).to_radians().cos();
             let lon = (i64::from(back.lon_e7) - i64::from(from.lon_e7)).rem_euclid(3_600_000_000);
@@ -229,7 +228,7 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         let [at_lat, at_lon, _] = line.at(x);
         line.earth.inverse(at_lat, at_lon, lat, lon)
     };
-    // The distance has one valley along the line, or one hill, at whose foot an end is the nearest.
+    // Along the line the distance has one minimum, or one maximum, in which case the nearest point is an end.
     let (mut low, mut high) = (0.0, length);
     for _ in 0..60 {
         let third = (high - low) / 3.0;
@@ -245,7 +244,7 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Largest relative error of a distance, for points up to so far from the middle of the line, m.
+/// Largest permitted relative error of a distance, for points within a distance of the line's middle, m.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]
@@ -268,7 +267,7 @@ fn distances_agree_with_geodesics() {
                     azimuth,
                 };
                 let [lat, lon, _] = line.at(length / 2.0);
-                // Of every order of magnitude from 10 m on.
+                // The distance is log-uniform from 10 m.
                 let away = 10.0 * (rng.random_range(0.0..1.0) * (most / 10.0).ln()).exp();
                 let heading = rng.random_range(0.0..360.0);
                 let (lat, lon): (f64, f64) = line.earth.direct(lat, lon, heading, away);
@@ -276,7 +275,7 @@ fn distances_agree_with_geodesics() {
                 let expected =
                     away_by_geodesics(&line, length, degrees(point.lat_e7), degrees(point.lon_e7));
                 let is = beside.axis().away_m(point).unwrap();
-                // Two units of the point, on the line.
+                // The tolerance is two units of the point's coordinates.
                 let off = ((is - expected).abs() - 0.03).max(0.0) / expected.max(1.0);
                 worst = worst.max(off);
             }
@@ -291,7 +290,7 @@ fn distances_agree_with_geodesics() {
     }
 }
 
-/// Both sites with latitude and longitude swapped, and the other side of the earth.
+/// Checks sites with latitude and longitude swapped, and the other side of the earth.
 #[test]
 fn a_point_that_has_no_place_has_a_distance() {
     let site = |lat, lon| Geodetic::from_degrees(lat, lon, 420.0).unwrap();

@@ -1,4 +1,4 @@
-//! A drone that is far from its line is told of, with the distance: sites with latitude and longitude swapped are accepted as any others.
+//! Reports of a drone far from its line, for example with latitude and longitude of the sites swapped.
 
 use std::time::Duration;
 
@@ -11,10 +11,10 @@ use crate::peer::{Heard, Peer, RX, Site, TX, apart_m, on_earth};
 use crate::process::Relay;
 use crate::stays::{asked, until};
 
-/// The question, and the line that it is in.
+/// Question in the event line.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
-/// A drone at the place where it belongs, and a relay that was given sites of its own.
+/// Drone at its place, with a relay that has other sites.
 struct Apart {
     drone: Peer,
     relay: Relay,
@@ -87,10 +87,10 @@ fn is_off_a_swapped_line(kind: &str) {
     let from_m = position["from_line_m"].as_f64().unwrap();
     assert!((from_m / away_m - 1.0).abs() < 2e-3, "{position}");
 
-    // On the ground that is all.
+    // On the ground the event is raised once.
     std::thread::sleep(Duration::from_secs(12));
     assert!(apart.relay.lines_with(SWAPPED).is_empty(), "it was told");
-    // In the air it is told again, once in ten seconds, to the operator as well.
+    // In the air the event repeats every ten seconds, and the operator receives it too.
     apart.drone.order("arm");
     apart.drone.order("takeoff");
     apart.relay.line("autopilot: in the air");
@@ -101,7 +101,7 @@ fn is_off_a_swapped_line(kind: &str) {
     assert!((1..=3).contains(&again.len()), "{again:?}");
     let texts = apart.drone.so_far().into_iter().filter(operator).count();
     assert!((1..=3).contains(&texts), "{texts} texts");
-    // Nothing is flown: the relay has no position, and nothing is streamed.
+    // The drone cannot be engaged: the relay has no position, and no targets are streamed.
     apart.drone.order("mode companion");
     let heard = apart.drone.hears_for(Duration::from_secs(3));
     assert!(!heard.iter().any(Heard::is_target), "{heard:?}");
@@ -122,7 +122,7 @@ fn an_arducopter_far_from_a_swapped_line_is_told_of() {
     is_off_a_swapped_line("arducopter");
 }
 
-/// Sites of another valley: not swapped, and not the drone's.
+/// Checks sites of another valley, which are not swapped: the report suggests no cause.
 #[test]
 fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
     let moved = |[lat, lon, amsl]: Site| [lat - 0.1, lon, amsl];
@@ -141,10 +141,10 @@ fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
     assert_eq!(apart.position()["sites_look_swapped"], false);
 }
 
-/// Beside its line, and outside the geofence: the relay has a position, and the pilot may fly there.
+/// Checks a drone beside its line and outside the geofence: it has a position and may fly there.
 #[test]
 fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
-    // 380 m along a line that begins 500 m farther on.
+    // 380 m along a line that starts 500 m farther on.
     let shifted = |site: Site| {
         let [lat, lon, amsl] = on_earth(500.0, 0.0);
         [
@@ -176,7 +176,6 @@ fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
     apart.relay.line("geofence");
 }
 
-/// At its line nothing is told.
 #[test]
 fn a_drone_at_its_line_is_not_told_of() {
     let mut flight = Flight::found("arducopter", 380.0);

@@ -1,4 +1,4 @@
-//! The bench of examples/LINUX.md, run as the page has it.
+//! Bench of examples/LINUX.md, run as printed on the page.
 
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::binary::{companion, ground};
 
 const PAGE: &str = include_str!("../../../examples/LINUX.md");
 
-/// A stand-in for `socat pty,..,link=A pty,..,link=B` where that is not installed.
+/// Replacement for `socat pty,..,link=A pty,..,link=B` where socat is not installed.
 const SOCAT: &str = r#"
 import os, pty, select, sys, tty
 ends = {}
@@ -26,7 +26,7 @@ while True:
         os.write(masters[1 - masters.index(ready)], os.read(ready, 4096))
 "#;
 
-/// Twice in one folder: what the first run has left behind is not in the way.
+/// Runs the bench twice in one folder: files of the first run must not disturb the second.
 #[test]
 fn the_bench_of_the_page_runs_twice() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
@@ -47,7 +47,7 @@ fn the_bench_of_the_page_runs_twice() {
     let folder = tempfile::tempdir().unwrap();
     let key = folder.path().join("network7.key");
     std::fs::write(&key, "5e".repeat(32)).unwrap();
-    // As the page has it before: programs refuse a key that other users can read.
+    // Programs refuse a key that other users can read; the page sets the permissions before.
     std::fs::set_permissions(&key, std::fs::Permissions::from_mode(0o600)).unwrap();
     if Command::new("socat").arg("-V").output().is_err() {
         let file = folder.path().join("socat.py");

@@ -1,17 +1,15 @@
-//! The programs. `cargo test --workspace` has built them already, `cargo test -p host-tests` has not, and there is
-//! no variable with its place as there is for a package's own binaries: so cargo is asked, which builds what is missing.
+//! Programs under test, which Cargo is called to build because `cargo test -p host-tests` does not.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-/// Where the relay is, built in the profile of the tests.
+/// Returns the path of the companion, built in the profile of the tests.
 pub(crate) fn companion() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| build("linux_companion"))
 }
 
-/// And the ground.
 pub(crate) fn ground() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| build("linux_ground"))
@@ -20,7 +18,7 @@ pub(crate) fn ground() -> &'static Path {
 fn build(program: &str) -> PathBuf {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = manifest.parent().expect("the workspace is one up");
-    // The target folder of these tests, so that nothing is built twice. Cargo holds no lock on it while tests run.
+    // The target folder of these tests avoids a second build. Cargo holds no lock on it while tests run.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
     let mut cargo = Command::new(env!("CARGO"));
     cargo

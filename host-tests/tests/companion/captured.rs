@@ -1,4 +1,4 @@
-//! What goes over the ports of three processes, as `cargo decode` reads it from their captures.
+//! Captures of three processes' ports, as `cargo decode` reads them.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,10 +15,10 @@ use super::stays::fill_disk;
 use super::{Chain, simulated};
 use uav_relay_scenario::Scenario;
 
-/// A frame: its sender, its destination, its counter.
+/// Sender, destination and counter of a frame.
 type Seen = (u64, u64, u64);
 
-/// The frames in a capture, with the way they went. A port that is opened while somebody speaks begins with a part of a frame.
+/// Returns the frames in a capture with their directions. A capture may begin with a partial frame.
 fn frames(file: &Path) -> Vec<(String, Seen)> {
     let output = Command::new("cargo")
         .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
@@ -55,7 +55,7 @@ fn every_frame_is_in_the_captures_of_both_ends() {
     }
     let places: Vec<_> = chain.relays.iter_mut().map(Relay::settled).collect();
     assert_eq!(places, simulated(&Scenario::default(), 3));
-    // What was on its way is there by then, and nothing new is said for seconds.
+    // All frames in transit have arrived by then, and no new ones are sent for seconds.
     std::thread::sleep(Duration::from_millis(500));
     for relay in chain.relays {
         relay.signal(Signal::TERM);
@@ -91,7 +91,7 @@ fn a_capture_that_cannot_begin_is_refused() {
     );
 }
 
-/// The one in the middle has two ports, and says it once for both.
+/// Checks the middle relay, which has two ports and reports the failure once for both.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     let folder = tempfile::tempdir().unwrap();
@@ -113,14 +113,14 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     let line = chain.relays[1].line("capture over: ");
     let why = "--capture cannot be written any more: File too large";
     assert!(line.contains(why), "{line}");
-    // Its neighbours ask for signs of life all the while, and get them.
+    // The neighbours keep asking for signs of life and receive them.
     std::thread::sleep(Duration::from_secs(4));
     let again = chain.relays[1].lines_with("capture over");
     assert!(again.is_empty(), "once: {again:?}");
     for relay in &mut chain.relays {
         assert!(!relay.has_said("lost: ") && !relay.has_said("lapsed: "));
     }
-    // Space that comes back begins no other capture.
+    // A capture does not resume when space is available again.
     fill_disk(chain.relays[1].pid(), false);
     std::thread::sleep(Duration::from_secs(1));
     assert!(std::fs::metadata(&file).unwrap().len() <= full + 64);
@@ -130,7 +130,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     }
 }
 
-/// The same at a station, which is asked for by a relay that was switched on: it says so and answers all the same.
+/// Checks a full disk at a ground station, which reports the end of its capture and still answers relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     let files = Files::new();
@@ -168,7 +168,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     assert_eq!(station.end().status, Some(0));
 }
 
-/// A crash and a restart: the capture of the time before the crash is the record of it.
+/// Checks that a restart after a crash does not overwrite the earlier capture.
 #[test]
 fn a_restart_keeps_the_capture_of_the_start_before() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,7 +193,7 @@ fn a_restart_keeps_the_capture_of_the_start_before() {
         }
         relay.line("converged: ");
         std::thread::sleep(Duration::from_millis(300));
-        // A relay that is dropped is killed.
+        // A dropped relay is killed.
         drop(relay);
         assert!(!frames(file).is_empty(), "start {number}");
         kept.push((file.clone(), std::fs::read(file).unwrap()));
@@ -202,7 +202,7 @@ fn a_restart_keeps_the_capture_of_the_start_before() {
         }
     }
     second.line("converged: ");
-    // A start that is refused leaves no file.
+    // A refused start leaves no file.
     chain
         .options
         .extend(["--positions", "/dev/null"].map(str::to_owned));

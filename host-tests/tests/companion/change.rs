@@ -1,4 +1,4 @@
-//! Changes that the ground shows before it sends an upload, and the operator's confirmation.
+//! Changes that the ground station shows before an upload, and the operator's confirmation.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -73,7 +73,7 @@ impl Bench {
         Relay::ground(&all).end()
     }
 
-    /// x of both relays, m, after the next agreement.
+    /// Returns x of both relays, m, after the next agreement.
     fn agreed(&mut self) -> [f64; 2] {
         self.relays.each_mut().map(|relay| {
             let setpoint = bits(&relay.line("setpoint: "));
@@ -83,7 +83,7 @@ impl Bench {
     }
 }
 
-/// Text that follows `event: ` in each line of that event.
+/// Returns the text after `event: ` in each line of that event.
 fn said<'a>(ended: &'a Ended, event: &str) -> Vec<&'a str> {
     let event = format!("  transmitter  {event}: ");
     let lines = ended.stdout.iter();
@@ -120,7 +120,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change_and_move() {
     let after = bench.agreed();
     assert!((after[0] - before[0]).abs() > 1.0, "{before:?}, {after:?}");
 
-    // A dry run of another interferer: the receiver stays where it was moved to.
+    // Dry run with another interferer: the receiver stays at its new site.
     let new = ["--new-interferer", "80,700,-300"];
     let ended = bench.uploads("2", &[&new[..], &["--dry-run"]].concat());
     assert_eq!(ended.status, Some(0), "{ended:?}");
@@ -134,7 +134,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change_and_move() {
     assert_eq!(said(&ended, "dry run"), ["version 2 was not uploaded"]);
     assert!(!bench.relays[0].has_said("uploaded: holds version 2"));
 
-    // The same for scripts: the relays move by as much as was said.
+    // A script's upload: the relays move as far as announced.
     let ended = bench.uploads("2", &[&new[..], &["--yes"]].concat());
     assert_eq!(ended.status, Some(0), "{ended:?}");
     assert_eq!(said(&ended, "move"), moves);
@@ -175,7 +175,7 @@ fn what_leaves_the_geofence_is_refused_before_it_is_sent() {
     assert!(!bench.relays[0].has_said("uploaded: "));
 }
 
-/// Runs the ground at a terminal, and answers its question; returns the status and what the terminal has shown.
+/// Runs the ground station at a terminal and answers its question. Returns exit status and terminal text.
 fn at_a_terminal(options: &[String], answer: &str) -> (Option<i32>, String) {
     let terminal = Pty::new();
     let tty = || {

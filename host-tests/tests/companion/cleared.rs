@@ -1,4 +1,4 @@
-//! A relay that fell silent, and the operator's word that it has landed.
+//! Clearing of a silent relay by an operator.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -12,7 +12,7 @@ use crate::positions::{fifo, write};
 use crate::process::{LIMIT, Relay, bits};
 use crate::stays::asked;
 
-/// Gives a command by the socket, and returns whether it was done, and the answer's text.
+/// Sends a command to the socket. Returns true if it was executed, with the text of the answer.
 fn commanded(socket: &Path, command: &str) -> (bool, String) {
     let mut stream = UnixStream::connect(socket).unwrap();
     stream.set_read_timeout(Some(LIMIT)).unwrap();
@@ -24,13 +24,13 @@ fn commanded(socket: &Path, command: &str) -> (bool, String) {
     (said["done"].as_bool().unwrap(), text.to_owned())
 }
 
-/// Three drones 20 m apart; relays 1 and 2 follow their setpoints, relay 3 stays where it is.
+/// Three drones 20 m apart; relays 1 and 2 follow their setpoints, relay 3 does not move.
 struct Drones {
     folder: tempfile::TempDir,
     relays: Vec<Relay>,
     fifos: Vec<PathBuf>,
     at: Vec<[f32; 3]>,
-    /// What each has said.
+    /// Log lines of each relay.
     said: Vec<Vec<String>>,
 }
 
@@ -66,7 +66,7 @@ impl Drones {
         self.said[index - 1].iter().any(|line| line.contains(part))
     }
 
-    /// Flies until it is so.
+    /// Flies until the condition holds.
     fn fly_until(&mut self, is_so: impl Fn(&Self) -> bool) {
         let end = Instant::now() + LIMIT;
         while !is_so(self) {
@@ -107,7 +107,7 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
         let (is_done, text) = commanded(&socket, command);
         assert!(!is_done && text.starts_with(why), "{command}: {text}");
     }
-    // It stays 4 m clear of the silent one.
+    // Relay 2 stays 4 m clear of the silent relay.
     let still = Instant::now();
     drones.fly_until(|_| still.elapsed() > Duration::from_secs(2));
     assert!(drones.at[1][0] <= 46.0, "{:?}", drones.at);
@@ -122,7 +122,7 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
     assert_eq!(asked(&socket)["relay"]["lost"], serde_json::json!([]));
 }
 
-/// `nc -U` sends nothing, and a client that sends nothing more is not waited for.
+/// Checks clients that send nothing, like `nc -U`, or half a command: they are answered at once.
 #[test]
 fn a_client_that_sends_a_part_of_a_command_is_answered() {
     let folder = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn a_client_that_sends_a_part_of_a_command_is_answered() {
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
 
-/// By way of the autopilot of its neighbour, as a ground station sends it.
+/// Checks clearing through the neighbour's autopilot, as a ground station does it.
 #[test]
 fn an_operator_clears_a_relay_by_a_mavlink_command() {
     let folder = tempfile::tempdir().unwrap();

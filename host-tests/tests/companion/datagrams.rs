@@ -1,4 +1,4 @@
-//! An autopilot over UDP that answers the first address and port it hears from, and no other: a companion that restarts is heard again.
+//! Restarts of the companion with an autopilot over UDP that answers only the first peer address.
 
 use std::net::UdpSocket;
 
@@ -8,17 +8,16 @@ use tempfile::TempDir;
 use crate::peer::{Heard, Peer, on_earth, options, relay};
 use crate::process::{Ended, Relay};
 
-/// UDP ports of this computer that no other program uses.
+/// Free UDP ports of this computer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ports {
-    /// The autopilot's.
     pub(crate) port: u16,
-    /// The companion's.
+    /// Port of the companion.
     pub(crate) local: u16,
 }
 
 impl Ports {
-    /// A pair as PX4's simulation has it: 14580 + i and 14540 + i.
+    /// Returns a pair of ports as in PX4's simulation: 14580 + i and 14540 + i.
     fn of_px4() -> Self {
         let first = std::process::id() as u16;
         let pairs = (0..10).map(|i| (first.wrapping_add(i)) % 10);
@@ -31,7 +30,7 @@ impl Ports {
             .expect("one of ten pairs is free")
     }
 
-    /// Any pair whose second port is `apart` above the first.
+    /// Returns a free pair of ports whose second is `apart` above the first.
     pub(crate) fn apart(apart: u16) -> Self {
         let mut pairs = (0..100).filter_map(|_| {
             let port = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -51,7 +50,7 @@ impl Ports {
         bound.iter().all(Result::is_ok)
     }
 
-    /// A drone on the ground behind the first port, that sends to `partner` before it has heard from anybody.
+    /// Starts a drone on the ground at the first port; it sends to `partner` until it receives a datagram.
     pub(crate) fn drone(self, partner: u16) -> Peer {
         let at = on_earth(380.0, 0.0).map(|number| number.to_string());
         let link = format!("udp:{}@{partner}", self.port);
@@ -59,7 +58,7 @@ impl Ports {
     }
 }
 
-/// The companion finds the autopilot, and the autopilot hears the companion and answers it.
+/// Checks that companion and autopilot receive each other.
 fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
     relay.line("autopilot: found a PX4");
     relay.line("autopilot: on the ground, or not armed");
@@ -67,12 +66,12 @@ fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
     drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == serde_json::json!([7, 191]));
 }
 
-/// Starts a companion three times: the first one is killed, the second one ends by itself. The autopilot restarts never.
+/// Starts a companion three times with one autopilot; the first is killed, the second terminates.
 fn is_heard_again(address: &str, ports: Ports) {
     let mut drone = ports.drone(ports.local);
     let mut first = relay(address, &[]);
     they_hear_each_other(&mut first, &mut drone);
-    // Dropped, it is killed with SIGKILL.
+    // Dropping kills it with SIGKILL.
     drop(first);
     let mut second = relay(address, &[]);
     they_hear_each_other(&mut second, &mut drone);
@@ -103,7 +102,7 @@ fn a_companion_that_restarts_is_heard_at_the_local_port_that_was_stated() {
     is_heard_again(&address, ports);
 }
 
-/// It restarts in the air: it finds the autopilot, and who flies.
+/// Checks a companion restarted in the air: it finds the autopilot and its mode.
 #[test]
 fn a_companion_that_restarts_in_the_air_is_heard() {
     let ports = Ports::apart(1_000);
@@ -120,11 +119,11 @@ fn a_companion_that_restarts_in_the_air_is_heard() {
     second.line("autopilot: in the air");
 }
 
-/// An autopilot that vanishes closes its port: what is sent there is refused, and that ends nothing.
+/// Checks an autopilot that closes its port: the refused datagrams do not end the companion.
 #[test]
 fn an_autopilot_that_restarts_is_found_again() {
     let ports = Ports::apart(1_000);
-    // It sends to nobody before it is spoken to.
+    // The drone does not send before it receives a datagram.
     let mut drone = ports.drone(9);
     let mut relay = relay(&format!("udp:127.0.0.1:{}", ports.port), &[]);
     they_hear_each_other(&mut relay, &mut drone);
@@ -142,7 +141,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     assert_eq!(relay.end().status, Some(0));
 }
 
-/// One line, with the port that is in the way and what else may be stated.
+/// Checks the error line: it names the occupied port and the alternative.
 #[test]
 fn a_local_port_that_cannot_be_had_is_named() {
     let ports = Ports::apart(1_000);
@@ -173,7 +172,6 @@ fn a_local_port_that_cannot_be_had_is_named() {
     drop(taken);
 }
 
-/// The same address in the file of all drones.
 #[test]
 fn the_file_states_a_local_port() {
     let ports = Ports::apart(11);

@@ -1,4 +1,4 @@
-//! How the program ends: told to, or because it cannot begin.
+//! Exit of the program: on a signal, or because it cannot start.
 
 use rustix::process::Signal;
 use uav_relay_scenario::Scenario;

@@ -1,4 +1,4 @@
-//! One file for all tools: what `cargo plan` reads, the companion and the ground read too, and their own sections of it.
+//! One scenario file for `cargo plan`, the companion and the ground station, with sections of their own.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::medium::{Medium, QUIET};
 use crate::process::{Ended, Relay};
 use crate::simulated;
 
-/// A scenario with nothing as the paper has it.
+/// Scenario in which every value differs from the paper's.
 const SCENARIO: &str = "
 [geometry]
 distance_m = 2345.6
@@ -82,7 +82,7 @@ fn three_with_one_file_settle_where_the_simulated_chain_does() {
     assert_ne!(settled, simulated(&Scenario::default(), 3));
 }
 
-/// The digest covers every number of a mission, so it is the same one if they all reached it.
+/// Checks by the digest, which covers every number of a mission, that all programs read the same mission.
 #[test]
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Folder::new();
@@ -185,7 +185,7 @@ fn what_is_wrong_with_the_file_is_named() {
                 "{sections}: {part} not in {stderr:?}"
             );
         }
-        // Tools that do not use the sections check them as well.
+        // Programs that do not use the sections check them as well.
         let checked = Scenario::load(&file).is_err();
         assert_eq!(checked, !parts[0].starts_with("--"), "{sections}");
     }
@@ -201,7 +201,7 @@ fn what_is_wrong_with_the_file_is_named() {
     }
 }
 
-/// The command line counts, and says where it counts against the file: nobody flies by a file that does not count unawares.
+/// Checks that the command line overrides the file, and that each difference is reported once.
 #[test]
 fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
     let folder = Folder::new();
@@ -232,7 +232,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
             format!("--network 12 counts, and not 4711 of {name}"),
         ]
     );
-    // The same number in other words is no contradiction, and what the file does not say neither.
+    // The same number in another notation is no difference, and neither is a value that the file lacks.
     let same = ["--altitude", "33.30", "--network", "4711", "--baud=57600"];
     let same = [
         &same[..],
@@ -268,7 +268,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
         ]
     );
 
-    // What is one relay's own by the file, an option for all cannot say.
+    // An option for all relays cannot override a value that the file has for one relay.
     let own = format!("{SCENARIO}\n[[relay]]\nindex = 1\npower_w = 0.5\n");
     let own = folder.write("own.toml", &own);
     for (index, status) in [("1", 2), ("2", 1)] {
@@ -293,7 +293,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
     }
 }
 
-/// What a relay has said it was told otherwise by its command line, once it has begun.
+/// Returns the reported overrides of a started relay.
 fn overrides(mut relay: Relay) -> Vec<String> {
     relay.line("unguarded: ");
     relay.signal(rustix::process::Signal::TERM);

@@ -1,4 +1,4 @@
-//! A chain of one with a drone of pymavlink's: a flight with an ArduCopter, and one with a PX4.
+//! Single relay with a pymavlink drone: a flight with an ArduCopter and one with a PX4.
 
 use std::time::Duration;
 
@@ -7,16 +7,16 @@ use tempfile::TempDir;
 use crate::peer::{Heard, Peer, Site, agreed, apart_m, on_earth, relay};
 use crate::process::Relay;
 
-/// What the companion asks for: position, in the air or not, target; µs.
+/// Messages requested by the companion (position, landed state, target), and their intervals, µs.
 pub(crate) const ASKED: [(u64, u64); 3] = [(33, 200_000), (245, 500_000), (87, 500_000)];
 
-/// Where the drone takes off, along the line, m: some 20 m from where it is wanted.
+/// Take-off position along the line, m: about 20 m from the setpoint.
 const START_M: f64 = 380.0;
 
-/// A moment in which a companion that sends targets sends some.
+/// Time in which a companion that streams targets sends several.
 const MOMENT: Duration = Duration::from_millis(1_500);
 
-/// A drone, its relay, and where that wants it.
+/// Drone, its relay, and the agreed position.
 pub(crate) struct Flight {
     pub(crate) drone: Peer,
     pub(crate) relay: Relay,
@@ -25,12 +25,12 @@ pub(crate) struct Flight {
 }
 
 impl Flight {
-    /// A drone on the ground at `x_m` along the line, and a relay that has found it.
+    /// Starts a drone on the ground at `x_m` along the line and a relay that has found it.
     pub(crate) fn found(kind: &str, x_m: f64) -> Self {
         Self::found_by(kind, x_m, None)
     }
 
-    /// The same, with a relay that has those options, too.
+    /// Starts a drone on the ground and a relay with additional options, which finds it.
     pub(crate) fn listening(kind: &str, more: &[&str]) -> Self {
         let mut flight = Self::started_with(kind, START_M, [None; 2], more);
         flight.relay.line("autopilot: found a");
@@ -38,7 +38,7 @@ impl Flight {
         flight
     }
 
-    /// Of which both sign with that key, where there is one.
+    /// Starts a drone and a relay that sign with `key`, if any, and find each other.
     fn found_by(kind: &str, x_m: f64, key: Option<&str>) -> Self {
         let mut flight = Self::started(kind, x_m, [key; 2]);
         if key.is_some() {
@@ -50,12 +50,12 @@ impl Flight {
         flight
     }
 
-    /// The two, the drone with the first key and the relay with the second.
+    /// Starts a drone with the first key and a relay with the second.
     pub(crate) fn started(kind: &str, x_m: f64, keys: [Option<&str>; 2]) -> Self {
         Self::started_with(kind, x_m, keys, &[])
     }
 
-    /// The same, whose relay is given `options` more.
+    /// Starts a drone with the first key, and a relay with the second key and additional `options`.
     pub(crate) fn started_with(
         kind: &str,
         x_m: f64,
@@ -88,7 +88,7 @@ impl Flight {
         }
     }
 
-    /// Armed, and in the air by its pilot.
+    /// Arms the drone and takes off under its pilot's control.
     pub(crate) fn takes_off(&mut self) {
         self.drone.order("arm");
         self.drone.order("takeoff");
@@ -96,9 +96,9 @@ impl Flight {
             .line("autopilot: in the air, not flown by the relay");
     }
 
-    /// The pilot chooses the companion's mode, which a PX4 grants to one that streams.
+    /// Chooses the companion's mode as the pilot; a PX4 grants it while targets are streamed.
     pub(crate) fn is_engaged(&mut self) {
-        // Before, the companion has seen no other mode.
+        // Before that, the companion has seen no other mode.
         self.relay.line("autopilot: ready");
         if self.is_px4 {
             self.drone.hears(Heard::is_target);
@@ -117,7 +117,7 @@ impl Flight {
         assert_eq!(there.mode(), "companion");
     }
 
-    /// The mode changes, by the pilot or by the autopilot itself.
+    /// Changes the mode, as the pilot or the autopilot does.
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay
@@ -136,7 +136,7 @@ impl Flight {
     }
 }
 
-/// Whom it speaks as, once it knows the drone's number: a computer of that drone, and nobody's autopilot.
+/// Checks the sender's identity: an onboard computer of that drone, not an autopilot.
 fn is_an_onboard_computer(drone: &Peer) {
     let from = serde_json::json!([7, 191]);
     let heard = drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == from);
@@ -144,13 +144,13 @@ fn is_an_onboard_computer(drone: &Peer) {
     assert_eq!((kind, autopilot), (&18.into(), &8.into()));
 }
 
-/// They lead from the drone to the place, without a jump.
+/// Checks that the targets lead from the drone to the place without a jump.
 fn lead_to(targets: &[Heard], place: Site) {
     let mut before = targets[0].own();
     for target in targets {
         assert_eq!(target.mode(), "companion", "{target:?}");
         let step = apart_m(target.to(), before);
-        // Half a second of the greatest speed, where the machine is so busy.
+        // Half a second at full speed, in case the machine is busy.
         assert!(step < 2.6, "{step} m at once: {target:?}");
         before = target.to();
     }
@@ -158,11 +158,11 @@ fn lead_to(targets: &[Heard], place: Site) {
     assert!(off < 0.05, "{off} m off");
 }
 
-/// Found, off the ground, engaged and led to its place, where the drone then is.
+/// Finds, engages and flies a drone to its agreed position.
 fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     let place = agreed();
     let mut flight = Flight::found_by(kind, START_M, key);
-    // A PX4 is not asked for what it flies to: it does not say it.
+    // A PX4 is not asked for its target because it does not report it.
     let asked = if kind == "px4" { &ASKED[..2] } else { &ASKED };
     flight.drone.is_asked_for(asked);
     is_an_onboard_computer(&flight.drone);
@@ -196,7 +196,7 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     (flight, place)
 }
 
-/// The autopilot is switched off and on, on the ground: it forgets what it was asked for, and its clock begins anew.
+/// Reboots the autopilot on the ground: it forgets the requests, and its clock restarts.
 fn is_switched_off_and_on(flight: &mut Flight) {
     flight.drone.order("reboot");
     flight.relay.line("autopilot: on the ground, or not armed");
@@ -205,7 +205,7 @@ fn is_switched_off_and_on(flight: &mut Flight) {
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
 }
 
-/// Nothing comes from it for more than 3 s; then it is there again.
+/// Mutes the autopilot for more than 3 s.
 fn falls_silent(flight: &mut Flight) {
     flight.drone.order("mute");
     flight
@@ -215,7 +215,7 @@ fn falls_silent(flight: &mut Flight) {
     flight.drone.order("speak");
 }
 
-/// What both sign with.
+/// Signing key of both.
 const KEY: Option<&str> = Some("c0ffee0123456789abcdef00112233445566778899aabbccddeeff0102030405");
 
 #[test]
@@ -230,14 +230,14 @@ fn an_arducopter_that_signs_is_led_to_its_place_and_let_go() {
 
 fn an_arducopter(key: Option<&str>) {
     let (mut flight, place) = led_to_its_place("arducopter", key);
-    // It has said that it flies there: to repeat it would make it wobble.
+    // The ArduCopter has confirmed its target; repeating it would make the drone wobble.
     assert!(flight.targets_for(MOMENT).is_empty(), "it is there");
 
-    // The pilot takes over.
+    // The pilot takes control.
     flight.is_released_by("pilot");
     flight.drone.order("sticks 4 0");
     assert!(flight.targets_for(2 * MOMENT).is_empty(), "it is released");
-    // And hands over: from where the drone is, back to the place.
+    // The pilot gives control back: the drone flies from its position to the agreed one.
     flight.drone.forget();
     flight.is_engaged();
     let back = flight.drone.hears(Heard::is_target);
@@ -245,13 +245,13 @@ fn an_arducopter(key: Option<&str>) {
     assert!(apart_m(back.own(), place) > 5.0, "{back:?}");
     flight.arrives(place);
 
-    // Its own failsafe.
+    // The autopilot's failsafe takes control.
     flight.is_released_by("rtl");
     assert!(flight.targets_for(MOMENT).is_empty(), "it is released");
     flight.is_engaged();
     flight.arrives(place);
 
-    // The cable is loose for some seconds. The mode has stayed, but nobody has chosen it since.
+    // The cable is loose for seconds: the mode is the same, but no pilot has chosen it since.
     falls_silent(&mut flight);
     flight
         .relay
@@ -265,7 +265,7 @@ fn an_arducopter(key: Option<&str>) {
     is_switched_off_and_on(&mut flight);
 }
 
-/// A fence: the place is not taken, and the relay says so.
+/// Checks a place outside the fence: the autopilot refuses the target, and the relay reports it.
 #[test]
 fn an_arducopter_that_refuses_is_told_of() {
     let mut flight = Flight::found("arducopter", START_M);
@@ -289,7 +289,7 @@ fn a_px4_that_signs_is_led_to_its_place_and_let_go() {
 
 fn a_px4(key: Option<&str>) {
     let (mut flight, place) = led_to_its_place("px4", key);
-    // It wants to hear of it all the while.
+    // A PX4 needs a continuous stream.
     let there = flight.targets_for(MOMENT);
     assert!(there.len() > 4, "{there:?}");
     assert!(
@@ -298,7 +298,7 @@ fn a_px4(key: Option<&str>) {
             .all(|target| apart_m(target.to(), place) < 0.05)
     );
 
-    // The pilot takes over: no more than its own place, so that the pilot can hand over.
+    // The pilot takes control: only the drone's own position is streamed, so that the pilot can give it back.
     flight.is_released_by("pilot");
     flight.drone.order("sticks 4 0");
     let own = flight.targets_for(2 * MOMENT);
@@ -315,7 +315,7 @@ fn a_px4(key: Option<&str>) {
     flight.is_engaged();
     flight.arrives(place);
 
-    // The cable is loose: the autopilot holds by itself, and would go back to the companion by itself if that streamed.
+    // The cable is loose: the autopilot holds, and would resume OFFBOARD on its own if targets were streamed.
     falls_silent(&mut flight);
     flight
         .relay
@@ -326,7 +326,7 @@ fn a_px4(key: Option<&str>) {
         !heard.iter().any(Heard::is_target),
         "nobody has asked for it"
     );
-    // The pilot takes it with the sticks, and hands over.
+    // The pilot takes control with the sticks, and gives it back.
     flight.drone.order("sticks 0 0");
     flight.drone.order("mode pilot");
     flight.drone.hears(Heard::is_target);

@@ -1,4 +1,4 @@
-//! A radio channel of ttys behind names of their own, as udev makes them: each can be pulled, and put back as another tty.
+//! Radio channel of ttys with names as made by udev: each can be unplugged, and plugged in as another tty.
 
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::pty::Pty;
 
-/// The channel. Every byte of one tty comes to all others.
+/// Radio channel that copies every byte of one tty to all others.
 #[derive(Debug)]
 pub(crate) struct Hub {
     folder: tempfile::TempDir,
@@ -40,23 +40,23 @@ impl Hub {
         hub
     }
 
-    /// A folder for whatever belongs to the channel's relays.
+    /// Returns the folder for the files of the channel's relays.
     pub(crate) fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// The name of a tty, counted from 0.
+    /// Returns the name of a tty, counted from 0.
     pub(crate) fn name(&self, index: usize) -> PathBuf {
         self.folder.path().join(format!("radio{index}"))
     }
 
-    /// Takes a tty and its name away.
+    /// Unplugs a tty and removes its name.
     pub(crate) fn pull(&self, index: usize) {
         std::fs::remove_file(self.name(index)).unwrap();
         self.ptys.lock().unwrap()[index] = None;
     }
 
-    /// Puts another tty behind the name.
+    /// Plugs another tty in under the name.
     pub(crate) fn plug(&self, index: usize) {
         let pty = Pty::new();
         crate::pty::make_raw(pty.path().to_str().unwrap());

@@ -1,4 +1,4 @@
-//! A relay with nothing to do does nothing: what it costs the processor.
+//! Processor load of an idle relay.
 
 use std::time::{Duration, Instant};
 
@@ -31,10 +31,10 @@ fn a_tty_that_takes_nothing_is_waited_for_asleep() {
     let path = pty.path().to_str().unwrap();
     let mut relay = Relay::start(&["--index", "1", "--of", "2", "--downstream", path]);
     relay.line("started: ");
-    // The facade tries it every 128 byte times: 90 times a second.
+    // The facade retries every 128 byte times: 90 times a second.
     let relays = [relay];
     assert_idle(&relays, 300);
-    // As soon as there is room again, frames come out.
+    // Frames are sent as soon as there is room again.
     let mut buffer = [0; 4096];
     let end = Instant::now() + LIMIT;
     while !pty.read(&mut buffer).contains(&0) {
@@ -43,9 +43,9 @@ fn a_tty_that_takes_nothing_is_waited_for_asleep() {
     }
 }
 
-/// Asserts that over 2 s each of `relays` needs next to no time, and wakes up `at_most` times.
+/// Asserts that each of `relays` uses almost no processor time in 2 s and wakes up at most `at_most` times.
 fn assert_idle(relays: &[Relay], at_most: u64) {
-    // Past whatever still went on.
+    // Activity of the start has ended by then.
     std::thread::sleep(Duration::from_millis(500));
     let before: Vec<_> = relays.iter().map(Relay::cost).collect();
     std::thread::sleep(Duration::from_secs(2));

@@ -19,7 +19,7 @@ const LISTENING: [&str; 5] = [
     "0.5",
 ];
 
-/// One relay is told where it is and what is heard there, by places that a pilot flew to.
+/// Feeds a relay through its FIFO with positions and powers along a pilot's flight.
 #[test]
 fn one_finds_the_interferer_by_its_fifo() {
     let scene = Scene::new(&Scenario::default(), 1).unwrap();
@@ -60,7 +60,7 @@ fn one_finds_the_interferer_by_its_fifo() {
     assert!(!believed.ends_with("0.000e0 W"), "{believed}");
 }
 
-/// What a radio hears counts in the air, and one place is not enough: the relay goes elsewhere to hear more.
+/// Checks that a radio's measurements count in the air, and that the relay moves to measure elsewhere.
 #[test]
 fn a_radio_on_the_autopilots_link_is_heard() {
     let mut flight = Flight::listening("arducopter", &LISTENING);

@@ -1,4 +1,4 @@
-//! `examples/linux_companion` and `examples/linux_ground` as processes on pseudo-terminals, against the simulated chain.
+//! Linux companion and ground station as processes on pseudo-terminals, compared with the simulated chain.
 #![cfg(target_os = "linux")]
 
 mod astray;
@@ -48,7 +48,7 @@ use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Bits of x, y, altitude and target of every relay, as the simulated chain has them.
+/// Returns the bits of x, y, altitude and target of every relay of the simulated chain.
 fn simulated(scenario: &Scenario, relays: u16) -> Vec<[u32; 4]> {
     simulated_by(Method::Align, scenario, relays)
 }
@@ -87,7 +87,7 @@ impl Chain {
         chain
     }
 
-    /// The wires, and nobody switched on.
+    /// Creates the wires, without relays.
     fn of_wires(relays: usize, noise: Noise) -> Self {
         let wire = |index: usize| Noise {
             seed: noise.seed * 100 + u64::try_from(index).unwrap(),
@@ -102,7 +102,6 @@ impl Chain {
         }
     }
 
-    /// Switches relay `index` on.
     fn relay(&self, index: usize) -> Relay {
         let (number, of) = (index.to_string(), (self.wires.len() + 1).to_string());
         let mut arguments = vec!["--index", &number, "--of", &of];
@@ -184,7 +183,7 @@ fn every_option_of_the_mission_reaches_the_relays() {
     assert_ne!(expected, simulated(&Scenario::default(), 4));
 }
 
-/// They are switched on higher up than is good for them.
+/// Starts the relays above their best altitudes.
 #[test]
 fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
     let scenario = Scenario {
@@ -217,7 +216,7 @@ fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
 
 #[test]
 fn three_processes_in_a_field_settle_where_the_simulated_chain_does() {
-    // With alpha = 2 Upsilon is (1 + beta) / I_max.
+    // Upsilon is (1 + beta) / I_max for alpha = 2.
     let beta = [(-50.0, 1.5), (400.0, 1.0), (1000.0, 3.0)];
     let beta = beta.map(|(x_m, beta)| BetaPoint {
         x_m,
@@ -240,7 +239,7 @@ fn three_processes_in_a_field_settle_where_the_simulated_chain_does() {
 fn the_tty_is_set_to_the_speed_asked_for() {
     let pty = Pty::new();
     let path = pty.path().to_str().unwrap();
-    // The last one is none of the usual.
+    // The last one is no standard rate.
     for baud in [1_200, 57_600, 115_200, 250_000] {
         let text = baud.to_string();
         let mut relay = Relay::start(&[
@@ -308,7 +307,7 @@ fn a_killed_process_is_noticed_by_both_neighbours_and_so_is_its_return() {
     );
     let settled = chain.settled();
     let killed = Instant::now();
-    // A relay that is dropped is killed.
+    // A dropped relay is killed.
     drop(chain.relays.remove(1));
     chain.relays[0].line("lost: no sign of life from relay 2 downstream");
     let first = killed.elapsed();
@@ -319,13 +318,13 @@ fn a_killed_process_is_noticed_by_both_neighbours_and_so_is_its_return() {
         first.as_millis(),
         took.as_millis()
     );
-    // By the rule at the latest after eight times `dead_after`, however long a busy machine has let the processes wait before.
+    // The loss is reported after eight times `dead_after` at the latest, however long a busy machine delays the processes.
     assert!(took < Duration::from_secs(10), "{took:?}");
 
     let mut again = chain.relay(2);
     chain.relays[0].line("back: relay 2 downstream");
     chain.relays[1].line("back: relay 2 upstream");
-    // The chain has asked for a view since its lease ran out: who was away gets its place with that.
+    // The chain has requested a view since its lease expired: the returning relay gets its position with that view.
     assert_eq!(again.settled(), settled[1]);
     drop(chain.relays.remove(0));
     let mut head = chain.relay(1);

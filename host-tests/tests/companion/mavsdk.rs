@@ -7,7 +7,6 @@ use rustix::process::Signal;
 use crate::flying::ASKED;
 use crate::peer::{Heard, Peer, agreed, apart_m, on_earth, relay};
 
-/// A port that nobody has.
 fn free_port() -> u16 {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.local_addr().unwrap().port()
@@ -31,7 +30,7 @@ fn mavsdk_is_led_to_its_place_and_let_go() {
     drone.is_asked_for(&ASKED[..2]);
     drone.order("arm");
     drone.order("air");
-    // MAVSDK says no `system_status`; a PX4 says ACTIVE.
+    // MAVSDK sends no `system_status`; a PX4 sends ACTIVE.
     drone.order("active");
     relay.line("autopilot: in the air, not flown by the relay");
     let own = drone.hears(Heard::is_target);
@@ -39,7 +38,7 @@ fn mavsdk_is_led_to_its_place_and_let_go() {
     assert!(off < 0.1, "{off} m off its own place");
     drone.order("mode offboard");
     relay.line("autopilot: flies to the relay's setpoints");
-    // Not before: a guarded relay that is not flown has no setpoint.
+    // A guarded relay has no setpoint before it is engaged.
     relay.line("setpoint: ");
     drone.hears(|heard| heard.says("relay: flies to its place"));
     let there = drone.hears(|heard| heard.is_target() && apart_m(heard.to(), place) < 0.05);

@@ -1,4 +1,4 @@
-//! What joins ttys: every byte of one comes to all others. Of two it is a wire, of more a radio channel.
+//! Medium that copies every byte of one tty to all others: two ttys form a wire, more a radio channel.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub(crate) const QUIET: Noise = Noise {
 };
 
 impl Noise {
-    /// About three in five of the longer frames do not arrive whole.
+    /// Returns noise that damages about three in five of the longer frames.
     pub(crate) const fn bad(seed: u64) -> Self {
         Self {
             loss: 0.005,
@@ -36,14 +36,14 @@ impl Noise {
     }
 }
 
-/// Bytes that were hit so far.
+/// Numbers of lost and corrupted bytes.
 #[derive(Debug, Default)]
 struct Counts {
     lost: AtomicU64,
     corrupted: AtomicU64,
 }
 
-/// Carries bytes until it is dropped; then its ttys are gone.
+/// Running medium; its ttys vanish when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Medium {
     paths: Vec<PathBuf>,
@@ -68,12 +68,11 @@ impl Medium {
         }
     }
 
-    /// The path of a tty, counted from 0.
     pub(crate) fn tty(&self, index: usize) -> &str {
         self.paths[index].to_str().unwrap()
     }
 
-    /// Adds the bytes it has lost and changed so far.
+    /// Adds the numbers of lost and corrupted bytes to `sums`.
     pub(crate) fn count(&self, sums: &mut [u64; 2]) {
         sums[0] += self.counts.lost.load(Ordering::Relaxed);
         sums[1] += self.counts.corrupted.load(Ordering::Relaxed);
@@ -120,7 +119,7 @@ fn carry(ptys: &[Pty], noise: Noise, counts: &Counts, stop: &AtomicBool) {
                         arriving.push(byte);
                     }
                 }
-                // What does not fit is lost, as on a UART that nobody reads.
+                // Bytes that do not fit are lost, as on a UART that is not read.
                 receiver.write(&arriving);
             }
         }

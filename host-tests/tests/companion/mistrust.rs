@@ -1,15 +1,15 @@
-//! An autopilot and a relay of which one signs and the other does not, or with another key: that fails, and not in silence.
+//! Autopilot and relay of which only one signs, or with different keys: the mismatch is reported.
 
 use rustix::process::Signal;
 
 use crate::flying::Flight;
 use crate::process::Ended;
 
-/// As a ground station writes it, and with white space around it.
+/// Keys as a ground station writes them, one with white space around it.
 const ONE: &str = "1111111122222222333333334444444455555555666666667777777788888888";
 const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788888889\n";
 
-/// What the relay says, and whether the drone believes anything.
+/// Returns the relay's exit, and true if the drone has accepted a frame.
 fn tells(drone: Option<&str>, relay: Option<&str>, line: &str) -> (Ended, bool) {
     let mut flight = Flight::started("arducopter", 380.0, [drone, relay]);
     flight.relay.line(line);

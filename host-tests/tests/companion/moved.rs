@@ -1,4 +1,4 @@
-//! A drone in the air whose receiver moves: the ground uploads a mission with another site.
+//! Drone in the air whose receiver moves: the ground station uploads a mission with another site.
 
 use std::time::Duration;
 
@@ -8,10 +8,10 @@ use crate::peer::{Heard, RX, Site, TX, agreed, agreed_toward, apart_m, distance_
 use crate::process::{Ended, Relay};
 use crate::signed::Files;
 
-/// Some 200 m farther on and to the right, on higher ground.
+/// Site about 200 m beyond the old receiver and to the right, on higher ground.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
-/// Less than the guard waits for the drone to have stopped.
+/// Time shorter than the guard's wait for the drone to stop.
 const STANDS: Duration = Duration::from_millis(2_500);
 
 fn text([lat, lon, amsl]: Site) -> String {
@@ -55,7 +55,7 @@ fn a_drone_stays_where_it_is_and_then_flies_along_the_new_line() {
         let adopted = flight.relay.line("adopted: flies version 1");
         let between = "between 47.4000000,8.5400000,420.000 and 47.4095000,8.5535000,440.000";
         assert!(adopted.ends_with(between), "{adopted}");
-        // It had arrived within a metre, and is told nothing but one place there.
+        // The drone is within a metre of its goal, and all targets are at one point there.
         let targets = flight.targets_for(STANDS);
         for target in &targets {
             let moved = apart_m(target.to(), targets[0].to());

@@ -1,4 +1,4 @@
-//! The number of a drone, which is the same everywhere, and its place in the chain, which is not.
+//! Drone numbers, which never change, as opposed to positions in the chain.
 
 use serde_json::Value;
 
@@ -13,7 +13,7 @@ fn start(channel: &Medium, index: usize, more: &[&str]) -> Relay {
     Relay::start(&[&options[..], &quick, more].concat())
 }
 
-/// Relay 2 is lost. Relay 3 is at place 2 of 2 then, and relay 3 still.
+/// Checks the loss of relay 2: relay 3 is the second of two then, and keeps its number 3.
 #[test]
 fn a_drone_keeps_its_number_when_its_place_in_the_chain_changes() {
     let folder = tempfile::tempdir().unwrap();
@@ -39,7 +39,6 @@ fn a_drone_keeps_its_number_when_its_place_in_the_chain_changes() {
     assert_eq!((&said["index"], &said["place"]), (&1.into(), &1.into()));
 }
 
-/// Logs of several drones are read side by side.
 #[test]
 fn every_line_names_its_relay() {
     let channel = Medium::new(3, QUIET);

@@ -1,8 +1,8 @@
-//! Wrong options: one line, status 2.
+//! Wrong options end the program with one error line and status 2.
 
 use crate::process::{Ended, Relay};
 
-/// What the later ones of [`WRONG`] are added to.
+/// Options to which the later ones of [`WRONG`] are added.
 const GOOD: &[&str] = &[
     "--index",
     "2",
@@ -14,7 +14,7 @@ const GOOD: &[&str] = &[
     "b",
 ];
 
-/// Options, and what the line must have in it.
+/// Wrong options, and the parts of the error line.
 const WRONG: &[(&[&str], &[&str])] = &[
     (
         &["--index", "0", "--of", "3"],
@@ -203,7 +203,7 @@ const WRONG: &[(&[&str], &[&str])] = &[
     (&["--nonsense"], &["--nonsense"]),
 ];
 
-/// The same, added to a relay that is given its autopilot's sites.
+/// Wrong options for a relay with an autopilot and its sites.
 const WRONG_AUTOPILOT: &[(&[&str], &[&str])] = &[
     (
         &["--autopilot", "a", "--positions", "b"],
@@ -280,7 +280,7 @@ const WRONG_AUTOPILOT: &[(&[&str], &[&str])] = &[
     (&["--speed", "5"], &["--autopilot", "not provided"]),
 ];
 
-/// Sites, and their distance.
+/// Sites and their distance.
 const SITES: &[&str] = &[
     "--site-tx",
     "47.4,8.54,420",
@@ -297,7 +297,7 @@ fn wrong_options_of_an_autopilot_are_named_with_their_value_and_range() {
     }
 }
 
-/// What cannot be opened ends it too, with its name.
+/// Checks that the error names a link that cannot be opened.
 #[test]
 fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
     for (autopilot, why) in [
@@ -331,7 +331,7 @@ fn wrong_options_are_named_with_their_value_and_range() {
     }
 }
 
-/// Refused with one line that has those parts in it.
+/// Checks that options are refused with one line that contains `parts`.
 fn is_refused(options: &[&str], parts: &[&str]) {
     let Ended {
         status,

@@ -1,4 +1,4 @@
-//! An autopilot that nobody here wrote, as a process of its own: what it hears, and orders to it.
+//! Independent autopilot as a process: the messages it receives, and commands to it.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -14,29 +14,29 @@ use uav_relay::flight::axis::Axis;
 
 use crate::process::{LIMIT, Relay, lines_of};
 
-/// Latitude, longitude, and the ground's height above the mean sea level.
+/// Latitude, longitude, and ground height above mean sea level.
 pub(crate) type Site = [f64; 3];
 
 pub(crate) const TX: Site = [47.40, 8.54, 420.0];
 pub(crate) const RX: Site = [47.41, 8.55, 431.0];
 
-/// The distance of the two, by the library, m.
+/// Returns the distance of the two sites by the library, m.
 pub(crate) fn distance_m() -> f64 {
     distance_to_m(RX)
 }
 
-/// The same to a receiver at `rx`.
+/// Returns the distance of the transmitter from a receiver at `rx`, m.
 pub(crate) fn distance_to_m(rx: Site) -> f64 {
     let [tx, rx] = [TX, rx].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
     Axis::try_new(tx, rx).unwrap().distance_m()
 }
 
-/// A place along the line on earth, by geodesics.
+/// Returns the earth coordinates of a point along the line, by geodesics.
 pub(crate) fn on_earth(x_m: f64, altitude_m: f64) -> Site {
     toward(RX, x_m, altitude_m)
 }
 
-/// A place along the line from the transmitter to a receiver at `rx`.
+/// Returns the earth coordinates of a point along the line to a receiver at `rx`.
 pub(crate) fn toward(rx: Site, x_m: f64, altitude_m: f64) -> Site {
     let earth = Geodesic::wgs84();
     let (length, azimuth, _, _): (f64, f64, f64, f64) = earth.inverse(TX[0], TX[1], rx[0], rx[1]);
@@ -48,13 +48,13 @@ pub(crate) fn toward(rx: Site, x_m: f64, altitude_m: f64) -> Site {
     ]
 }
 
-/// How far two places are from each other, m.
+/// Returns the distance of two points, m.
 pub(crate) fn apart_m(a: Site, b: Site) -> f64 {
     let level: f64 = Geodesic::wgs84().inverse(a[0], a[1], b[0], b[1]);
     level.hypot(a[2] - b[2])
 }
 
-/// The options that a relay that flies alone is given.
+/// Returns the options of a single relay.
 pub(crate) fn options(autopilot: &str) -> Vec<String> {
     let site = |site: Site| site.map(|number| number.to_string()).join(",");
     let distance = distance_m().to_string();
@@ -80,12 +80,12 @@ pub(crate) fn relay(autopilot: &str, more: &[&str]) -> Relay {
     Relay::start(&options)
 }
 
-/// Where a relay that flies alone has its place, as one without an autopilot has it.
+/// Returns the agreed position of a single relay without an autopilot.
 pub(crate) fn agreed() -> Site {
     agreed_toward(RX)
 }
 
-/// The same where the receiver is at `rx`.
+/// Returns the agreed position of a single relay for a receiver at `rx`.
 pub(crate) fn agreed_toward(rx: Site) -> Site {
     let distance = distance_to_m(rx).to_string();
     let mut relay = Relay::start(&["--index", "1", "--of", "1", "--distance", &distance]);
@@ -94,7 +94,7 @@ pub(crate) fn agreed_toward(rx: Site) -> Site {
     toward(rx, x_m.into(), altitude_m.into())
 }
 
-/// The autopilot.
+/// Running autopilot.
 #[derive(Debug)]
 pub(crate) struct Peer {
     child: Child,
@@ -102,7 +102,7 @@ pub(crate) struct Peer {
     lines: Receiver<String>,
 }
 
-/// A message that it has heard, with its fields.
+/// Received message with its fields.
 #[derive(Clone, Debug)]
 pub(crate) struct Heard(pub(crate) Value);
 
@@ -111,7 +111,6 @@ impl Heard {
         self.0["mavpackettype"] == name
     }
 
-    /// True for every message of the companion.
     pub(crate) fn is_any(&self) -> bool {
         self.0["own"].is_object()
     }
@@ -126,24 +125,23 @@ impl Heard {
         self.is("SET_POSITION_TARGET_GLOBAL_INT")
     }
 
-    /// Whether it says that to the operator.
+    /// Returns true for a STATUSTEXT with `text`.
     pub(crate) fn says(&self, text: &str) -> bool {
         self.is("STATUSTEXT") && self.0["text"] == text
     }
 
-    /// The message that it asks for, and µs from one to the next.
+    /// Returns the requested message and its interval, µs, of a message request.
     pub(crate) fn asks_for(&self) -> Option<(u64, u64)> {
         let asks = self.is("COMMAND_LONG") && self.0["command"] == 511;
         let number = |name: &str| self.0[name].as_f64().unwrap() as u64;
         asks.then(|| (number("param1"), number("param2")))
     }
 
-    /// Whether a target moves.
     pub(crate) fn has_velocity(&self) -> bool {
         self.0["type_mask"].as_u64().unwrap() & 0b11_1000 == 0
     }
 
-    /// Where a target is.
+    /// Returns the position of a target.
     pub(crate) fn to(&self) -> Site {
         let number = |name: &str| self.0[name].as_f64().unwrap();
         [
@@ -153,13 +151,13 @@ impl Heard {
         ]
     }
 
-    /// Where the drone was then.
+    /// Returns the drone's position at reception.
     pub(crate) fn own(&self) -> Site {
         let at = &self.0["own"]["at"];
         [0, 1, 2].map(|part| at[part].as_f64().unwrap())
     }
 
-    /// Whether a target is a place where the drone has said to be, not long before.
+    /// Returns true if a target is at a position that the drone has recently reported.
     pub(crate) fn is_to_own_place(&self) -> bool {
         let said = self.0["own"]["said"].as_array().unwrap().iter();
         let mut said = said.map(|at| [0, 1, 2].map(|part| at[part].as_f64().unwrap()));
@@ -195,12 +193,12 @@ impl Peer {
         writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
     }
 
-    /// The next message that is `wanted`; those before it are passed over.
+    /// Waits for the next message that is `wanted`, ignoring those before.
     pub(crate) fn hears(&self, wanted: impl Fn(&Heard) -> bool) -> Heard {
         self.hears_until(wanted).pop().unwrap()
     }
 
-    /// All up to the next message that is `wanted`.
+    /// Returns all messages up to the next one that is `wanted`.
     pub(crate) fn hears_until(&self, wanted: impl Fn(&Heard) -> bool) -> Vec<Heard> {
         let end = Instant::now() + LIMIT;
         let mut all = Vec::new();
@@ -219,14 +217,14 @@ impl Peer {
         }
     }
 
-    /// All that it hears in that time, after what it has heard before.
+    /// Returns the messages received in `span`, without earlier ones.
     pub(crate) fn hears_for(&self, span: Duration) -> Vec<Heard> {
         self.forget();
         std::thread::sleep(span);
         self.so_far()
     }
 
-    /// What it has heard that nobody asked for.
+    /// Returns the messages received and not yet returned.
     pub(crate) fn so_far(&self) -> Vec<Heard> {
         let lines = self.lines.try_iter();
         lines
@@ -238,7 +236,7 @@ impl Peer {
         drop(self.so_far());
     }
 
-    /// Waits until it was asked for those messages, in any order.
+    /// Waits until the companion has requested the messages `wanted`, in any order.
     pub(crate) fn is_asked_for(&self, wanted: &[(u64, u64)]) {
         let mut left = wanted.to_vec();
         while !left.is_empty() {
@@ -250,7 +248,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // It ends when there are no orders any more; one that hangs is killed.
+        // The script ends when its commands end; if it hangs it is killed.
         self.orders = None;
         let _ = self.child.kill();
         let _ = self.child.wait();

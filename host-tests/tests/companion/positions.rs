@@ -1,4 +1,4 @@
-//! Drones that are told where they are, through a FIFO.
+//! Relays that receive their drones' positions through a FIFO.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -23,7 +23,7 @@ pub(crate) fn write(path: &Path, text: &str) {
     file.write_all(text.as_bytes()).unwrap();
 }
 
-/// Their first setpoints are where they are, and their last ones where they would be without a guard.
+/// Checks that first setpoints are the drones' positions, and last ones those of an unguarded chain.
 #[test]
 fn two_that_know_where_they_are_make_room_for_each_other() {
     let mut free = Chain::start(2, QUIET, &[]);
@@ -42,7 +42,7 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
         chain.options = vec!["--positions".to_owned(), fifo.display().to_string()];
         chain.relays.push(chain.relay(index));
     }
-    // Where the drones are: at their setpoints, once they have some.
+    // The drones are always at their latest setpoints.
     let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
     for relay in &mut chain.relays {
         let line = relay.line("guarded: setpoints keep drones apart on their way, by --positions");
@@ -90,7 +90,7 @@ fn lines_that_are_no_position_are_counted_and_said_once() {
         &format!("x y z\n\n1 2\n1 2 3 4\n1 2 NaN\n1 2 inf\n{long}\n"),
     );
     relay.line("position: \"x y z\" is not x_m y_m altitude_m");
-    // The last one counts, whatever comes in pieces.
+    // The last line counts, even if it arrives in pieces.
     write(&fifo, "900 0 20\n10");
     write(&fifo, "0 0 20\nnonsense\n");
     let first = relay.line("setpoint: ");

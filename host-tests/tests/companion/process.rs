@@ -1,4 +1,4 @@
-//! A relay, or the ground, as a process: its lines, its end, its use of the processor. It is killed when dropped.
+//! Relay or ground station as a process: its lines, exit and processor load. It is killed when dropped.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
@@ -11,7 +11,7 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::binary::{companion, ground};
 
-/// How long anything may take that should be done in a moment: this machine may be busy.
+/// Timeout of any quick action on a busy machine.
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 #[derive(Debug)]
@@ -23,10 +23,10 @@ pub(crate) struct Relay {
     name: String,
 }
 
-/// Status and lines of a relay that has ended.
+/// Exit status and output of a process.
 #[derive(Debug)]
 pub(crate) struct Ended {
-    /// None: a signal.
+    /// Exit status; `None` after a signal.
     pub(crate) status: Option<i32>,
     pub(crate) stdout: Vec<String>,
     pub(crate) stderr: Vec<String>,
@@ -70,7 +70,7 @@ impl Relay {
         }
     }
 
-    /// The next line with `part` in it, after the one that was returned last.
+    /// Waits for the next line that contains `part`.
     pub(crate) fn line(&mut self, part: &str) -> String {
         let end = Instant::now() + LIMIT;
         loop {
@@ -89,13 +89,13 @@ impl Relay {
         }
     }
 
-    /// Whether a line that has come so far has `part` in it.
+    /// Returns true if a line so far contains `part`.
     pub(crate) fn has_said(&mut self, part: &str) -> bool {
         self.seen.extend(self.lines.try_iter());
         self.seen.iter().any(|line| line.contains(part))
     }
 
-    /// The lines with `part` in them that have come since a line was asked for last.
+    /// Returns the lines that contain `part` since the last call.
     pub(crate) fn lines_with(&mut self, part: &str) -> Vec<String> {
         let lines: Vec<String> = self.lines.try_iter().collect();
         self.seen.extend(lines.iter().cloned());
@@ -105,14 +105,14 @@ impl Relay {
             .collect()
     }
 
-    /// Bits of x, y, altitude and target, once the relay has them.
+    /// Returns the bits of x, y, altitude and target, once the relay has agreed on them.
     pub(crate) fn settled(&mut self) -> [u32; 4] {
         let setpoint = bits(&self.line("setpoint: "));
         let target = bits(&self.line("converged: "));
         [setpoint[0], setpoint[1], setpoint[2], target[0]]
     }
 
-    /// Waits until it has agreed on these bits of x, y, altitude and target: it may agree on others on its way there.
+    /// Waits until the relay has agreed on these bits of x, y, altitude and target, possibly after others.
     pub(crate) fn settles_at(&mut self, expected: [u32; 4]) {
         let mut place = Vec::new();
         loop {
@@ -137,7 +137,7 @@ impl Relay {
         Pid::from_child(&self.child)
     }
 
-    /// Waits for its end.
+    /// Waits for the exit.
     pub(crate) fn end(mut self) -> Ended {
         let end = Instant::now() + LIMIT;
         let status = loop {
@@ -156,11 +156,11 @@ impl Relay {
         }
     }
 
-    /// Processor time and how often it went to sleep, so far.
+    /// Returns the processor time and the number of voluntary sleeps so far.
     pub(crate) fn cost(&self) -> (Duration, u64) {
         let file = |name| std::fs::read_to_string(format!("/proc/{}/{name}", self.child.id()));
         let stat = file("stat").unwrap();
-        // Fields 14 and 15; the name, field 2, is in parentheses and may hold anything.
+        // Fields 14 and 15. Field 2, the name, is in parentheses and may contain any characters.
         let fields: Vec<&str> = stat[stat.rfind(')').unwrap() + 2..].split(' ').collect();
         let ticks: u64 = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
         let millis = ticks * 1_000 / rustix::param::clock_ticks_per_second();
@@ -175,13 +175,13 @@ impl Relay {
 
 impl Drop for Relay {
     fn drop(&mut self) {
-        // It may have ended already.
+        // The process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// The numbers in a line that stand there as bits.
+/// Returns the numbers that a line prints as bits.
 pub(crate) fn bits(line: &str) -> Vec<u32> {
     let mut parts = line.split("(0x");
     parts.next();

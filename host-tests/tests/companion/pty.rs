@@ -1,4 +1,4 @@
-//! A pseudo-terminal: a tty for a relay at one side, its wire at the other.
+//! Pseudo-terminal: a tty for a relay on one side, its wire on the other.
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
@@ -9,18 +9,18 @@ use rustix::io::{Errno, ioctl_fionbio};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// Both sides. It is left as the system makes it, cooked and with echo: to make it raw is up to the relay.
+/// Pseudo-terminal in the system's default mode: cooked and with echo. The relay has to make it raw.
 #[derive(Debug)]
 pub(crate) struct Pty {
     pub(crate) wire: OwnedFd,
     path: PathBuf,
-    /// Keeps the tty there while no relay has it open, as a real one is.
+    /// Handle that keeps the tty in existence while no relay has it open.
     tty: OwnedFd,
 }
 
 impl Pty {
     pub(crate) fn new() -> Self {
-        // Not for the relays to inherit: they would keep their own ttys alive.
+        // Relays must not inherit the handle, which would keep their own ttys alive.
         let wire = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&wire).unwrap();
         unlockpt(&wire).unwrap();
@@ -39,12 +39,12 @@ impl Pty {
         &self.path
     }
 
-    /// The speed its tty is set to, bit/s.
+    /// Returns the tty's speed, bit/s.
     pub(crate) fn baud(&self) -> u32 {
         tcgetattr(&self.tty).unwrap().output_speed()
     }
 
-    /// What the relay has sent, as far as it fits into `buffer`.
+    /// Reads bytes that the relay has sent, as many as fit into `buffer`.
     pub(crate) fn read<'a>(&self, buffer: &'a mut [u8]) -> &'a [u8] {
         match rustix::io::read(&self.wire, &mut *buffer) {
             Ok(count) => &buffer[..count],
@@ -53,7 +53,7 @@ impl Pty {
         }
     }
 
-    /// Hands bytes to the relay and says how many: a tty that nobody reads overflows in the end.
+    /// Writes bytes to the relay. Returns their number, since a tty that is not read overflows.
     pub(crate) fn write(&self, bytes: &[u8]) -> usize {
         match rustix::io::write(&self.wire, bytes) {
             Ok(count) => count,
@@ -62,7 +62,7 @@ impl Pty {
         }
     }
 
-    /// Sends as if the relay did, until the tty takes no more even after the kernel has moved on what it had.
+    /// Fills the relay's output until neither the tty nor the kernel's buffer has room.
     pub(crate) fn stuff(&self) {
         let mut idle = 0;
         while idle < 10 {
@@ -78,7 +78,7 @@ impl Pty {
     }
 }
 
-/// Makes a tty raw that nobody has opened yet: on a channel that others use, it would send them back what it hears.
+/// Makes a tty raw before a relay opens it; otherwise it would echo all received bytes onto the channel.
 pub(crate) fn make_raw(path: &str) {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let tty = open(path, flags, Mode::empty()).unwrap();

@@ -1,4 +1,4 @@
-//! Processes whose frames are signed.
+//! Relay processes with signed frames.
 
 use std::path::{Path, PathBuf};
 
@@ -9,14 +9,14 @@ use crate::medium::{Noise, QUIET};
 use crate::process::{Ended, Relay};
 use crate::{Chain, simulated};
 
-/// Writes a key as a key is to be kept: for its owner alone.
+/// Writes a key file that only its owner can read.
 pub(crate) fn write_key(file: impl AsRef<Path>, key: &str) {
     use std::os::unix::fs::PermissionsExt as _;
     std::fs::write(&file, key).unwrap();
     std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
 }
 
-/// A file with a key, and a folder for the epochs of relays.
+/// Folder with a key file and the epoch files of relays.
 pub(crate) struct Files(tempfile::TempDir);
 
 impl Files {
@@ -59,7 +59,7 @@ fn start(chain: &mut Chain, files: &Files, index: usize) -> Relay {
     chain.relay(index)
 }
 
-/// Through noise too, and when one of them is switched off and on.
+/// Checks quiet and noisy wires, and a reboot.
 #[test]
 fn three_that_sign_settle_where_the_simulated_chain_does() {
     for noise in [QUIET, Noise::bad(3)] {
@@ -71,13 +71,13 @@ fn three_that_sign_settle_where_the_simulated_chain_does() {
             .collect();
         assert!(chain.relays[1].line("signed: ").ends_with("epoch 42"));
         assert_eq!(files.epoch("epoch2"), 42);
-        // It writes the file before it says so.
+        // The relay writes the file before the log line.
         chain.relays[0].line("signed: ");
         assert!(files.epoch("epoch1") > 1_700_000_000, "of the clock");
         let expected = simulated(&Scenario::default(), 3);
         assert_eq!(chain.settled(), expected);
 
-        // The middle one again: it is heard, and the leader, too, agrees with it once it has been switched on again.
+        // Relay 2 and then the leader restart; both are accepted and agree again.
         for index in [2, 1] {
             let old = chain.relays.remove(index - 1);
             old.signal(Signal::TERM);
@@ -140,7 +140,7 @@ fn a_bad_key_or_epoch_is_named() {
         std::fs::read_to_string(files.path("text")).unwrap(),
         "yesterday"
     );
-    // One without the other is an option that is missing.
+    // Either option requires the other.
     for given in ["--key-file", "--epoch-file"] {
         let ended = Relay::start(&["--index", "1", "--of", "1", given, "x"]).end();
         assert_eq!(ended.status, Some(2));

@@ -1,6 +1,4 @@
-//! Three companions on one channel, with everything that can happen to a service happening to them again and again: nobody leaves the air.
-//!
-//! A minute of it; `COMPANION_SECONDS=600` makes it ten.
+//! Soak test of three companions on one channel with repeated faults, for a minute or `COMPANION_SECONDS`.
 
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -18,17 +16,17 @@ use crate::hub::Hub;
 use crate::process::{LIMIT, Relay, lines_of};
 use crate::stays::{asked, fill_disk, until};
 
-/// What was seen of one relay, over and over.
+/// Statistics of one relay's status answers.
 #[derive(Debug, Default)]
 struct Seen {
     answers: u64,
     slowest: Duration,
-    /// Answers without a place to be at, after the first with one.
+    /// Answers without a setpoint after the first one with a setpoint.
     placeless: u64,
     failed: u64,
 }
 
-/// Asks a relay five times a second until it is told to stop.
+/// Queries a relay's status five times a second until `stop` is set.
 fn watch(socket: &Path, stop: &AtomicBool) -> Seen {
     let mut seen = Seen::default();
     while !stop.load(Ordering::Relaxed) {
@@ -57,7 +55,6 @@ impl Drop for Killed {
     }
 }
 
-/// The options of relay `index` of the channel.
 fn options(hub: &Hub, index: usize) -> Vec<String> {
     let file = |name: &str| {
         hub.folder()
@@ -83,24 +80,24 @@ fn start(arguments: &[String]) -> Relay {
     Relay::start(&arguments)
 }
 
-/// Whether it is at its place in a chain of three.
+/// Returns true if the relay has its setpoint and a lease in a chain of three.
 fn of_three(said: &Value) -> bool {
     said["relay"]["relays"] == 3
         && said["relay"]["setpoint"].is_object()
         && said["relay"]["has_lease"] == true
 }
 
-/// All that happens to them, once: `third` is the last of `pids`.
+/// Runs one round of faults; `third` is the last of `pids`.
 fn round(hub: &Hub, sockets: &[PathBuf], pids: [Pid; 3], third: &mut Relay) {
     for pid in pids {
         kill_process(pid, Signal::HUP).unwrap();
     }
-    // While the disk of the third is full the second is lost: another view, and another record that cannot be written.
+    // Relay 2 is lost while relay 3's disk is full: the new view needs a record that cannot be written.
     fill_disk(pids[2], true);
     hub.pull(1);
     let line = third.line("cannot be written: ");
     assert!(line.contains("file: --view-file /"), "{line}");
-    // Lines of 2 KB each that nobody takes: 64 KiB in the pipe, 1 024 of them in the queue.
+    // Lines of 2 KB each are not read: 64 KiB fit into the pipe, 1 024 lines into the queue.
     for _ in 0..400 {
         kill_process(pids[0], Signal::USR1).unwrap();
         std::thread::sleep(Duration::from_millis(10));
@@ -113,7 +110,7 @@ fn round(hub: &Hub, sockets: &[PathBuf], pids: [Pid; 3], third: &mut Relay) {
     }
 }
 
-/// The reader of the first goes on, and is told of what it has missed: how many lines said so, once `dropped` is above 0.
+/// Resumes reading of the first relay's lines. Returns the number of reports on dropped lines.
 fn told(pid: Pid, reader: PipeReader, dropped: u64) -> usize {
     let lines = lines_of(reader);
     let end = Instant::now() + LIMIT;
@@ -144,7 +141,7 @@ fn three_stay_in_the_air_whatever_happens_to_their_ports_readers_and_disks() {
     let hub = Hub::new(3);
     let sockets = [1, 2, 3].map(|index| hub.folder().join(format!("status{index}")));
 
-    // The lines of the first go to a reader that does not read.
+    // The first relay's lines go to a reader that does not read.
     let (reader, writer) = std::io::pipe().unwrap();
     let first = Command::new(companion())
         .args(options(&hub, 1))

@@ -1,4 +1,4 @@
-//! Stations that stay at their posts, with three relays in the air: what is measured on the ground is known in the air.
+//! Ground stations on duty with three relays in the air, which receive their measurements.
 
 use std::fmt::Write as _;
 use std::net::UdpSocket;
@@ -17,7 +17,7 @@ use crate::process::{Ended, LIMIT, Relay};
 use crate::signed::Files;
 use crate::stays::{asked, until};
 
-/// Three relays and two stations on one channel, and their files.
+/// Three relays and two stations on one channel, with their files.
 struct Field {
     hub: Hub,
     files: Files,
@@ -59,7 +59,7 @@ impl Field {
         program(&options)
     }
 
-    /// Relay `index`, with a FIFO for what it hears.
+    /// Starts relay `index`, with a FIFO for its measurements.
     fn relay(&self, index: usize) -> Relay {
         let number = index.to_string();
         let fifo = fifo(self.hub.folder(), &format!("positions{index}"));
@@ -89,13 +89,12 @@ fn is_about(said: &Value, expected: f64) -> bool {
         .is_some_and(|said| (said / expected - 1.0).abs() < 1e-3)
 }
 
-/// A free port, until somebody takes it.
 fn port() -> u16 {
     let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     socket.local_addr().unwrap().port()
 }
 
-/// What each of three relays hears over three places, W.
+/// Returns measurements of relay `relay` at three positions, W.
 fn heard(scene: &Scene, relay: usize) -> String {
     let mut lines = String::new();
     for step in 0..3_u8 {
@@ -140,7 +139,7 @@ fn three_relays_know_what_both_stations_measure() {
     rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm");
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     let to = format!("127.0.0.1:{port}");
-    // As a spectrum analyser shows it.
+    // Notation of a spectrum analyser.
     let tx_dbm = format!("{} dBm", 10.0 * f64::log10(tx_w) + 30.0);
     meter.send_to(tx_dbm.as_bytes(), &to).unwrap();
     std::fs::write(&level, format!("1\nreceiver {rx_w:e}\nhalf a li")).unwrap();
@@ -156,7 +155,7 @@ fn three_relays_know_what_both_stations_measure() {
         "both levels are known after {} ms",
         begun.elapsed().as_millis()
     );
-    // What the receiver hears stands in what the chain believes.
+    // The chain's estimate includes the receiver's measurement.
     for (index, relay) in relays.iter_mut().enumerate() {
         write(
             &field.path(&format!("positions{}", index + 1)),
@@ -168,7 +167,7 @@ fn three_relays_know_what_both_stations_measure() {
         assert!((at / rx_w - 1.0).abs() < 0.05, "{line}");
     }
 
-    // Its port is pulled and put back, and it is asked to open its log again; then it measures something else.
+    // The station's port is replugged and its log reopened; then it measures another level.
     field.hub.pull(4);
     rx.line("port lost: --tty ");
     rx.signal(Signal::HUP);
@@ -195,7 +194,7 @@ fn three_relays_know_what_both_stations_measure() {
     let status: Value = serde_json::from_str(&status).unwrap();
     assert_eq!(status["measurements"]["handed_on"], 1, "{status:#}");
 
-    // A relay that is gone is missed, since it is told of what is measured.
+    // A lost relay is reported because measurements are sent to it.
     drop(relays.remove(2));
     let end = Instant::now() + LIMIT;
     while !rx.has_said("lost: relay 3 does not answer") {
@@ -271,7 +270,7 @@ fn options_of_a_station_that_are_wrong_are_named() {
     }
 }
 
-/// An upload by a station that stands: what comes of it is said, and it stands on.
+/// Checks that a station uploads a mission, reports the result and stays on duty.
 #[test]
 fn a_station_that_stands_uploads_and_stands_on() {
     let files = Files::new();

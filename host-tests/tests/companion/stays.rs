@@ -1,4 +1,4 @@
-//! What does not end a relay, nor holds it up: a port that vanishes, a reader that stops or goes, a full disk, a hang-up.
+//! Faults that neither end nor delay a relay: vanished ports, stopped readers, full disks, hang-ups.
 
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
@@ -16,7 +16,7 @@ use crate::process::{Ended, LIMIT, Relay};
 use crate::pty::Pty;
 use crate::signed::Files;
 
-/// What a relay says by its socket.
+/// Returns the status answer of a relay's socket.
 pub(crate) fn asked(socket: &Path) -> Value {
     let end = Instant::now() + LIMIT;
     let mut stream = loop {
@@ -27,14 +27,14 @@ pub(crate) fn asked(socket: &Path) -> Value {
         }
     };
     stream.set_read_timeout(Some(LIMIT)).unwrap();
-    // No command follows, so the state comes at once.
+    // No command follows, so the answer comes at once.
     let _ = stream.shutdown(Shutdown::Write);
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
 
-/// Asks until it says so.
+/// Queries the status until the condition holds.
 pub(crate) fn until(socket: &Path, is_so: impl Fn(&Value) -> bool) -> Value {
     let end = Instant::now() + LIMIT;
     loop {
@@ -83,7 +83,7 @@ fn a_port_that_vanishes_comes_back_and_the_other_one_goes_on() {
     assert!(again.is_empty(), "once each: {again:?}");
 }
 
-/// A relay whose standard output and error are these; told to end, it does.
+/// Process with given standard output and error; it terminates on drop.
 struct Bare(Child);
 
 impl Bare {
@@ -121,7 +121,7 @@ impl Drop for Bare {
     }
 }
 
-/// A reader that stops fills the pipe, then the queue; one that goes closes it; `/dev/full` takes nothing.
+/// Checks a reader that stops (full pipe and queue), one that exits (closed pipe), and `/dev/full`.
 fn goes_on_where_nobody_reads(program: &Path, options: &[&str]) {
     let (kept, stopped) = std::io::pipe().unwrap();
     let (gone, closed) = std::io::pipe().unwrap();
@@ -140,7 +140,7 @@ fn goes_on_where_nobody_reads(program: &Path, options: &[&str]) {
         let options = [options, &["--status-socket", socket.to_str().unwrap()]].concat();
         let relay = Bare::start(program, &options, stdout, Stdio::null());
         asked(&socket);
-        // Every one is a line of some 1 500 bytes: 64 KiB in the pipe, 1 024 lines in the queue.
+        // Each line has some 1 500 bytes: 64 KiB fit into the pipe, 1 024 lines into the queue.
         let end = Instant::now() + LIMIT;
         let mut dropped = 0;
         while dropped < 10 {
@@ -170,7 +170,6 @@ fn nobody_who_reads_is_no_reason_to_leave_the_post() {
     goes_on_where_nobody_reads(ground(), &options);
 }
 
-/// Nobody reads what it says of a mistake, either.
 #[test]
 fn a_closed_standard_error_is_no_panic() {
     for options in [&["--index", "0"][..], &["--help"], &["--version"]] {
@@ -191,7 +190,7 @@ fn a_closed_standard_error_is_no_panic() {
     }
 }
 
-/// Who connects and reads nothing, or sends, is not waited for.
+/// Checks that clients that do not read, or that send data, do not block the others.
 #[test]
 fn the_socket_answers_one_object_whoever_else_is_stuck() {
     let folder = tempfile::tempdir().unwrap();
@@ -211,7 +210,7 @@ fn the_socket_answers_one_object_whoever_else_is_stuck() {
     assert_eq!(said["relay"]["downstream"]["name"], Value::Null);
     assert!(said["relay"]["setpoint"]["x_m"].is_f64(), "{said:#}");
     assert_eq!(said["relay"]["counters"]["refused"], 0);
-    // A second one of the same name is refused; a name that was left behind is not.
+    // A second process with the same name is refused; a stale name is not.
     let Ended { status, stderr, .. } = Relay::start(&options).end();
     assert_eq!((status, stderr.len()), (Some(1), 1));
     assert!(stderr[0].contains("is in use already"), "{stderr:?}");
@@ -264,7 +263,7 @@ fn the_log_is_moved_away_and_opened_again_at_a_hang_up() {
     assert!(has(&moved, "started")["index"] == 1);
 }
 
-/// Seconds that a time of RFC 3339 in UTC is away from now, by the system's own `date`.
+/// Difference between an RFC 3339 time in UTC and now, s, by the system's `date`.
 struct Stamp(u64);
 
 impl std::str::FromStr for Stamp {
@@ -287,7 +286,7 @@ impl std::str::FromStr for Stamp {
     }
 }
 
-/// From now on no file of that process may grow, as on a full disk; or again.
+/// Prevents the growth of any file of that process, as on a full disk, or permits it again.
 pub(crate) fn fill_disk(relay: Pid, full: bool) {
     let limit = Rlimit {
         current: full.then_some(0),
@@ -346,7 +345,7 @@ fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
     assert_eq!(first.end().status, Some(0));
 }
 
-/// A disk that takes for ever: what is to become the file of the views is a FIFO that nobody reads.
+/// Checks a disk that blocks: the new view file is a FIFO that is not read.
 #[test]
 fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
     let hub = Hub::new(2);
@@ -386,7 +385,7 @@ fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
     assert!(slowest < Duration::from_secs(1), "{slowest:?}");
     assert!(asked(&socket)["links"]["ports"][0]["bytes_in"].as_u64() > Some(0));
     assert!(!second.has_said("converged: "));
-    // Somebody takes it, but a FIFO keeps nothing: it is tried again, with a file this time.
+    // A FIFO stores nothing: the relay writes again, into a file this time.
     drop(std::fs::File::open(&slow).unwrap());
     let line = first.line("cannot be written: ");
     assert!(line.contains("file: --view-file /"), "{line}");
@@ -401,7 +400,7 @@ fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
     assert!(views.exists() && !slow.exists());
 }
 
-/// What a start cannot keep is no start: a number of an epoch must not be used twice.
+/// Checks that the start fails if the epoch cannot be stored, because an epoch must not be used twice.
 #[test]
 fn an_epoch_that_cannot_be_kept_is_refused_at_the_start() {
     let folder = tempfile::tempdir().unwrap();

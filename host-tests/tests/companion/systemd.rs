@@ -1,4 +1,4 @@
-//! The companion as a service: its unit, and what it tells systemd.
+//! Companion as a systemd service: its unit, and its notifications.
 
 use std::os::unix::net::UnixDatagram;
 use std::path::Path;
@@ -14,14 +14,13 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Where systemd is installed it finds nothing to say about the unit.
 #[test]
 fn the_unit_is_one_that_systemd_takes() {
     let unit = root().join("examples/linux_companion/uav-relay@.service");
     let text = std::fs::read_to_string(unit).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("uav-relay@.service");
-    // The program is looked for, and is not installed here.
+    // The unit's program is not installed here.
     let installed = "/usr/local/bin/linux_companion";
     assert!(text.contains(installed));
     let text = text.replace(installed, companion().to_str().unwrap());
@@ -46,14 +45,14 @@ fn the_unit_is_one_that_systemd_takes() {
     assert!(said.contains("uav-relay@"), "it verifies anything: {said}");
 }
 
-/// The options in the unit, and the file that it names, are such that the program takes.
+/// Checks that the program accepts the unit's options and the example file.
 #[test]
 fn the_example_file_is_whole() {
     let file = root().join("examples/drone.toml");
     let options = ["--config", file.to_str().unwrap(), "--index", "2"];
     let relay = crate::process::Relay::start(&options);
     let ended = relay.end();
-    // All that is wrong is that there is no key.
+    // The only mistake is the missing key.
     assert_eq!(ended.status, Some(2));
     let key = root().join("examples/network7.key");
     let line = format!("--key-file {}: cannot be read: ", key.display());

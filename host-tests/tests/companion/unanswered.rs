@@ -1,4 +1,4 @@
-//! An autopilot that does not answer is said: after 3 s, once, with what to look at, and in the status.
+//! Report on an autopilot that does not answer: after 3 s, once, with hints, and in the status.
 
 use std::net::UdpSocket;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::process::Relay;
 use crate::pty::Pty;
 use crate::stays::{asked, until};
 
-/// How late a line may be on a busy machine.
+/// Greatest delay of a line on a busy machine, s.
 const LATE_S: f64 = 1.5;
 
 struct Unanswered {
@@ -39,7 +39,7 @@ impl Unanswered {
         &self.socket
     }
 
-    /// The line with `part` in it comes after 3 s, has those parts, and is in the status.
+    /// Checks that the line comes after 3 s, contains `parts`, and is in the status.
     fn is_said(&mut self, parts: &[&str]) {
         let line = self.relay.line(parts[0]);
         let seconds = seconds(&line);
@@ -54,7 +54,7 @@ impl Unanswered {
         assert_eq!(autopilot["state"], "silent", "{autopilot}");
     }
 
-    /// Nothing more is said of it for 7 s, in which it sleeps.
+    /// Checks that no further line comes for 7 s, in which the relay sleeps.
     fn is_said_once(&mut self) {
         let (time, sleeps) = self.relay.cost();
         std::thread::sleep(Duration::from_secs(7));
@@ -73,7 +73,7 @@ impl Unanswered {
     }
 }
 
-/// The time since the start that a line begins with.
+/// Returns the time since the start that begins a line.
 fn seconds(line: &str) -> f64 {
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }
@@ -93,7 +93,7 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
         "connection refused",
     ]);
     unanswered.is_said_once();
-    // Once it is there it is found.
+    // The autopilot is found once it is running.
     let drone = ports.drone(9);
     unanswered.relay.line("autopilot: found a PX4");
     unanswered.relay.line("autopilot: on the ground");
@@ -113,7 +113,7 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
     assert_eq!(unanswered.relay.end().status, Some(0));
 }
 
-/// As a PX4 that answers somebody else.
+/// Simulates a PX4 that answers another program.
 #[test]
 fn a_udp_port_that_does_not_answer_is_said_once() {
     let ports = Ports::apart(1_000);
@@ -140,7 +140,7 @@ fn a_tty_that_does_not_answer_is_said_once() {
     unanswered.is_said_once();
 }
 
-/// What comes is no MAVLink 2, as with a wrong baud rate.
+/// Simulates a wrong baud rate, with bytes that are no MAVLink 2.
 #[test]
 fn noise_is_told_from_silence() {
     let ports = Ports::apart(1_000);
@@ -157,7 +157,7 @@ fn noise_is_told_from_silence() {
     assert!(!unanswered.relay.has_said("nobody answers"), "bytes came");
 }
 
-/// A ground station, a radio, a plane: they speak, and are no autopilot that grants control.
+/// Simulates a ground station, radio or plane, which are no autopilots that grant control.
 #[test]
 fn others_are_told_from_an_autopilot() {
     let ports = Ports::apart(1_000);

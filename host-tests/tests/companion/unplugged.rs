@@ -1,4 +1,4 @@
-//! An autopilot whose port vanishes in flight and comes back under the same name.
+//! Autopilot whose port vanishes in flight and returns under the same name.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ fn a_port_that_vanishes_is_opened_again() {
         assert!(flight.relay.lines_with("is back").is_empty(), "it is not");
         flight.drone.order("plug");
         flight.relay.line("is back");
-        // It is in GUIDED still, and its pilot has to choose that again.
+        // The autopilot is still in GUIDED, and its pilot has to choose that mode again.
         flight.relay.line("autopilot: cannot be engaged");
         flight.drone.order("mode pilot");
         flight.is_engaged();
@@ -34,7 +34,7 @@ fn a_port_that_vanishes_is_opened_again() {
     let gone = flight.relay.lines_with("is gone");
     assert!(gone.is_empty(), "once each: {gone:?}");
 
-    // An autopilot that was switched off with its port is asked again for what it is to say.
+    // Messages are requested again from an autopilot that was switched off with its port.
     flight.drone.order("unplug");
     flight.relay.line("is gone; tried again until it is back");
     flight.drone.order("reboot");

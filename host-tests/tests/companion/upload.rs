@@ -1,4 +1,4 @@
-//! A new mission from a ground process to relays that keep it, and fly it when they are switched on again.
+//! Upload of a mission from a ground station to relays that store it, and fly it after a restart.
 
 use rustix::process::Signal;
 use uav_relay::Upload;
@@ -12,7 +12,7 @@ use crate::pty::{Pty, make_raw};
 use crate::signed::Files;
 use crate::simulated;
 
-/// What is uploaded here, as the options of the ground and as a scenario.
+/// Uploaded change as options of the ground station.
 const NEW: [&str; 2] = ["--new-interferer", "80,700,-300"];
 
 fn new() -> Scenario {
@@ -26,7 +26,7 @@ fn new() -> Scenario {
     }
 }
 
-/// Relay `index` of two, with a file for what is uploaded; `ttys` are its own options.
+/// Starts relay `index` of two, with an upload file; `ttys` are its own options.
 fn relay(files: &Files, index: usize, ttys: &[&str]) -> Relay {
     let mut options = files.options("key", &format!("epoch{index}"));
     options.push("--upload-file".to_owned());
@@ -40,7 +40,7 @@ fn relay(files: &Files, index: usize, ttys: &[&str]) -> Relay {
     Relay::start(&arguments)
 }
 
-/// The ground of two relays, which uploads [`NEW`] as `version`.
+/// Starts the ground station of two relays, which uploads [`NEW`] as `version`.
 fn ground(files: &Files, version: &str, more: &[&str]) -> Relay {
     let options = files.options("key", "ground");
     let mut arguments = vec!["--of", "2", "--yes", "--version", version];
@@ -50,7 +50,7 @@ fn ground(files: &Files, version: &str, more: &[&str]) -> Relay {
     Relay::ground(&arguments)
 }
 
-/// Over wires that are good and bad, from the transmitter.
+/// Uploads from the transmitter over quiet and noisy wires.
 #[test]
 fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     let (loaded, uploaded) = (simulated(&Scenario::default(), 2), simulated(&new(), 2));
@@ -79,12 +79,12 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
             "{last}"
         );
         for (relay, place) in relays.iter_mut().zip(&uploaded) {
-            // Both before the ground was told.
+            // Both log lines come before the ground station's.
             relay.line("uploaded: holds version 3");
             relay.line("adopted: flies version 3");
             relay.settles_at(*place);
         }
-        // Both are killed, in the middle of whatever they do.
+        // Both are killed at a random moment.
         drop(relays);
         let mut relays = start();
         for (relay, place) in relays.iter_mut().zip(&uploaded) {
@@ -103,7 +103,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     }
 }
 
-/// On one channel, from the receiver; and a relay that keeps nothing is handed it again.
+/// Uploads from the receiver on one channel; a relay without a file receives the mission again.
 #[test]
 fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     let uploaded = simulated(&new(), 2);
@@ -139,7 +139,7 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     for (relay, place) in relays.iter_mut().zip(&uploaded) {
         relay.settles_at(*place);
     }
-    // A thread of its own writes it.
+    // A separate thread writes the file.
     let is_kept = || files.path("upload2").exists();
     let begun = std::time::Instant::now();
     while !is_kept() && begun.elapsed() < std::time::Duration::from_secs(20) {
@@ -148,7 +148,7 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     assert!(is_kept());
 }
 
-/// The file that a relay keeps of `config`, uploaded as version 5 to relays that were loaded with `base`.
+/// Returns a relay's upload file of `config` as version 5, based on the loaded `base`.
 fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
     let [base, new] = [base, config].map(|scenario| mission::mission(scenario, 1, 1e-4).unwrap().0);
     let upload = Upload::new(&base, 5, *new.config()).unwrap();
@@ -229,7 +229,7 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
     assert!(stderr[0].ends_with("; 0 frames refused"), "{stderr:?}");
 }
 
-/// Relays that fly with a guard, at 20 m: an altitude outside of their geofence is refused by name, one inside of it is flown.
+/// Checks guarded relays at 20 m: an altitude outside their geofence is refused by name.
 #[test]
 fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
     for (band, altitude, range) in [
@@ -304,7 +304,7 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
     }
 }
 
-/// Options of the ground, and what the line must have in it.
+/// Wrong options of the ground station, and parts of the error line.
 fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
     let wrong: &[(&[&str], &[&str])] = &[
         (&["--version", "0"], &["--version", "'0'", "1 to 65535"]),
@@ -354,7 +354,6 @@ fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
         .collect()
 }
 
-/// Sites, and their distance.
 const SITED: &[&str] = &[
     "--site-tx",
     "47.4,8.54,420",
@@ -364,7 +363,7 @@ const SITED: &[&str] = &[
     "1343.795",
 ];
 
-/// The same where it depends on what the chain flies: the ground asks that first.
+/// Wrong options that depend on the mission in flight, which the ground station requests first.
 fn unfit() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
     let unfit: &[(&[&str], &[&str])] = &[
         (
@@ -391,7 +390,7 @@ fn unfit() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
             &[SITED, &["--new-site-rx", "47.39,8.55,431"]].concat(),
             &["--new-site-rx", "turns the line by 111.", "0 to 60.0"],
         ),
-        // Both ends with latitude and longitude swapped are places on earth.
+        // Both sites remain valid with latitude and longitude swapped.
         (
             &[
                 SITED,
@@ -482,7 +481,7 @@ fn wrong_options_of_the_ground_are_named() {
             "--yes",
         ];
         all.extend(good.iter().map(String::as_str));
-        // What is given twice would be another mistake.
+        // A duplicate option would be another mistake.
         if let Some(at) = all.iter().position(|option| *option == wrong[0]) {
             all.drain(at..at + 2);
         }

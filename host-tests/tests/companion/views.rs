@@ -1,4 +1,4 @@
-//! What a process has said in the votes on views, in a file: it stands by it when it is started again.
+//! Stored votes on views: a restarted process is bound by them.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::medium::{Medium, QUIET};
 use crate::process::{Ended, Relay};
 use crate::simulated;
 
-/// The relays of a chain on one channel, and a folder for their files.
+/// Relays of a chain on one channel, and a folder for their files.
 struct Channel {
     medium: Medium,
     folder: tempfile::TempDir,
@@ -30,7 +30,6 @@ impl Channel {
         self.folder.path().join(format!("views{index}"))
     }
 
-    /// Starts relay `index` of three.
     fn start(&self, index: usize) -> Relay {
         let file = self.file(index);
         Relay::start(&[
@@ -70,7 +69,7 @@ fn stored(file: &Path) -> ViewRecord {
 
 const STANDS_BY: &str = "stands by: what it has said in votes before this start; before another flight remove its --view-file";
 
-/// All are killed in a view of two of them, and fly as three when they are started again: no number of a view comes twice.
+/// Kills all relays in a view of two; restarted, three fly, and no view number is used twice.
 #[test]
 fn three_that_are_started_again_stand_by_what_they_said() {
     let expected = simulated(&Scenario::default(), 3);
@@ -98,7 +97,7 @@ fn three_that_are_started_again_stand_by_what_they_said() {
     }
 }
 
-/// The exit status after which the unit does not start the companion again.
+/// Exit status after which the unit does not restart the companion.
 const NOT_RETRIED: i32 = 2;
 
 #[test]
@@ -108,7 +107,7 @@ fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
     assert!(unit.lines().any(|line| line == setting), "{unit}");
 }
 
-/// Two of three are a quorum of the chain that was loaded, and none of a view that neither of them is in.
+/// Checks two of three relays, a quorum of the loaded chain, but not of a stored view without them.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly() {
     let channel = Channel::new(3);

@@ -1,4 +1,4 @@
-//! What is said of a mistake, word by word: each names what is wrong.
+//! Error messages word by word: each names the mistake.
 
 use std::os::unix::fs::PermissionsExt as _;
 
@@ -8,7 +8,7 @@ use crate::medium::{Medium, QUIET};
 use crate::process::{Ended, Relay};
 use crate::signed::Files;
 
-/// What is said where it ends with that status.
+/// Returns the error line of a process that exits with status `expected`.
 fn said(relay: Relay, expected: i32) -> String {
     let Ended { status, stderr, .. } = relay.end();
     assert_eq!((status, stderr.len()), (Some(expected), 1), "{stderr:?}");
@@ -62,7 +62,7 @@ fn a_port_that_cannot_be_opened_says_why() {
         ),
         ("/dev/null".into(), "is no tty"),
     ];
-    // Root may open whatever it likes.
+    // Root may open any file.
     if std::fs::read(&secret).is_err() {
         faults.push((secret, "may not be opened by this user"));
     }
@@ -77,7 +77,7 @@ fn a_port_that_cannot_be_opened_says_why() {
     }
 }
 
-/// Two on one wire that differ in one thing each.
+/// Starts two relays on one wire that differ in one option.
 #[test]
 fn frames_that_are_refused_say_why() {
     let files = Files::new();
@@ -125,7 +125,6 @@ fn frames_that_are_refused_say_why() {
     }
 }
 
-/// An upload that does not come about, and why: to that end with these options.
 fn upload_fails(files: &Files, tty: &str, key: &str, more: &[&str], why: &str) {
     let options = files.options(key, "ground");
     let mut all = vec!["--tty", tty, "--version", "3", "--yes", "--timeout", "8"];
@@ -147,7 +146,7 @@ fn signed(files: &Files, epoch: &str, place: &[&str]) -> Relay {
     Relay::start(&all)
 }
 
-/// A relay says nothing to somebody whom it does not know, so on a wire most mistakes are silence: then its own log has the reason.
+/// Checks reasons on a wire, where relays do not answer strangers and only their logs have the reason.
 #[test]
 fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     let files = Files::new();
@@ -186,7 +185,7 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     assert!(relay.line("not taken: ").contains("have a wrong tag"));
 }
 
-/// On a channel it hears the others talk.
+/// Checks the reasons on a channel, where the ground station receives the relays' frames.
 #[test]
 fn on_a_channel_the_ground_says_what_most_likely_is_wrong() {
     let files = Files::new();

@@ -1,5 +1,4 @@
-//! The f64 judge of chains under stochastic interference, judged itself: by values of a separate program, and by methods
-//! of its own that must agree.
+//! Checks of the f64 reference for chains in stochastic interference by independent values and methods.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,10 +8,10 @@ use uav_relay_oracle::reference::{Link, Station};
 
 use super::off;
 
-/// The Upsilon of the program's chains, 1/W: 0.8 of `p_u` U / (eta h^2) with the paper's channel and 20 m.
+/// Upsilon of the program's chains, 1/W: 0.8 of `p_u` U / (eta h^2) with the paper's channel and 20 m.
 const UPSILON: f64 = 2_301_379.773_574_951;
 
-/// The paper's multi-hop scenario under the same interference everywhere.
+/// Returns the paper's multi-hop scenario under constant interference.
 fn paper(n: usize) -> StochasticLink {
     let link = Link::paper(n);
     StochasticLink {
@@ -25,7 +24,7 @@ fn paper(n: usize) -> StochasticLink {
     }
 }
 
-/// One relay at 10 m on 100 m, 10 W against 1 W, all path-loss factors 1.
+/// Returns one relay at 10 m on 100 m, 10 W against 1 W, all path-loss factors 1.
 fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
     StochasticLink {
         distance_m: 100.0,
@@ -40,7 +39,7 @@ fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
     }
 }
 
-/// Places from `first` on, `step` apart.
+/// Checks positions from `first` on, `step` apart.
 fn evenly(got: &[f64], first: f64, step: f64) {
     for (k, got) in (0..).zip(got) {
         let want = first + step * f64::from(k);
@@ -60,10 +59,10 @@ fn algorithm_4_takes_the_steps_of_a_separate_program() {
     assert_eq!((fifty.iterations, fifty.places.len()), (1, 50));
     evenly(&fifty.places, 20.0, 20.0);
 
-    // More relays than the distance has room for at full reach: some end up above Tx, and the chain is none the worse.
+    // There are more relays than the distance has room for at full reach: some end up above Tx.
     let hundred = paper(100).algorithm4(0.1).unwrap();
     assert_eq!((hundred.iterations, hundred.places[0]), (1, 0.0));
-    // The optimum of eight, 0.09117, is below the step: nothing is found.
+    // The optimum of eight, 0.09117, is below the step, so no target is found.
     assert_eq!(paper(8).algorithm4(0.1), None);
     assert!(off(paper(8).algorithm4(1e-4).unwrap().gamma, 0.091_17) < 2e-3);
 }
@@ -76,7 +75,7 @@ fn the_fewest_relays_are_those_of_a_separate_program() {
     let high = paper(1).fewest(0.79, 100).unwrap();
     assert_eq!(high.iterations, 42);
     evenly(&high.places, 172.576_271_298_479_2, 20.126_184_217_065);
-    // Where only shortening any hop helps, 12 do.
+    // Only shorter hops help, and 12 relays suffice.
     let link = StochasticLink {
         distance_m: 105.0,
         tx_w: 1.0,
@@ -93,7 +92,7 @@ fn algorithm_3_takes_the_steps_of_a_separate_program() {
     assert!(off(printed.x_m, 77.297_916_056_347_92) < 1e-6);
     assert!(off(printed.sir, 0.006_499_999_999_999_889_5) < 1e-6);
     assert_eq!(printed.iterations, 336);
-    // Put right it may end a step earlier, never lower.
+    // The corrected algorithm may end a step earlier, but never lower.
     let right = link.algorithm3(1e-4).unwrap();
     let (_, optimum) = link.single_optimum(1000).unwrap();
     assert!(right.sir >= printed.sir && right.sir <= optimum * (1.0 + 1e-12));
@@ -102,7 +101,7 @@ fn algorithm_3_takes_the_steps_of_a_separate_program() {
 
 #[test]
 fn the_first_target_that_is_met_is_not_the_best() {
-    // Quiet from 90 m on, loud before.
+    // The field is quiet from 90 m on, and loud before.
     let link = short(vec![(0.0, 0.1), (90.0 - 1e-9, 0.1), (90.0, 100.0)]);
     let printed = link.algorithm3_printed(1e-5).unwrap();
     assert!((printed.sir - 0.009_98).abs() < 1e-5, "{printed:?}");
@@ -113,7 +112,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
     assert!(off(link.backward_best(2000), optimum) < 1e-3);
 }
 
-/// A chain of alike relays under the same interference everywhere.
+/// Draws a chain of identical relays under constant interference.
 fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
     let distance_m = log_uniform(rng, 10.0, 1e5);
     let station = Station {
@@ -141,7 +140,7 @@ fn under_constant_interference_all_optima_are_one() {
         let ceiling = link.ceiling();
         let found = link.backward_best(400);
         assert!(off(found, closed) < 1e-6, "{link:?}: {found:e} {closed:e}");
-        // A fixed step is never better, and at most itself worse.
+        // A fixed step is never better, and at most one step worse.
         let step = closed * 0.01;
         if ceiling / step < 1e5 {
             let fixed = link.algorithm4(step).unwrap();

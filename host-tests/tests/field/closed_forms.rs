@@ -1,27 +1,26 @@
-//! Upsilon in closed form against the integral of the moment-generating function, which knows nothing of it.
+//! Closed form of Upsilon compared with the integral of the moment-generating function.
 
 use uav_relay::FieldPoint;
 use uav_relay_oracle::reference::stochastic::upsilon_by_mgf;
 
 use super::off;
 
-/// E[exp(-y u)] of a Beta distribution, by the trapezoidal rule in the logit of u, where the integrand is analytic.
+/// Returns E[exp(-y u)] of a Beta distribution, by the trapezoidal rule in the logit of u.
 fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     const STEP: f64 = 0.125;
-    // The hill is at most 4 wide where both shapes are large.
+    // The peak is at most 4 wide where both shapes are large.
     let low = -((1.0 + y).ln() + 4.0 + 45.0 / alpha);
     let high = 4.0 + 45.0 / beta;
     let (mut with, mut without) = (0.0, 0.0);
     let mut z = low;
     while z < high {
-        // u = 1 / (1 + e^-z), and du = u (1 - u) dz.
         let (ln_u, ln_rest) = (-(-z).exp().ln_1p(), -z.exp().ln_1p());
         let ln_u = if z < -700.0 { z } else { ln_u };
         let weight = alpha * ln_u + beta * ln_rest;
         with += (weight - y * ln_u.exp()).exp();
         z += STEP;
     }
-    // The other one has its mass elsewhere.
+    // The other integrand has its mass elsewhere.
     let mut z = -4.0 - 45.0 / alpha;
     while z < high {
         without += (-alpha * (-z).exp().ln_1p() - beta * z.exp().ln_1p()).exp();
@@ -30,7 +29,7 @@ fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     with / without
 }
 
-/// The same by the power series of e^-y 1F1(beta; alpha + beta; y): all terms above zero; good for y up to 500 or so.
+/// Returns E[exp(-y u)] of a Beta distribution by the series of e^-y 1F1(beta; alpha + beta; y), y to 500.
 fn beta_mgf_series(alpha: f64, beta: f64, y: f64) -> f64 {
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 0..3_000 {
@@ -70,19 +69,19 @@ fn upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf() {
     assert!(worst < 1e-12);
 }
 
-/// Distributions whose E[1/I] is known otherwise: the judge is judged first.
+/// Checks the integral by distributions with known E[1/I].
 #[test]
 fn the_integral_finds_what_is_known_of_other_distributions() {
     let constant = |level: f64| upsilon_by_mgf(move |t| (t * level).exp()).unwrap();
     for level in [1e-12, 3.0, 2e5] {
         assert!(off(constant(level), 1.0 / level) < 1e-12, "{level}");
     }
-    // Gamma with shape k and scale s: 1 / ((k - 1) s).
+    // Gamma distribution with shape k and scale s: 1 / ((k - 1) s).
     for (k, s) in [(1.5, 1.0), (2.0, 1e-9), (12.0, 40.0)] {
         let found = upsilon_by_mgf(|t| (1.0 - s * t).powf(-k)).unwrap();
         assert!(off(found, 1.0 / ((k - 1.0) * s)) < 1e-11, "{k} {s}");
     }
-    // Uniform on [a, b]: ln(b / a) / (b - a).
+    // Uniform distribution on [a, b]: ln(b / a) / (b - a).
     for (a, b) in [(1.0, 2.0), (1e-3, 1.0), (1e-9, 3e-9)] {
         let mean = |y: f64| {
             let width = y * (b - a);
@@ -99,7 +98,7 @@ fn the_integral_finds_what_is_known_of_other_distributions() {
     // Two levels, six decades apart.
     let found = upsilon_by_mgf(|t| 0.25 * t.exp() + 0.75 * (1e-6 * t).exp()).unwrap();
     assert!(off(found, 0.25 + 0.75e6) < 1e-12);
-    // Exponential: 1 / I has no mean.
+    // Exponential distribution: 1 / I has no mean.
     assert_eq!(upsilon_by_mgf(|t| 1.0 / (1.0 - t)), None);
 }
 
@@ -108,7 +107,7 @@ fn the_closed_form_has_the_values_of_a_separate_program() {
     assert!(off(FieldPoint::beta_upsilon(2.0, 2.0, 1.0).unwrap(), 3.0) < 1e-12);
     let found = FieldPoint::beta_upsilon(1.5, 2.0, 3.476_175_5e-7).unwrap();
     assert!(off(found, 14_383_623.611_638_71) < 1e-12);
-    // That program says infinite.
+    // The mean is infinite.
     assert_eq!(FieldPoint::beta_upsilon(1.0, 2.0, 1.0), None);
 }
 

@@ -1,4 +1,4 @@
-//! How good an estimate is, in hundreds of seeds: its error, and whether its own standard error holds.
+//! Accuracy of the estimator over hundreds of seeds: its error, and the validity of its standard error.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -13,17 +13,17 @@ const SEEDS: u64 = 100;
 
 const I_MAX_W: f32 = 3.476_175_5e-7;
 
-/// What came of one pair of shapes.
+/// Results of one pair of shapes.
 #[derive(Default, Debug)]
 struct Found {
-    /// Estimates that were made.
+    /// Number of estimates.
     made: u32,
-    /// Those within 5 % of the truth.
+    /// Number of estimates within 5 % of the truth.
     close: u32,
-    /// Those within two of their standard errors of the truth.
+    /// Number of estimates within two of their standard errors of the truth.
     covered: u32,
     worst: f64,
-    /// The largest standard error, as a part of the estimate.
+    /// Largest standard error, as a fraction of the estimate.
     widest: f64,
 }
 
@@ -41,7 +41,7 @@ fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> 
 fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
     let truth = FieldPoint::beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
     let mut found = Found::default();
-    // Every pair of shapes gets samples of its own.
+    // Every pair of shapes has its own samples.
     let first = first.wrapping_mul(1_000_003) ^ alpha.to_bits() ^ beta.to_bits().rotate_left(32);
     for k in 0..SEEDS {
         let Some(estimate) = estimate(alpha, beta, samples, first.wrapping_add(k)) else {
@@ -66,7 +66,7 @@ fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
     found
 }
 
-/// Each alpha with a small, a middling and a large beta.
+/// Returns each alpha with a small, a medium and a large beta.
 fn grid(alphas: [f64; 3]) -> [(f64, f64); 9] {
     std::array::from_fn(|k| (alphas[k / 3], [0.5, 3.0, 20.0][k % 3]))
 }
@@ -80,7 +80,7 @@ fn ten_thousand_samples_give_upsilon_within_five_percent() {
         let found = found(alpha, beta, 10_000, first);
         assert!(found.close >= 99, "{alpha} {beta}: {found:?}");
         assert!(found.covered >= 90, "{alpha} {beta}: {found:?}");
-        // Nor is the standard error a way out: it stays small where the estimate is good.
+        // A good estimate must also have a small standard error.
         assert!(found.widest < 0.015, "{alpha} {beta}: {found:?}");
         covered += found.covered;
     }
@@ -112,7 +112,7 @@ fn it_holds_for_few_samples_too() {
         for alpha in [1.2, 1.5, 2.0, 4.0, 20.0] {
             for beta in [0.5, 3.0, 20.0] {
                 let found = found(alpha, beta, samples, first);
-                // Next to alpha = 1 an estimate is made where chance made alpha large: it misleads, but rarely.
+                // Close to alpha = 1 an estimate exists only if chance made alpha large: it misleads, but rarely.
                 assert!(
                     found.made - found.covered <= 10,
                     "{alpha} {beta}: {found:?}"

@@ -1,7 +1,6 @@
-//! Stochastic interference judged from outside: the table of Upsilon, its closed form against the integral it stands for,
-//! its estimation from samples, and the f64 judge of whole chains against values of a separate program.
+//! Stochastic interference: Upsilon's table and closed form, its estimation, and reference chains.
 //!
-//! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints.
+//! Random tests use the environment variable `SEED` (1 if unset), which each prints.
 
 mod chains;
 mod closed_forms;
@@ -9,7 +8,6 @@ mod estimation;
 mod samples;
 mod table;
 
-/// The relative difference of `got` from `want`.
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }

@@ -1,4 +1,4 @@
-//! Which samples count, and that no stream of them can make an estimate of anything but finite numbers.
+//! Accepted samples, and finite estimates from any stream of samples.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -42,7 +42,7 @@ fn bad_samples_are_counted_and_left_out() {
     assert_eq!(estimator.accepted(), 500);
     assert_eq!(estimator.rejected() - rejected, 8);
     assert_eq!(estimator.estimate(), Some(before));
-    // The ends that count.
+    // Smallest and largest accepted samples.
     estimator.push(1e-6);
     estimator.push(f32::from_bits(1));
     assert_eq!(estimator.accepted(), 502);
@@ -77,12 +77,12 @@ fn no_estimate_without_enough_samples_or_spread() {
         }
         assert_eq!(still.estimate(), None, "{level}");
     }
-    // 61 dB below the largest value, the steps of the fixed-point numbers would be seen.
+    // From 61 dB below the largest value, the fixed-point resolution would show.
     assert!(scaled(2e-12).is_some());
     assert_eq!(scaled(0.8e-12), None);
 }
 
-/// The estimate from powers around `mean_w` with an `I_max` of 1e-6 W.
+/// Returns the estimate from powers around `mean_w` with an `I_max` of 1e-6 W.
 fn scaled(mean_w: f32) -> Option<Estimate> {
     let mut estimator = Estimator::new(1e-6);
     for k in 0..1_000_u16 {
@@ -113,7 +113,7 @@ fn a_bound_that_is_none_takes_no_sample() {
     }
 }
 
-/// A million samples around one value: where sums of f32 would have stopped growing or would cancel.
+/// Checks a million samples around one value, where f32 sums would stagnate or cancel.
 #[test]
 fn many_samples_close_together_lose_nothing() {
     let mut estimator = Estimator::new(1.0);
@@ -124,7 +124,7 @@ fn many_samples_close_together_lose_nothing() {
     let estimate = estimator.estimate().unwrap();
     assert_eq!(estimate.samples, 2_000_000);
     let (low, high) = (f64::from(0.7_f32), f64::from(0.700_01_f32));
-    // The standard error is that of the mean, through 1 / I, and 0.2 % more for what is not known of alpha.
+    // The standard error is that of the mean, through 1 / I, plus 0.2 % for the uncertainty of alpha.
     let mean = low.midpoint(high);
     let error = (high - low) / 2.0 / mean / mean / 2e6_f64.sqrt();
     assert!(off(estimate.upsilon_per_w.into(), 1.0 / mean) < 3e-7);
@@ -140,7 +140,7 @@ fn config(cases: u32) -> Config {
     }
 }
 
-/// Powers of every kind: any bits at all, and some close to the ends of what is taken.
+/// Draws powers of every kind: any bits, and some close to the limits.
 fn powers() -> impl Strategy<Value = f32> {
     prop_oneof![
         any::<u32>().prop_map(f32::from_bits),
@@ -155,7 +155,7 @@ proptest! {
 
     #[test]
     fn every_estimate_is_finite_and_in_range(
-        // A few values, each many times over: what drives the fit into its corners.
+        // A few values with many repetitions drive the fit into its corners.
         values in vec((powers(), 1..2_000_u16), 1..6),
         scale in prop_oneof![Just(1.0_f32), Just(1e-30), Just(1e6), Just(3e-9)],
     ) {
@@ -173,7 +173,7 @@ proptest! {
             prop_assert_eq!(samples, estimator.accepted());
             let point = FieldPoint { x_m: 0.0, upsilon_per_w };
             prop_assert!(Field::try_new(Box::leak(Box::new([point]))).is_ok());
-            // Jensen: the mean of 1 / I is at least one over the mean, and that at least 1 / I_max.
+            // Jensen's inequality: the mean of 1 / I is at least 1 / mean, and that at least 1 / I_max.
             prop_assert!(upsilon_per_w >= 0.999_999 / scale);
         }
     }

@@ -1,4 +1,4 @@
-//! The table of Upsilon: what it refuses, and what it says between and beyond its points.
+//! Table of Upsilon: validation, interpolation and extrapolation.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// A table as firmware holds it, with a point from a closed form.
+/// Table as in a firmware, with one point from a closed form.
 const POINTS: [FieldPoint; 3] = [
     at(0.0, 4.0),
     match FieldPoint::from_beta(100.0, 2.0, 2.0, 1.5) {
@@ -58,7 +58,7 @@ fn the_same_everywhere_is_known_as_that() {
     assert_ne!(ONE, TWO);
 }
 
-/// Lives as long as the process: a field borrows its table for good.
+/// Creates a field whose table is leaked, because a field borrows its table for good.
 fn field(points: Vec<FieldPoint>) -> Result<Field, FieldError> {
     Field::try_new(Vec::leak(points))
 }
@@ -96,7 +96,7 @@ fn every_number_is_checked_at_both_ends_and_for_nan() {
         let points = vec![at(0.0, 1.0), at(1.0, 1.0), at(second, 1.0)];
         assert_eq!(field(points).unwrap_err(), FieldError::Order);
     }
-    // A NaN further on is no reason to lose the order.
+    // A NaN further on must not hide the wrong order.
     let points = vec![at(0.0, 1.0), at(f32::NAN, 1.0), at(-1.0, 1.0)];
     assert_eq!(field(points).unwrap_err(), FieldError::Place);
 }

@@ -1,4 +1,4 @@
-//! The epoch that a drone keeps in its flash: it rises, whatever happens.
+//! Epoch in a drone's flash: it rises at every start, whatever fails.
 
 use host_tests::firmware::epoch::{KEY, WORDS, begin};
 use host_tests::firmware::journal::{AROUND, Journal};
@@ -19,7 +19,7 @@ fn the_epoch_rises_at_every_start_through_full_sectors() {
     for begun in 1..=100 {
         assert_eq!(start(&mut flash, 1), Some((begun, true)));
     }
-    // A new block may raise it, and never lower it.
+    // A new provisioning block may raise the epoch, but not lower it.
     assert_eq!(start(&mut flash, 1_000), Some((1_000, true)));
     assert_eq!(start(&mut flash, 500), Some((1_001, true)));
     assert_eq!(start(&mut flash, 1_002), Some((1_002, true)));
@@ -36,7 +36,7 @@ fn after_the_last_epoch_there_is_none() {
     assert_eq!(start(&mut Ram::blank(7 * ENTRY, 1), u32::MAX), None);
 }
 
-/// Power fails at any moment, in the middle of an erase or of a word too: no epoch that was used comes again.
+/// Checks power failures at any moment, also during an erase or a word: no used epoch comes again.
 #[test]
 fn no_epoch_comes_twice_whenever_power_fails() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(31));
@@ -49,7 +49,7 @@ fn no_epoch_comes_twice_whenever_power_fails() {
                 flash.power = Some(rng.random_range(1..=ENTRY + 1));
             }
             let (epoch, _) = start(&mut flash, 1).unwrap();
-            // Where power has failed, nothing was signed.
+            // With a power failure no frames were signed.
             if flash.switch_on() {
                 failures += 1;
             } else {
@@ -63,7 +63,7 @@ fn no_epoch_comes_twice_whenever_power_fails() {
     assert!(failures > 1_000);
 }
 
-/// A flash that cannot be written does not put the epoch back.
+/// Checks that a flash that cannot be written does not reset the epoch.
 #[test]
 fn a_write_that_fails_never_puts_the_epoch_back() {
     for worn in 0..=5 {

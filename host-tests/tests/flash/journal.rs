@@ -1,4 +1,4 @@
-//! The log that all of it is in: what was kept last is there, whenever power fails.
+//! Journal in the flash: the last record survives any power failure.
 
 use host_tests::firmware::journal::{AROUND, BLANK, Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
@@ -24,7 +24,7 @@ fn entry(number: u32) -> Vec<u32> {
 
 #[test]
 fn records_fill_both_sectors_and_the_newest_counts() {
-    // Words that make no record are left over.
+    // The sector has spare words that hold no record.
     let mut flash = Ram::blank(4 * RECORD + 3, 1);
     log(&mut flash).tidy();
     assert_eq!(newest(&mut flash), None);
@@ -37,7 +37,7 @@ fn records_fill_both_sectors_and_the_newest_counts() {
     let full = flash.sectors.clone();
     assert!(!log(&mut flash).keep(&entry(9), WhenFull::Refuse));
     assert_eq!((&full, flash.erased.len()), (&flash.sectors, 0));
-    // A start makes room for all records of a sector.
+    // Tidying at the start makes room for all records of a sector.
     log(&mut flash).tidy();
     assert_eq!(flash.erased, [0]);
     for number in 9..=12 {
@@ -47,7 +47,7 @@ fn records_fill_both_sectors_and_the_newest_counts() {
     assert_eq!(newest(&mut flash), Some(entry(12)));
 }
 
-/// The sector that is erased never has the newest record, and each erase is good for all records of a sector.
+/// Checks that the newest record's sector is never erased, and that each erase frees a full sector.
 #[test]
 fn a_full_log_goes_on_in_the_sector_with_the_older_records() {
     let mut flash = Ram::blank(4 * RECORD, 1);
@@ -106,7 +106,7 @@ fn a_place_that_is_worn_is_passed_over() {
     assert!(!log(&mut none).keep(&entry(1), WhenFull::Erase));
 }
 
-/// In the middle of an erase, of a record or of a word: what was read back stays, and nothing else is ever found.
+/// Checks power failures during an erase, record or word: stored records stay, and no others appear.
 #[test]
 fn nothing_is_lost_whenever_power_fails() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(37));
@@ -128,7 +128,7 @@ fn nothing_is_lost_whenever_power_fails() {
             let before = flash.erased.len();
             let stands = log(&mut flash).keep(&entry(number), WhenFull::Erase);
             let erased = flash.erased.len() > before;
-            // By chance a word that was cut short may be whole.
+            // By chance a truncated word may be complete.
             let found = newest(&mut flash);
             if stands || found == Some(entry(number)) {
                 kept = Some(entry(number));

@@ -1,4 +1,4 @@
-//! What a drone keeps in its flash: the epoch of its frames, the missions that were uploaded, and what it has said in votes.
+//! Contents of a drone's flash: epoch, uploaded missions, and votes on views.
 
 mod epoch;
 mod journal;

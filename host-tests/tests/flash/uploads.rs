@@ -1,4 +1,4 @@
-//! The uploads that a drone keeps in its flash. That none is lost whenever power fails: `journal.rs`.
+//! Uploads in a drone's flash; `journal.rs` tests power failures.
 
 use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
@@ -7,7 +7,7 @@ use uav_relay::Upload;
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 
-/// Words of a sector of 128 KiB.
+/// Words in a sector of 128 KiB.
 const SECTOR: usize = 32 * 1024;
 
 fn version(number: u16) -> Upload {

@@ -1,4 +1,4 @@
-//! What a drone has said in the votes on views: it stands by it after a reboot. That nothing is lost whenever power fails: `journal.rs`.
+//! Votes on views in a drone's flash, binding after a reboot; `journal.rs` tests power failures.
 
 use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
@@ -6,7 +6,7 @@ use host_tests::firmware::views::{SECTORS, WORDS, kept, record};
 use host_tests::fixtures::voted;
 use uav_relay::ViewRecord;
 
-/// Words of a sector of 16 KiB.
+/// Words in a sector of 16 KiB.
 const SECTOR: usize = 4 * 1024;
 
 fn found(log: &mut Journal<&mut Ram>) -> Option<ViewRecord> {
@@ -30,7 +30,7 @@ fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
     assert_eq!(found(&mut start), Some(voted(7, 5, 1_000, true)));
 }
 
-/// A loss of power in the middle of a record: what was said before holds, and nobody has been told more.
+/// Checks a power failure during a record: the record before is valid, and the new vote was not sent.
 #[test]
 fn of_a_record_that_is_torn_the_one_before_holds() {
     for written in 1..WORDS + AROUND {

@@ -1,4 +1,4 @@
-//! Counts and optima of equals in a field.
+//! Numbers and optima of identical relays in a field.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,7 +25,7 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
     }
 }
 
-/// Equals in a field of one to twelve points, Upsilon within a factor of up to 300.
+/// Draws identical relays in a field of one to twelve points, Upsilon within a factor of up to 300.
 fn random_field(rng: &mut impl Rng) -> StochasticLink {
     let d = round(log_uniform(rng, 10.0, 1e5));
     let points = rng.random_range(1..=12);
@@ -47,9 +47,7 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
     link
 }
 
-/// The fewest equals on a grid of places, by marking which places can be continued to Rx, hop by hop; 0 if `most` do not do.
-///
-/// With `longer` hops may be longer than the target lets them, by so many steps of the grid.
+/// Returns the fewest relays on a grid, with hops up to `longer` grid steps too long; 0 if more than `most`.
 fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> usize {
     const STEPS: usize = 4000;
     let (d, relay) = (link.distance_m, link.relays[0]);
@@ -75,7 +73,7 @@ fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> us
         if (low..=STEPS).any(|i| first[i]) {
             return n;
         }
-        // Every place that some hop into a place that can be continued may begin at.
+        // Marks every start of a hop that ends at a reachable position.
         let mut marked = vec![0_i32; STEPS + 2];
         for y in low..=STEPS {
             let length = squared(relay.power_w, link.mu_los, place(y)).sqrt();
@@ -105,7 +103,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
         let mission = of_stochastic_link(&link, 0.0).unwrap();
         let common = mission.config().common;
         let target = round(link.ceiling() * log_uniform(&mut rng, 3e-4, 1.1));
-        // On the grid no fewer relays can do, with longer hops no more are needed.
+        // The grid needs no fewer relays; with longer hops it needs no more.
         let at_most = on_a_grid(&link, target, MOST, 0.0);
         let at_least = on_a_grid(&link, target, MOST, 1.0);
         let told = Fewest::of(&mission, target as f32, |_| common)
@@ -129,7 +127,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
         } else {
             between += 1;
         }
-        // The places are such a chain.
+        // The positions form such a chain.
         let mut places = vec![Placement::default(); told];
         let mission = mission.with_relays(told as u16).unwrap();
         assert!(
@@ -159,7 +157,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
     assert!(same > 300 && none > 20 && fewer > 10 && largest > 30);
 }
 
-/// The best target of N equals in a field: that of the closed form where it is even, and never below Algorithm 4's.
+/// Checks the best target of N identical relays against the closed form and Algorithm 4.
 #[test]
 fn the_best_of_equals_in_a_field() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));
@@ -189,7 +187,7 @@ fn the_best_of_equals_in_a_field() {
             above += 1;
             gain = gain.max(best / backward - 1.0);
         }
-        // It is met, and with the grid's longer hops a little more is not.
+        // The target is met, and a slightly higher one is not even with the grid's longer hops.
         let mut places = vec![Placement::default(); n];
         assert!(mission.places_for(best as f32, |_| mission.config().common, &mut places));
         let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
@@ -204,7 +202,7 @@ fn the_best_of_equals_in_a_field() {
     assert!(above > 5);
 }
 
-/// A field with own powers is for Algorithm 4's chains, and nobody says that it is proven.
+/// Checks that relays with own powers in a field use Algorithm 4 and are not called proven.
 #[test]
 fn what_differs_in_a_field_is_not_proven() {
     let link = field(1000.0, 20.0, vec![(0.0, 3e6), (1000.0, 5e6)]);
@@ -224,7 +222,7 @@ fn what_differs_in_a_field_is_not_proven() {
             .windows(2)
             .all(|pair| pair[1].x_m - pair[0].x_m >= 4.0)
     );
-    // Too short a list takes nothing.
+    // A list that is too short is not written.
     assert!(!mission.places_for(1000.0, profile_of, &mut places[1..]));
     let config = MissionConfig {
         relays: 1,

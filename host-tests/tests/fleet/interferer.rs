@@ -1,4 +1,4 @@
-//! Counts against one interferer.
+//! Numbers of relays with one interferer.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::Link;
 
 use super::{ROUNDING, count, round};
 
-/// The mission of `link` and what its relays hold, by index; those beyond the link hold what the last does.
+/// Returns the mission of `link` and its relays' profiles by index; further relays are like the last one.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
     let common = mission.config().common;
@@ -22,7 +22,7 @@ pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>)
     (mission, of)
 }
 
-/// The first `relays` of `link`, which are padded with what is common.
+/// Returns `link` with `relays` relays, padded with the common profile.
 fn with(link: &Link, relays: usize) -> Link {
     let mut link = link.clone();
     let common = link.relays[0];
@@ -30,7 +30,7 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// The fewest relays with which a chain in f64 meets `target`, tried one number after the other; 0 if `most` do not.
+/// Returns the fewest relays that meet `target` in f64, by trying each number; 0 if `most` are not enough.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;
@@ -52,7 +52,7 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
     last.sir_rx(x).unwrap()
 }
 
-/// A target that takes one relay or some dozens: a part of the most that the outer hops can have.
+/// Draws a target for one to several dozen relays, as a fraction of the outer hops' maximum.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)
@@ -98,7 +98,7 @@ fn as_few_as_an_exhaustive_count() {
         }
         met += 1;
         if told != expected {
-            // A target that the last relay meets or misses by f32's own rounding.
+            // The last relay meets or misses the target by f32 rounding.
             ties += 1;
             let either =
                 [1.0 - ROUNDING, 1.0 + ROUNDING].map(|by| exhaustive(&link, target * by, MOST));
@@ -110,14 +110,14 @@ fn as_few_as_an_exhaustive_count() {
         }
         assert!(found.unwrap().proven);
         largest = largest.max(told);
-        // The places are such a chain.
+        // The positions form such a chain.
         let mission = mission.with_relays(found.unwrap().relays).unwrap();
         let mut places = vec![Placement::default(); told];
         assert!(mission.places_for(target as f32, &profile_of, &mut places));
         let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
         let sir = with(&link, told).chain_sir(&x);
         assert!(sir >= target * (1.0 - ROUNDING), "{sir} {target} {link:?}");
-        // And one relay fewer is not enough, by the sets of all places that each relay can have.
+        // One relay fewer is not enough, by each relay's set of possible positions.
         if told > 1 && told <= 40 {
             fewer += 1;
             let fewer = with(&link, told - 1).placement(target * (1.0 + ROUNDING));
@@ -177,7 +177,7 @@ fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
     assert!(proven > 500 && none > 100);
 }
 
-/// The most is met, a bit more is not, whatever the number of relays.
+/// Checks that the maximum is met and no number of relays meets a slightly higher target.
 #[test]
 fn the_most_is_what_no_number_of_relays_exceeds() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));
@@ -188,7 +188,7 @@ fn the_most_is_what_no_number_of_relays_exceeds() {
             chain: Chain::Alike,
         };
         let mut link = random::link(&mut rng, &style);
-        // A separation keeps the number of relays, and the work of the count, low.
+        // A separation limits the number of relays and the work.
         link.min_separation_m = if rng.random_bool(0.5) {
             link.distance_m * log_uniform(&mut rng, 0.01, 0.3)
         } else {
@@ -204,13 +204,13 @@ fn the_most_is_what_no_number_of_relays_exceeds() {
         let found = Fewest::of(&mission, most.target, &profile_of).unwrap();
         assert_eq!(found.relays, most.relays);
         if link.min_separation_m > 0.0 {
-            // A chain that has to keep a distance may be able to do more than one with a lower target.
+            // A chain with a separation may reach more than one with a lower target.
             exceeded += u32::from(Fewest::of(&mission, most.target * 1.001, &profile_of).is_some());
             continue;
         }
         assert!(Fewest::of(&mission, most.target * 1.001, &profile_of).is_none());
         if most.relays < 900 {
-            // Only the outer hops limit it.
+            // Only the outer hops limit the target.
             let d = link.distance_m;
             let first =
                 (0..=20_000).map(|i| link.sir_relay(1, 0.0, d * f64::from(i) / 2e4).unwrap());

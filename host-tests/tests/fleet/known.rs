@@ -1,4 +1,4 @@
-//! Values of an independent program, and what the printed rules get wrong.
+//! Values of an independent program, and errors of the printed rules.
 
 use uav_relay::Placement;
 use uav_relay::planning::fleet::Fewest;
@@ -78,7 +78,7 @@ fn the_reference_cases_hold() {
             case.id
         );
     }
-    // What the printed rules make 16, 24, 36 and 54.
+    // The printed rules give 16, 24, 36 and 54.
     let (mission, profile_of) = briefed(&Link::paper(1));
     for (target, relays) in [(5.0, 22), (10.0, 40), (20.0, 65), (40.0, 100)] {
         assert_eq!(

@@ -1,13 +1,10 @@
-//! How many relays a target needs: against counts that know nothing of the crate's reaches and ranges.
-//!
-//! `COUNT` and `SEED` in the environment take other scenarios.
+//! Number of relays for a target, compared with independent counts; `COUNT` and `SEED` select scenarios.
 
 mod field;
 mod interferer;
 mod known;
 
-/// What rounding to f32 may take from a target, relative: half a step of x next to Rx is 6e-8 D, over the lowest altitude here,
-/// 0.002 D; and along hundreds of hops each place is rounded toward its sender.
+/// Relative loss of a target by f32 rounding: half a step of x is 6e-8 D, over an altitude of 0.002 D.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 pub(crate) fn count(default: usize) -> usize {

@@ -1,18 +1,18 @@
-//! Eight drones with autopilots that are handed over anywhere in the air, and given back anywhere.
+//! Eight drones with autopilots that are engaged anywhere in the air and given back anywhere.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
-//! | tame | 30 %: in order, 6 m to 30 m from drone to drone along the line, no upload, and pilots who give drones back where they took them |
-//! | start | in a third above each other, in a third beside each other, else anywhere; up to 30 m along the line from drone to drone; two swapped in 20 % |
+//! | tame | 30 %: in order, 6 m to 30 m from drone to drone along the line, no upload, and pilots who give drones back where they took control |
+//! | start | in a third above each other, in a third beside each other, else anywhere; up to 30 m along the line from drone to drone; two in swapped order in 20 % |
 //! | separation, stated position error | 10 m; 2 m, of which 0.5 m is a bias, 0.3 m noise, and the rest gusts and overshoot |
-//! | pilots | each with 25 % takes its drone once, flies it to anywhere within 60 m of the chain, and gives it back; with 5 % never |
+//! | pilots | 25 % take control once, fly to anywhere within 60 m of the chain, and give the drone back; 5 % do not give it back |
 //! | upload | in 60 % the receiver moves, so that the line turns by up to 80 degrees and is 0.5 to 1.3 times as long |
 //! | relays | each with 10 % rebooted, at most one lost for good |
 //! | autopilots | each with 10 % switched off and on |
 //! | radio | loses up to 40 % |
 //!
-//! No two drones that no pilot has come nearer than the separation less twice the stated error, or than they were when they were handed
-//! over less twice that error.
+//! Two engaged drones never come nearer than the separation, or their distance when they were engaged, less twice the stated
+//! error.
 
 use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -26,11 +26,11 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// Position error that the guard is told, m.
+/// Position error configured in the guard, m.
 const ERROR_M: f64 = 2.0;
 const NOISE_M: f64 = 0.3;
 
-/// Whatever happens begins within this time, and the flight ends after the other, s.
+/// End of the events, and end of the flight, s.
 const EVENTS_S: u64 = 180;
 const ENDS_S: u64 = 420;
 
@@ -64,7 +64,7 @@ fn starts(rng: &mut ChaCha8Rng, tame: bool) -> Vec<Point> {
     starts
 }
 
-/// An upload that turns the line.
+/// Draws an upload that turns the line.
 fn turned(rng: &mut ChaCha8Rng, setup: &Setup, axis: &Axis) -> UploadSpec {
     let config = *setup.mission.config();
     let angle = rng.random_range(-80.0_f64..=80.0).to_radians();
@@ -162,7 +162,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns true if the order of the drones is certain all the time, so that all have to arrive.
+/// Returns true if the order of the drones is always certain, so that all must arrive.
 fn is_orderly(setup: &Setup) -> bool {
     let Some(spec) = &setup.fleet else {
         return false;
@@ -172,7 +172,7 @@ fn is_orderly(setup: &Setup) -> bool {
     let apart = pairs.all(|pair| pair[1][0] - pair[0][0] > certain_m);
     let mut pilots = spec.takeovers.iter();
     let back = pilots.all(|it| it.to.is_none() && it.until.is_some());
-    // The pilot of a drone whose relay is silent for half a minute lands it.
+    // A pilot lands a drone whose relay is silent for half a minute.
     let quick = setup.kills.iter().all(|(relay, off)| {
         let mut boots = setup.boots.iter().filter(|(other, _)| other == relay);
         boots.any(|(_, on)| on.since(*off) < Duration::from_millis(25_000))

@@ -1,24 +1,24 @@
-//! Relays that come back between others, and relays that stand in another order than that of their numbers.
+//! Relays that return between others, and relays in a wrong order.
 
 use rand::SeedableRng;
 use uav_relay_sim::simulator::chain::run;
 
 use super::*;
 
-/// Where each relay is told to be in the end, x in m.
+/// Returns the final setpoints of the relays, x in m.
 fn ends(outcome: &Outcome) -> Vec<f32> {
     let places = outcome.relays.iter().map(|relay| relay.setpoint.unwrap());
     places.map(|place| place.x_m).collect()
 }
 
-/// Where they would be if nothing had happened.
+/// Returns the final setpoints without any events, x in m.
 fn undisturbed(setup: &Setup) -> Vec<f32> {
     let mut clean = Setup::new(setup.mission);
     clean.seed = 1;
     ends(&run(clean).unwrap())
 }
 
-/// Those beside it have closed up as far as its silent drone lets them; it comes back between them, and all find their places.
+/// Checks a relay that returns after its neighbours have closed up as far as its silent drone permits.
 #[test]
 fn one_that_comes_back_between_two_that_closed_up_gets_its_place() {
     for silent in 1..=8 {
@@ -46,7 +46,7 @@ fn one_that_comes_back_between_two_that_closed_up_gets_its_place() {
     }
 }
 
-/// While two neighbours stand in each other's place all stay where they are: who does not know of the two could fly into them.
+/// Checks two neighbours in each other's position: all drones stay, because others do not know of the swap.
 #[test]
 fn while_two_are_in_the_wrong_order_all_stay() {
     for first in 0..7 {

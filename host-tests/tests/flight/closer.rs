@@ -1,4 +1,4 @@
-//! Places that were agreed closer to each other along the line than the separation.
+//! Agreed positions closer along the line than the separation.
 
 use host_tests::flights::with_room;
 use rand::SeedableRng;
@@ -15,8 +15,7 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Of 200 random scenes with room beside the line: in how many agreed neighbours stand closer along x than the separation, in how many
-/// of those the drones do not get there, and how near any two come on the way.
+/// Flies 200 random scenes with lateral room and counts those with neighbours closer along x, and failures.
 #[test]
 fn drones_get_to_places_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));
@@ -59,7 +58,7 @@ fn drones_get_to_places_that_are_closer_along_x() {
                 ]
             })
             .collect();
-        // However long the line is, they are along it in a minute.
+        // The speed lets the drones fly the whole line in a minute.
         let speed_mps = vec![f64::from(config.distance_m) / 60.0; to_be.len()];
         let step = Duration::from_millis(200);
         setup.flight = Some(FlightSpec::exact(start, speed_mps, step));
@@ -84,7 +83,7 @@ fn drones_get_to_places_that_are_closer_along_x() {
         "{closer} of {scenes} scenes; in {short} of them a drone does not get there, and ends {:.2} separations off at most; the nearest two of any come within {least:.4}",
         far[far.len() - 1]
     );
-    // Three relays of which each two neighbours are closer along x, and the outer ones, too.
+    // The exceptions are three relays in a row of which also the outer two are closer along x.
     assert!(closer > 10 && short <= 2, "{far:?}");
     assert!(far[far.len() - 1] < 3.0, "{far:?}");
     assert!(least > 0.999, "{least}");

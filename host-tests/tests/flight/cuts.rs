@@ -1,14 +1,14 @@
-//! Two cuts of the chain that overlap, one after the other.
+//! Two overlapping cuts of the chain.
 
 use rand::SeedableRng;
 use uav_relay_sim::simulator::chain::run;
 
 use super::*;
 
-/// Within this time after the last cut has healed all are in one view again.
+/// Time limit from the last repair until all relays are in one view, s.
 const SOON_S: f64 = 120.0;
 
-/// All that two cuts can be: relays 1 to `.0` cut off, then also those to `.1`; the first heals before the second.
+/// Returns all pairs of cuts, of relays 1 to `.0` and then 1 to `.1`; the first heals first.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
     (1..8)
         .flat_map(|first| (1..8).map(move |second| (first, second)))
@@ -25,7 +25,7 @@ fn all_are_in_one_view_soon_after_two_cuts_that_heal_a_second_apart() {
     judge(&[[30, 200, 31, 201]]);
 }
 
-/// Has every pair of cuts fly, from, until, from and until these times, s.
+/// Flies every pair of cuts at each set of times: start, end, start, end, s.
 fn judge(all: &[[u64; 4]]) {
     let mut took = Vec::new();
     let mut failed = Vec::new();

@@ -1,4 +1,4 @@
-//! Eight drones with autopilots and pilots, and anything that may happen to them.
+//! Eight drones with autopilots, pilots and all kinds of faults.
 
 use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -12,17 +12,16 @@ use super::*;
 
 const NOISE_M: f64 = 0.3;
 
-/// The most that gusts move a drone at all, m/s (standard deviation).
+/// Largest standard deviation of gusts, m/s.
 const GUST_MPS: f64 = 0.3;
 
-/// How far off its setpoint a drone that hovers there may be reported, m, as the guard is told: the noise, and what gusts and stopping make.
+/// Position error configured in the guard, m: noise, gusts and overshoot.
 const HOVER_M: f64 = 1.5;
 
-/// What may be missing of the separation, m: each of the two is off by the bias, which nobody sees, and may hover off its setpoint. (By
-/// the guard's rules as much again each time that one begins anew; so much was never seen.)
+/// Permitted shortfall of the separation, m: bias and hovering error of both drones.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
-/// So long something may begin, s.
+/// End of the events, s.
 const EVENTS_S: u64 = 240;
 
 fn during(rng: &mut ChaCha8Rng) -> Instant {
@@ -53,7 +52,7 @@ fn flight(seed: u64) -> Setup {
         bias_m: BIAS_M,
         noise_m: NOISE_M,
     };
-    // At most three are lost: more than half go on.
+    // At most three are lost, so that more than half remain.
     let mut lost = rng.random_range(0..=3);
     for relay in 1..=8 {
         let from = during(&mut rng);
@@ -109,7 +108,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// What is wrong with a flight, if anything is, and how near two drones came.
+/// Returns the fault of a flight, if any, and the smallest distances.
 fn judged(seed: u64) -> (Option<String>, f64, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();
@@ -123,7 +122,7 @@ fn judged(seed: u64) -> (Option<String>, f64, f64) {
             outcome.stray_targets
         ))
     } else if outcome.ending != Ending::Settled {
-        // Settled is: each that flies is granted, and within 1 m of its place.
+        // Settled means that each engaged drone is within 1 m of its setpoint.
         Some(format!("{:?}: {:?}", outcome.ending, outcome.fleet))
     } else {
         None

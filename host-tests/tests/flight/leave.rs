@@ -1,4 +1,4 @@
-//! Relays that leave the line where their part of the chain is too small.
+//! Relays that leave the line because their part of the chain has no quorum.
 
 use rand::SeedableRng;
 use uav_relay::WithoutQuorum;
@@ -11,8 +11,7 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
     up_m: 25.0,
 };
 
-/// How far beside the line and how high each relay is told to be while relays 1 to 3 are cut off, with or without room for it, and
-/// when they are back.
+/// Returns lateral offsets and altitudes while relays 1 to 3 are cut off, and after their return.
 fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
     [seconds(110), seconds(300)].map(|end| {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));
@@ -41,7 +40,7 @@ fn a_box_has_room_for_relays_that_leave_if_it_was_asked_for() {
     let mut beside = on_line;
     beside[..3].fill([-30.0, 45.0]);
     assert_eq!(across(true), [beside, on_line]);
-    // They go no farther than their box: along the line it has no room beside, and a band of altitudes.
+    // Without room the drones stay within their box, which has altitudes but no lateral range.
     let [cut, back] = across(false);
     assert_eq!((cut[0][0], &back[..]), (0.0, &on_line[..]));
     assert_ne!(cut[..3], beside[..3]);

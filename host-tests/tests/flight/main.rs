@@ -1,6 +1,4 @@
-//! Drones that fly as drones do, guarded: they take a while to get going and to stop, and know where they are only nearly.
-//!
-//! `COUNT` and `SEED` in the environment take other sequences of faults; a failure names the seed of its one.
+//! Guarded drones with realistic dynamics; `COUNT` and `SEED` select other faults, a failure names its seed.
 
 mod anywhere;
 mod between;
@@ -22,14 +20,14 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 const SEPARATION_M: f64 = 10.0;
 
-/// How far off a drone takes itself to be at most, all the time and each time that it says so, m.
+/// Position errors: constant bias, and noise of each report, m.
 const BIAS_M: f64 = 0.5;
 const NOISE_M: f64 = 0.5;
 
-/// What a place may be off by rounding, m: places are f32 of up to 1 km.
+/// Rounding error of a position, m: positions are f32 of up to 1 km.
 const ROUNDING_M: f64 = 2e-3;
 
-/// Eight drones in order along x that know it, on one radio channel.
+/// Returns eight drones in order along x on one radio channel.
 fn eight(rng: &mut ChaCha8Rng) -> Setup {
     let mission = eight_apart(SEPARATION_M as f32);
     let mut setup = Setup::on_shared_channel(mission);
@@ -44,15 +42,14 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
     setup
 }
 
-/// How near two drones may come to each other of which none was switched on more than `starts` times, m.
+/// Returns the smallest permitted distance of drones that were each started at most `starts` times, m.
 ///
-/// A guard keeps the places apart that drones take themselves to be at. Either is off that by its bias. What it says is off by
-/// the noise besides: in flight, or hovering where it said it was when it was switched on, as much again each time.
+/// The guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }
 
-/// When all eight have come to the view that they are in at the end, if that is one of all.
+/// Returns the time when the last of eight relays accepted the final common view, if there is one.
 fn together(outcome: &Outcome) -> Option<Instant> {
     let view = outcome.relays[0].view;
     let all = outcome
@@ -69,7 +66,6 @@ fn together(outcome: &Outcome) -> Option<Instant> {
     all.then(|| came.max().unwrap_or(Instant::ZERO))
 }
 
-/// The environment variable `name` as a number, or `usual`.
 fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }

@@ -1,4 +1,4 @@
-//! Eight drones with autopilots whose receiver moves: by an upload with sites of its own, while they fly.
+//! Eight drones in flight whose receiver moves, by an upload with new sites.
 
 use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -11,12 +11,12 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// As in `fleet`: the noise and gusts of these drones, and what of the separation they may use up.
+/// Noise and hovering error of the drones, and the permitted shortfall of the separation, m, as in `fleet`.
 const NOISE_M: f64 = 0.3;
 const HOVER_M: f64 = 1.5;
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
-/// How far the receiver moves at most along the line, and to a side, m: some 17 degrees.
+/// Largest displacement of the receiver along the line and sideways, m: about 17 degrees.
 const ON_M: f32 = 300.0;
 const ASIDE_M: f32 = 300.0;
 
@@ -43,7 +43,7 @@ fn flight(seed: u64) -> Setup {
         };
         axis.point(place).unwrap()
     };
-    // On the way to their places, there, or at once one after the other.
+    // Uploads come on the way, after arrival, or in quick succession.
     let mut begun = rng.random_range(15_000..120_000);
     for version in 1..=rng.random_range(1..=2) {
         let on_m = rng.random_range(-ON_M / 2.0..=ON_M);
@@ -70,7 +70,7 @@ fn flight(seed: u64) -> Setup {
         });
         begun += rng.random_range(1_000..60_000);
     }
-    // One is rebooted about then.
+    // One relay reboots at about the time of the upload.
     if rng.random_bool(0.5) {
         let relay = rng.random_range(1..=8);
         let off = setup.uploads[0].at + Duration::from_millis(rng.random_range(0..2_000));
@@ -89,7 +89,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// What is wrong with a flight, if anything is, and how near two drones came.
+/// Returns the fault of a flight, if any, and the smallest distance.
 fn judged(seed: u64) -> (Option<String>, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();
@@ -104,7 +104,7 @@ fn judged(seed: u64) -> (Option<String>, f64) {
     } else if outcome.stray_targets > 0 || outcome.unsafe_setpoints > 0 {
         Some("targets that nobody asked for, or outside their limits".to_owned())
     } else if outcome.ending != Ending::Settled {
-        // Settled is: each within 1 m of its place, on earth.
+        // Settled means that each drone is within 1 m of its setpoint on earth.
         Some(format!("{:?}: {:?}", outcome.ending, outcome.fleet))
     } else {
         off.next().map(|(relay, _)| format!("{relay:?}"))

@@ -1,10 +1,10 @@
-//! Random sequences of all that may happen to a chain in the air.
+//! Random faults of a chain in flight.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
-//! | losses | 0 to 60 %, in runs of up to 20 frames in 50 %; up to 10 % corrupted, 10 % twice, 10 % late |
+//! | losses | 0 to 60 %, in bursts of up to 20 frames in 50 %; up to 10 % corrupted, 10 % duplicated, 10 % late |
 //! | cuts | up to 4 in 180 s, 2 s to 100 s long |
-//! | relays that do not hear another one | up to 4, 2 s to 100 s long |
+//! | one-way links | up to 4, 2 s to 100 s long |
 //! | relays switched off | up to 3, half of them on again within 60 s |
 //! | without a quorum | hold in 50 %, else leave |
 
@@ -21,7 +21,7 @@ use super::*;
 
 const STORM_S: u64 = 180;
 
-/// Some time of the storm.
+/// Draws a time span within the storm.
 fn span(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     let from = rng.random_range(0..STORM_S * 1_000);
     let until = from + rng.random_range(2_000..100_000);

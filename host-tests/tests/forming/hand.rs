@@ -1,4 +1,4 @@
-//! Relays on perfect wires that take no time, so that a test may hold up, lose and look at every frame.
+//! Relays on instantaneous wires, on which a test can inspect, delay and drop every frame.
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Place};
 
-/// A frame on its way: to which relay, counted from 0, through which port, and its bytes.
+/// Frame in transit: receiver counted from 0, its port, and the bytes.
 pub(crate) struct Flying {
     pub(crate) to: usize,
     pub(crate) port: Port,
@@ -18,7 +18,7 @@ pub(crate) struct Flying {
 }
 
 impl Flying {
-    /// Whether it is a message of Algorithm 2's last round.
+    /// Returns true for a message of Algorithm 2's last round.
     pub(crate) fn is_stop(&self) -> bool {
         self.is(
             |message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop),
@@ -44,7 +44,7 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// The paper's link, whose relays may choose altitudes within `band` and begin at `altitude_m`.
+    /// Creates the paper's link, with altitudes within `band` that start at `altitude_m`.
     pub(crate) fn new(relays: usize, altitude_m: f64, band: Band, settings: Settings) -> Self {
         let mut link = Link {
             y_i: 150.0,
@@ -80,12 +80,11 @@ impl Chain {
         Relay::new(self.mission, identity, self.settings, seed, self.now).unwrap()
     }
 
-    /// Relay `at` forgets everything.
     pub(crate) fn reboot(&mut self, at: usize, seed: u32) {
         self.relays[at] = self.switched_on(at, seed);
     }
 
-    /// The next frame arrives, or time passes until the next timer.
+    /// Delivers the next frame, or else advances to the next timer.
     pub(crate) fn step(&mut self) {
         if let Some(Flying { to, port, bytes }) = self.flying.pop_front() {
             self.relays[to].handle_bytes(self.now, port, &bytes);
@@ -107,7 +106,7 @@ impl Chain {
         }
     }
 
-    /// Steps until `done`, at most `limit_ms` of the chain's time; how long it took, ms.
+    /// Steps until `done`, for at most `limit_ms` of virtual time. Returns the time taken, ms.
     pub(crate) fn until(&mut self, limit_ms: u64, done: impl Fn(&Self) -> bool) -> Option<u64> {
         let begun = self.now;
         let took = |chain: &Self| chain.now.since(begun).as_micros().div_ceil(1000);
@@ -120,15 +119,14 @@ impl Chain {
         Some(took(self))
     }
 
-    /// Whether all relays hold, in the same view, and nothing is on its way.
+    /// Returns true if all relays hold positions in the same view and no frame is in transit.
     pub(crate) fn holds(&self) -> bool {
         let view = self.relays[0].view();
         let holds = |relay: &Relay| relay.phase() == Phase::Holding && relay.view() == view;
         self.relays.iter().all(holds)
     }
 
-    /// By how much the SIR of the chain as it stands is above what its relays have agreed to, as a part of it, and how far the
-    /// nearest two relays are from each other, m.
+    /// Returns the relative margin of the chain's SIR over its target, and the smallest distance, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self
@@ -148,7 +146,7 @@ impl Chain {
     }
 }
 
-/// A band of one altitude, and a wide one.
+/// Bands of one altitude and of many.
 pub(crate) const LOW: Band = Band::at(20.0);
 pub(crate) const WIDE: Band = Band {
     least_m: 20.0,

@@ -1,12 +1,11 @@
-//! A frame of a life, or of a view, that is over comes late.
+//! Late frames of an earlier life or view.
 
 use uav_relay::wire::message::Message;
 use uav_relay::{Adjust, Local, Method, Settings};
 
 use crate::hand::{Chain, LOW, WIDE};
 
-/// The first pass of a leader's life is held up, the leader is rebooted, and the chain goes through Algorithm 2: when the pass
-/// comes after all, no relay leaves its place for it.
+/// Delays a leader's first pass beyond its reboot and an agreement by Algorithm 2: no relay may follow it.
 #[test]
 fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {
@@ -25,7 +24,7 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
             chain.until(5_000, at_held).unwrap();
             let late = chain.flying.pop_back().unwrap();
             chain.reboot(0, seed);
-            // It comes when the chain turns for the last time.
+            // The pass arrives during the last round.
             let stops = |chain: &Chain| {
                 let mut flying = chain.flying.iter();
                 flying.any(|frame| frame.to == held && frame.is_stop())
@@ -41,7 +40,7 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     }
 }
 
-/// A call for a view that is held up until a newer one is in force changes nothing.
+/// Checks that a view request delayed beyond a newer view has no effect.
 #[test]
 fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
@@ -52,13 +51,13 @@ fn a_proposal_of_an_old_view_changes_nothing() {
         flying.any(|frame| frame.to == 2 && frame.is(|m| matches!(m, Message::Proposal(_))))
     };
     chain.until(10_000, calls).unwrap();
-    // Lost on its way, it is sent again; and the relay before is rebooted once more, for a second view.
+    // The lost request is repeated; relay 2 then reboots once more for a second view.
     let late = chain.flying.pop_back().unwrap();
     chain.until(10_000, Chain::holds).unwrap();
     assert_eq!(chain.relays[2].view().number(), 1);
     chain.reboot(1, 4);
     let second = |chain: &Chain| chain.holds() && chain.relays[2].view().number() == 2;
-    // Relay 2 has forgotten a view that it is needed in: its lease has to run out first, 15 s after a pulse.
+    // Relay 2 forgot a view that needs it, whose lease must expire first, 15 s after a renewal.
     chain.until(10_000 + 16_000, second).unwrap();
     let before: Vec<_> = chain
         .relays
@@ -81,20 +80,19 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(after, before);
 }
 
-/// A relay that hears of a newer view than its own, from a neighbour that it could not talk to, calls for one.
+/// Checks that a relay requests a view when an incompatible neighbour reports a newer one.
 #[test]
 fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
     chain.until(5_000, Chain::holds).unwrap();
     chain.reboot(1, 3);
-    // The tail has agreed to the new view, and its count is lost for good: the others are rebooted.
+    // The tail accepted the new view, but the result is lost because the others reboot.
     let agreed = |chain: &Chain| chain.relays[2].view().number() == 1;
     chain.until(10_000, agreed).unwrap();
     chain.flying.clear();
     chain.reboot(0, 8);
     chain.reboot(1, 9);
-    // Passes of view 0 are none of the tail's; it says so, and the number of the next view is above that of its own.
-    // The tail counts as a member that may be elsewhere for as long as its lease lasts.
+    // The tail rejects passes of view 0 and reports its view. It is a member elsewhere until its lease expires.
     let took = chain.until(10_000 + 16_000, |chain| {
         chain.holds() && chain.relays[0].view().number() == 2
     });

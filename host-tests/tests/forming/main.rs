@@ -1,5 +1,4 @@
-//! A chain of two to six relays, passed their frames by hand, that loses its memory: a relay or the leader is switched on
-//! again in the midst of something, frames come late, and the chain agrees all the same, to what it can keep.
+//! Chains of two to six relays with reboots and late frames, passed by hand: they agree again.
 
 mod hand;
 mod late;

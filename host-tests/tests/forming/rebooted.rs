@@ -1,14 +1,13 @@
-//! A relay, or the leader, is switched on again while the others go on.
+//! Reboot of a relay or the leader while the others continue.
 
 use uav_relay::{Method, Phase, Settings};
 
 use crate::hand::{Chain, LOW, WIDE};
 
-/// A leader that comes back with any number, just behind the chain's as well, is heard, and the chain agrees again: within a
-/// second, where `hop_time` is 30 ms.
+/// Checks that a rebooted leader with any pass number agrees within a second at a `hop_time` of 30 ms.
 #[test]
 fn a_rebooted_leader_is_answered_whatever_its_seed() {
-    // With a prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
+    // With prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
     for predict in [true, false] {
         let settings = Settings {
             predict,
@@ -32,8 +31,7 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
     }
 }
 
-/// The middle one of three forgets everything while the second pass of the leader's life is under way. Of that it has missed
-/// the beginning: it gets its place by a new view.
+/// Reboots a relay during the leader's second pass: it gets its position by a new view.
 #[test]
 fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
     let settings = Settings {
@@ -58,14 +56,14 @@ fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
     }
 }
 
-/// One that is rebooted when all is agreed calls on the first pulse, which it has agreed on nothing for, or by itself.
+/// Reboots a relay of a settled chain: it requests a view at the first unknown renewal, or on its own.
 #[test]
 fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
     for rebooted in 1..4 {
         let mut chain = Chain::new(4, 20.0, LOW, Settings::default());
         chain.until(5_000, Chain::holds).unwrap();
         chain.reboot(rebooted, 5);
-        // `quiet`, and two hops for each relay.
+        // The limit is `quiet`, and two hops for each relay.
         let took = chain.until(5_000 + 2 * 4 * 30 + 500, Chain::holds);
         println!("relay {}: {took:?} ms", rebooted + 1);
         assert!(took.is_some(), "{took:?}");
@@ -74,8 +72,6 @@ fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
     }
 }
 
-/// The agreement on altitudes is under way, its answer is lost, and a relay forgets what it had chosen: it must not join it
-/// with another altitude than it was agreed for.
 #[test]
 fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
     let settings = Settings {
@@ -89,7 +85,7 @@ fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
                 let name = format!("{relays} relays at {altitude_m} m, {}", rebooted + 1);
                 let mut chain = Chain::new(relays, altitude_m, WIDE, settings);
                 let tail = |chain: &Chain| chain.relays[relays - 1].phase() == Phase::Holding;
-                // Every relay knows where it is to be before, and one sweep confirms it.
+                // Each relay knows its position by then, and one sweep confirms it.
                 chain.until(60_000, tail).unwrap();
                 chain.flying.clear();
                 chain.reboot(rebooted, 99);

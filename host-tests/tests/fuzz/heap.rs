@@ -1,4 +1,4 @@
-//! The counter of what is asked of the heap counts, so that its zeros mean something.
+//! Check of the heap counter, so that its zeros are meaningful.
 
 use uav_relay_fuzz::heap::{asked, without};
 

@@ -1,7 +1,6 @@
-//! The fuzz targets without a fuzzer: every input that one has found worth keeping, and some thousands of random ones.
+//! Fuzz targets without a fuzzer: every input of the corpora, and thousands of random ones.
 //!
-//! The same functions run in `host-tests/fuzz` under libFuzzer. Random tests draw from the environment variable `SEED` (1
-//! if unset), which each of them prints.
+//! `host-tests/fuzz` runs the same functions under libFuzzer. Random tests print their `SEED` (1 if unset).
 
 use std::fs;
 use std::path::PathBuf;
@@ -15,17 +14,16 @@ mod replay;
 mod seeds;
 mod tools;
 
-/// Counts what the crate asks of the heap: nothing.
+/// Counter of heap allocations, of which the crate makes none.
 #[global_allocator]
 static HEAP: Counting = Counting;
 
-/// The folder of the inputs of a target.
 fn folder(target: &str) -> PathBuf {
     let fuzz = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/corpus");
     PathBuf::from(fuzz).join(target)
 }
 
-/// The inputs of a target with the names of their files, in the order of those.
+/// Returns the inputs of a target with their file names, in order.
 fn corpus(target: &str) -> Vec<(String, Vec<u8>)> {
     let mut inputs: Vec<_> = fs::read_dir(folder(target))
         .unwrap()

@@ -1,4 +1,4 @@
-//! Each target on random bytes and on inputs of its corpus with a few bytes changed: a plain test run explores a little too.
+//! Targets on random bytes and on mutated inputs of the corpus.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -7,17 +7,16 @@ use uav_relay_oracle::random::seed;
 
 use super::corpus;
 
-/// Inputs of each kind and target.
+/// Number of inputs of each kind and target.
 const INPUTS: usize = 1000;
 
-/// The longest random input.
 const LONGEST: usize = 300;
 
 fn rng() -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed(1))
 }
 
-/// Runs `target` on what `draw` gives, and shows the input where it fails.
+/// Runs `target` on drawn inputs and shows an input that fails.
 fn explore(target: fn(&[u8]), mut draw: impl FnMut() -> Vec<u8>) {
     for _ in 0..INPUTS {
         let input = draw();
@@ -33,7 +32,7 @@ fn bytes(rng: &mut impl Rng) -> Vec<u8> {
     bytes
 }
 
-/// One input with up to four bytes changed, left out, doubled, or with the end of another.
+/// Returns an input with up to four bytes changed, removed or doubled, or with another input's end.
 fn changed(rng: &mut impl Rng, inputs: &[(String, Vec<u8>)]) -> Vec<u8> {
     let pick = |rng: &mut dyn Rng| inputs[rng.random_range(0..inputs.len())].1.clone();
     let mut input = pick(rng);

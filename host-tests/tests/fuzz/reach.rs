@@ -1,4 +1,4 @@
-//! That the corpora get where things may go wrong: every counter counts, every method finds places, links are bad.
+//! Coverage of the corpora: all counters, all methods and bad links.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use uav_relay_fuzz::{chain, relay};
 
 use super::corpus;
 
-/// How a relay came to a place.
+/// Returns the name of a relay's method.
 fn method(watched: &Watched) -> &'static str {
     match watched.settings().method {
         _ if watched.relay().mission().field().is_some() => "field",
@@ -19,7 +19,7 @@ fn method(watched: &Watched) -> &'static str {
     }
 }
 
-/// The sums of every counter over some relays.
+/// Returns the sums of every counter over some relays.
 fn counted<'a>(relays: impl IntoIterator<Item = &'a Watched>) -> [u64; 23] {
     relays.into_iter().fold([0; 23], |sums, watched| {
         let counters = all(watched.relay().stats());

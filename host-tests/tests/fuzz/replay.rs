@@ -1,20 +1,19 @@
-//! The corpora: every input again, and that they stay small.
+//! Replay of the corpora, which must stay small.
 
 use uav_relay_fuzz::TARGETS;
 use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::corpus;
 
-/// What all corpora may take in a checkout: files, and bytes in them.
+/// Largest number of files and bytes of all corpora.
 const MOST: (usize, usize) = (200, 200 << 10);
 
-/// Under Miri, a thousand times slower: the targets that do not compute for long, and how many short inputs of each.
+/// Targets for Miri, which is a thousand times slower, and their numbers of short inputs.
 const FOR_MIRI: [(&str, usize); 4] = [("deframe", 4), ("frame", 6), ("relay", 3), ("mavlink", 2)];
 
-/// The longest input for Miri, bytes.
 const SHORT: usize = 60;
 
-/// The inputs of a target that are run: all, but for Miri.
+/// Returns the inputs of a target to run: all, or few under Miri.
 fn chosen(target: &str) -> Vec<(String, Vec<u8>)> {
     let mut inputs = corpus(target);
     assert!(!inputs.is_empty(), "{target}");

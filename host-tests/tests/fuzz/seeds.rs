@@ -1,4 +1,4 @@
-//! Where the corpora begin: golden frames, recorded flights, the example scenarios.
+//! Seeds of the corpora: golden frames, recorded flights, the example scenarios.
 //!
 //! ```sh
 //! cargo test --test fuzz -- --ignored write_the_seeds
@@ -18,10 +18,9 @@ use uav_relay_fuzz::{TARGETS, setting};
 
 use super::folder;
 
-/// Frames of a flight that are kept: a few passes of every kind.
+/// Number of recorded frames of a flight: a few passes of every kind.
 const FRAMES: usize = 24;
 
-/// Wake-ups in one operation, at most.
 const MOST_WAKES: u8 = 64;
 
 #[derive(Deserialize)]
@@ -47,7 +46,7 @@ fn golden() -> Vec<Frame> {
     vectors.frames
 }
 
-/// Two lengths and a stream: each golden frame alone, then all of them with noise in between.
+/// Returns golden frames after two lengths: each alone, then all of them with noise in between.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().iter().map(|frame| hex(&frame.wire)).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();
@@ -64,7 +63,7 @@ fn deframe() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Each golden frame without its check sequence.
+/// Returns each golden frame without its check sequence.
 fn frame() -> Vec<Vec<u8>> {
     golden()
         .iter()
@@ -83,19 +82,18 @@ fn scenario() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// What a chain and its mission begin with: mission, number of relays, method and the numbers of Algorithm 2.
+/// Returns the starts of chains: mission, number of relays, method and parameters of Algorithm 2.
 fn missions() -> Vec<Vec<u8>> {
-    // Unsigned, and signed.
     let align = (0..6).flat_map(|mission| [0, 8].map(|how| vec![mission, 3, how]));
     let joint = [1, 33, 65, 73].map(|how| vec![1, 3, how]);
     let adjust = [vec![1, 3, 2, 0, 2, 20, 0], vec![1, 3, 2, 65, 2, 20, 0, 5]];
     align.chain(joint).chain(adjust).collect()
 }
 
-/// A chain that is switched on, told to agree in the end, and run for so many rounds.
+/// Returns chains that are started, commanded to agree at the end, and run for so many rounds.
 fn chain() -> Vec<Vec<u8>> {
     let with = |mission: &[u8], operations: &[u8]| {
-        // Seed, four relays without anything of their own, to the end.
+        // Seed, four relays without individual settings, to the end.
         [mission, &[1, 0], &[0; 4], &[3], operations].concat()
     };
     let mut seeds: Vec<_> = missions()
@@ -107,7 +105,7 @@ fn chain() -> Vec<Vec<u8>> {
         let operations = [0, 13, 9, 1, operation, 5, 1, 2, 0, 13, 60];
         seeds.push(with(&[1, 3, 1], &operations));
     }
-    // Damage, frames cut and lost, noise, frames doubled and put back, a restart, on links and on one channel.
+    // Damaged, cut, lost, doubled and reordered frames, noise and a restart, on links and on one channel.
     let faults = [
         &[
             0, 13, 2, 1, 5, 3, 7, 0, 13, 2, 1, 6, 9, 1, 1, 0, 1, 7, 0, 3, 5, 1, 0,
@@ -119,7 +117,7 @@ fn chain() -> Vec<Vec<u8>> {
     ]
     .concat();
     seeds.extend([0, 64].map(|how| with(&[0, 3, how], &faults)));
-    // Signed: relay 2 is handed a newer mission, and one more while relay 3 is rebooted.
+    // Signed frames: relay 2 receives a newer mission, and another one while relay 3 reboots.
     let uploads = [
         &[0, 13, 60, 1, 13, 0][..],
         &[0x99; 8],
@@ -129,7 +127,7 @@ fn chain() -> Vec<Vec<u8>> {
     ]
     .concat();
     seeds.extend([8, 72].map(|how| with(&[0, 3, how], &uploads)));
-    // Relay 2 holds its altitude: what it holds is gathered.
+    // Relay 2 holds its altitude, so that profiles are collected.
     let mixed = |how| {
         let rounds = [0, 13, 127].repeat(8);
         [&[1, 3, how, 1, 0][..], &[0, 4, 0, 0], &[3], &rounds].concat()
@@ -138,14 +136,14 @@ fn chain() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// A relay that hears what it hears in a flight of its chain, and operations on one that nobody talks to.
+/// Returns relays with the frames of their chain's flight, and operations on an isolated one.
 fn relay() -> Vec<Vec<u8>> {
     let mut seeds = Vec::new();
     for mission in missions() {
         for index in [1, 2, 4] {
             seeds.push(recorded(&mission, index));
         }
-        // Wake-ups, a restart, samples, each kind of message from either side.
+        // Wake-ups, a restart, samples, and each kind of message from either side.
         let mut operations = vec![3, 63, 7, 3, 9, 8, 100, 1, 0, 0, 200];
         for tag in 0..15 {
             operations.extend([9, tag % 2, tag, 0, 0, 0, 128, 0, 1, 0, 64, 0, 128, 0, 0]);
@@ -159,20 +157,19 @@ fn relay() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// The next version for as many relays, of the paper's mission with the interferer elsewhere, from one side or the other.
+/// Returns an offer of the next version, the paper's mission with another interferer position, from `side`.
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
     [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// The second of four relays with a key, on links or on one channel: it is asked for a hello and offered a mission, its other neighbour comes to hold
-/// it, too, and they are counted in a view that flies it.
+/// Returns the second of four relays with a key, which receives a mission that a view adopts.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
     let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
     let hello = [9, 1, 10, 0, 2, 1, 0, 0, 0, 1, 0, 0];
-    // The next view, of the mission held: from the first place, after view 0 of four with a voice, its leader's; back from the third.
+    // The next view with the held mission: proposed by the leader, decided by the third relay.
     let proposal = [9, 0, 11, 0, 33, 1, 240, 4, 1, 0, 0, 1, 0, 0];
     let decision = [9, 1, 12, 0, 33, 3, 240, 4, 1, 33, 4, 4, 0, 0];
     let wake = [3, 3];
@@ -190,7 +187,7 @@ fn uploaded(how: u8) -> Vec<u8> {
     parts.concat()
 }
 
-/// The first or the last of four relays with a key hears from Tx or from Rx: a question, a mission, the same again.
+/// Returns the first or last of four relays with a key, with two queries and offers from Tx or Rx.
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
@@ -199,12 +196,11 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// The last of four relays, with a guard, on links or on one channel: it is told where it is, counted in the next two views,
-/// and hears of a fence, a pass of another view, and nodes beyond its neighbour.
+/// Returns the last of four guarded relays: it receives its position, two views, a fence and late frames.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];
-    // The view after its own, a good digest, the third place of four in view 0, whose leader is there.
+    // The view after its own, with the right digest, for the third position of four in view 0, whose leader is present.
     let proposal = [9, 0, 11, 1, 0, 3, 4, 224, 0, 1];
     let hello = [9, 0, 10, 1, 0, 3, 0, 5];
     let fence = [9, 0, 13, 7, 0, 100, 0, 0, 0, 128, 0, 0, 128];
@@ -214,7 +210,7 @@ fn formed(wiring: u8) -> Vec<u8> {
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 
-/// A relay that asks for tags hears from a neighbour of another mission, and from one without a tag.
+/// Returns a relay that requires tags and receives frames of another mission and without a tag.
 fn refused() -> Vec<u8> {
     let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
     let other = [9, 0, 3, 255, 0, 0];
@@ -222,7 +218,7 @@ fn refused() -> Vec<u8> {
     [&head[..], &other, &bare].concat()
 }
 
-/// The second of four relays hears the first pass of its leader twice.
+/// Returns the second of four relays, which receives its leader's first pass twice.
 fn again() -> Vec<u8> {
     let head = [0, 3, 0, 1, 0, 0, 0, 0, 0, 1, 0];
     let pass = [9, 192, 0, 250, 64, 0, 0, 0];
@@ -230,7 +226,7 @@ fn again() -> Vec<u8> {
     [&head[..], &pass, &targets].concat()
 }
 
-/// The flight of a chain as one of its relays sees it.
+/// Returns a chain's flight as one of its relays receives it.
 fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     let mut input = Input::new(prefix);
     let mission = setting::mission(&mut input, 5).unwrap();
@@ -261,7 +257,7 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
         }
         let mut heard = Vec::new();
         frames += exchange(&mut relays, now, usize::from(own), &mut heard);
-        // As many wake-ups in one operation as there may be.
+        // As many wake-ups as one operation may have.
         if wakes > 0 && (wakes == MOST_WAKES || !heard.is_empty()) {
             seed.extend([3, wakes - 1]);
             wakes = 0;
@@ -271,7 +267,7 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     seed
 }
 
-/// Has all relays say what they have to say; how many frames relay `own` (from 0) has heard, which go into `seed`.
+/// Exchanges all frames; appends those of relay `own` (from 0) to `seed` and returns their number.
 fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) -> usize {
     let (mut heard, mut said) = (0, true);
     let mut buffer = [0; MAX_FRAME];
@@ -300,7 +296,7 @@ fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) 
     heard
 }
 
-/// Streams of frames with noise between, and flights with a PX4 and an ArduCopter.
+/// Returns streams of frames with noise, and flights with a PX4 and an ArduCopter.
 fn mavlink() -> Vec<Vec<u8>> {
     let heartbeat = [1, 0, 7, 1, 0, 9, 0, 0, 6, 0, 2, 12, 129, 4, 3];
     let noise = [0, 12, 253, 9, 0, 0, 0, 1, 1, 0, 0, 0, 253, 255];
@@ -318,7 +314,7 @@ fn mavlink() -> Vec<Vec<u8>> {
     let hurt = [
         0, 2, 1, 7, 1, 0, 3, 1, 2, 3, 20, 16, 3, 2, 7, 1, 0, 3, 9, 9, 9, 30,
     ];
-    // Without a key, and with one: then each frame that comes is followed by how it is signed.
+    // Without and with a key; with a key each received frame is followed by its kind of signature.
     let flight = |autopilot: u8, how: &[u8]| {
         let kind = if how.is_empty() { 1 } else { 3 };
         let begins = [&[kind, 255, 63, 255, 63, 100, 0], how].concat();
@@ -359,7 +355,7 @@ fn mavlink() -> Vec<Vec<u8>> {
         ];
         parts.concat()
     };
-    // The link has the time, is without a clock, has that of the end of all stamps; replays, a clock that is set, one that jumps, another key.
+    // Clocks of the link (valid, missing, at the largest stamp), replays, clock changes, another key.
     let attacked = [
         flight(0, &[2]),
         vec![

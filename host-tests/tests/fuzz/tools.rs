@@ -1,4 +1,4 @@
-//! What the targets judge by: COBS there and back, numbers that cover their ranges.
+//! Checks of the targets' tools: COBS in both directions, numbers over their whole ranges.
 
 use proptest::collection::vec;
 use proptest::prelude::*;

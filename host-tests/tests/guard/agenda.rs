@@ -1,4 +1,4 @@
-//! What happens in a flight, and when.
+//! Random events of a flight and their times.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ pub(crate) const ROUGH_S: f64 = 200.0;
 pub(crate) const SLOWEST: f64 = 2.0;
 pub(crate) const FASTEST: f64 = 40.0;
 
-/// What happens to drone `.0`.
+/// Event at the drone with the index `.0`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum What {
     Hear(usize, Point),
@@ -22,12 +22,12 @@ pub(crate) enum What {
     Mute(usize),
     Unmute(usize),
     Vanish(usize),
-    /// It links to the last one, around the third.
+    /// The drone links to the relay in the last field, past the silent relay in the third.
     Around(usize, Side, usize, Option<usize>),
     Back(usize, Side, usize),
     Forget(usize, Side),
     Speed(usize, f64),
-    /// Its pilot takes it, its guard hears of that, the pilot moves it aside, and gives it back.
+    /// The pilot takes control, the guard is informed, the pilot moves the drone aside and gives control back.
     Take(usize),
     Hears(usize),
     Aside(usize, (usize, bool, f64)),
@@ -77,7 +77,7 @@ pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     plan
 }
 
-/// Relays that are rebooted, fall silent, or go: of three in a row only one in the second and third ways.
+/// Plans reboots, silences and removals; of three relays in a row at most one falls silent or is removed.
 pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     let mut plan = Vec::new();
     let mut left_out = 0;
@@ -98,7 +98,7 @@ pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> 
     plan
 }
 
-/// Pilots who take their drones. Not beside one that is gone: an operator says that nobody is there any more.
+/// Plans pilots' takeovers, except beside a removed drone, which an operator has cleared.
 pub(crate) fn pilots(
     rng: &mut ChaCha8Rng,
     relays: usize,
@@ -143,7 +143,7 @@ pub(crate) fn pilots(
     plan
 }
 
-/// Relay `k` falls silent, its neighbours link to each other, and it is back some time later; or it is gone.
+/// Plans the silence of relay `k`, the link of its neighbours past it, and its return unless it is `gone`.
 pub(crate) fn around(
     rng: &mut ChaCha8Rng,
     plan: &mut Vec<(f64, What)>,
@@ -175,7 +175,7 @@ pub(crate) fn around(
     }
 }
 
-/// Places in order, the separation apart.
+/// Returns random positions in order along x, at least the separation apart.
 pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(confines.fence.most_x_m);
     let step = f64::from(confines.separation_m) + 5e-7 * distance;
@@ -202,8 +202,9 @@ pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize
         .collect()
 }
 
-/// The same with half of the neighbours closer along x, and the separation apart in space: relays that are not neighbours stay that far
-/// apart along x. Where `wild`, they do not: some take turns at two places across the line.
+/// Moves half of the neighbours closer along x, with the separation kept in space.
+///
+/// Relays that are not neighbours stay the separation apart along x, unless `wild`.
 pub(crate) fn closer(
     rng: &mut ChaCha8Rng,
     confines: &GuardConfig,

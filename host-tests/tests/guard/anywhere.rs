@@ -1,17 +1,16 @@
-//! Guards of drones that begin anywhere in the air, are given back anywhere, and fly along a line that turns.
+//! Guards of drones that are engaged anywhere in the air, given back anywhere, and fly along a line that turns.
 //!
-//! Drones fly as the autopilot link has them fly: toward the setpoint no faster than 5 m/s, slowing down before it, and overshooting by
-//! what the flight controller lags behind.
+//! Drones move as behind the autopilot link: at most 5 m/s, slower close to the setpoint, with a lagging controller's overshoot.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
 //! | relays, separation | 2 to 8; 4 m to 20 m |
-//! | stated position error | 0.5 m to 1.5 m in x, y and altitude: two fifths of it a bias, three tenths noise, the rest is left to what the autopilot lags behind |
+//! | stated position error | 0.5 m to 1.5 m in x, y and altitude: two fifths of it a bias, three tenths noise, the rest for the autopilot's lag |
 //! | start | up to 3 separations apart across the line, 0 m to 2 separations apart along it; in 30 % two are in the wrong order |
 //! | medium | loses 0 to 40 %, delays up to 2 s |
 //! | pilots | take a drone with 30 %, fly it to anywhere within 5 separations of the chain, and give it back |
 //! | reboots | a relay with 20 % |
-//! | uploads | the line turns by up to 85 degrees once in 50 % of the flights, heard by each relay up to 5 s late |
+//! | uploads | the line turns by up to 85 degrees once in 50 % of the flights, received by each relay up to 5 s late |
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,18 +29,18 @@ use crate::world::beside;
 const STEP_S: f64 = 0.1;
 const SPEED: f64 = 5.0;
 
-/// Acceleration of a target, and of a drone that follows it, m/s².
+/// Acceleration limit of the autopilot's target, m/s².
 const TARGET_ACCELERATION: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
 
-/// A drone that is given back at full speed overshoots, comes back, and hovers after so long at most.
+/// Longest time until a drone that is given back at full speed hovers after its overshoot, s.
 const BRAKES_S: f64 = 8.0;
 
-/// Faults happen until then; the flight ends when all have arrived, or at `LAST_S`.
+/// End of the faults, s. The flight ends when all drones have arrived, or fails at `LAST_S`.
 const ROUGH_S: f64 = 120.0;
 const LAST_S: f64 = 900.0;
 
-/// Line over the ground, from a transmitter that all lines share.
+/// Line over the ground; all lines start at the same transmitter.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     number: u32,
@@ -81,13 +80,13 @@ struct Drone {
     at: Point,
     velocity: Point,
     bias: Point,
-    /// What the autopilot flies to: place and velocity over the ground.
+    /// Target of the autopilot: position and velocity over the ground.
     target: Point,
     target_velocity: Point,
     guard: Guard,
     line: Line,
     agreed: Option<(u32, Point)>,
-    /// Where its pilot flies it.
+    /// Position to which the pilot flies the drone; `None` under setpoint control.
     pilot: Option<Point>,
     reminder_s: f64,
     letters: u64,
@@ -112,7 +111,7 @@ impl Drone {
         if let Some(goal) = goal {
             let to = way(self.target, goal);
             let left = length(to);
-            // As the link's target: only the speed toward the goal counts.
+            // Only the speed component toward the goal counts, as in the autopilot link's target.
             let toward: f64 = to
                 .iter()
                 .zip(self.target_velocity)
@@ -127,7 +126,7 @@ impl Drone {
             } else {
                 0.0
             };
-            // It turns no faster than it may change its speed: the guard counts on places between the setpoints only.
+            // The target turns no faster than its acceleration allows: the guard assumes straight flight.
             let change = way(self.target_velocity, to.map(|part| part * share / STEP_S));
             let part = (1.5 * TARGET_ACCELERATION * STEP_S / length(change).max(1e-9)).min(1.0);
             let velocity = plus(self.target_velocity, change, part);
@@ -154,7 +153,7 @@ impl Drone {
 )]
 #[derive(Debug, Default)]
 struct Report {
-    /// Least distance over the allowed one, m; and between which drones, when.
+    /// Smallest distance less the required one, m, with the two drones and the time.
     margin_m: f64,
     nearest: Option<(usize, usize, f64, f64)>,
     in_order: bool,
@@ -172,17 +171,17 @@ struct World {
     faults: Faults,
     now_s: f64,
     noise_m: f64,
-    /// What each pair may come to: least of the separation and of what it was at the start, m.
+    /// Required distance of each pair: the smaller of the separation and the distance at the start, m.
     least_m: Vec<f64>,
-    /// Since when each drone has hovered in its pilot's hands; infinite while it does not.
+    /// Time since which each drone hovers under its pilot's control; infinite otherwise.
     hovers_s: Vec<f64>,
-    /// When a drone was first told of the place where its neighbour hovers in its pilot's hands; infinite before.
+    /// Time when a drone first received its hovering neighbour's position; infinite before.
     known_s: Vec<f64>,
-    /// The same as `least_m` for such a pair, counted from `BRAKES_S` after that.
+    /// Required distance of a drone and its hovering neighbour, from `BRAKES_S` after `known_s`, m.
     hovering_m: Vec<f64>,
-    /// Drones that their pilots give back once no other one is on its way past them.
+    /// Drones that their pilots give back once no other drone is passing them.
     later: Vec<usize>,
-    /// Drones that were given back in motion, and until when they brake: their distances count from then on.
+    /// Drones given back in motion, and the end of their braking, from which their distances are checked.
     brakes: Vec<(usize, f64)>,
     rng: ChaCha8Rng,
 }
@@ -192,7 +191,7 @@ impl World {
         k * self.drones.len() + other
     }
 
-    /// The distances of `k` count from now on.
+    /// Restarts the distance check of drone `k` at its present distances.
     fn begin(&mut self, k: usize) {
         for other in 0..self.drones.len() {
             let apart = length(way(self.drones[k].at, self.drones[other].at));
@@ -203,7 +202,7 @@ impl World {
         }
     }
 
-    /// Returns true if another drone is on its way past drone `k`.
+    /// Returns true if another drone is about to pass drone `k`.
     fn is_in_the_way(&self, k: usize) -> bool {
         let (apart, at) = (f64::from(self.config.separation_m), self.drones[k].at);
         let flown = |drone: &&Drone| drone.pilot.is_none();
@@ -263,7 +262,7 @@ impl World {
             }
             let before = drone.guard.setpoint();
             if drone.guard.steer(now).is_some() && before.is_none() {
-                // The autopilot's target begins where the drone takes itself to be.
+                // The autopilot's target starts at the drone's estimated position.
                 drone.target = drone.taken_at();
             }
             while let Some((side, to, fence)) = drone.guard.poll() {
@@ -296,7 +295,7 @@ impl World {
         }
     }
 
-    /// Takes which drones hover in their pilots' hands, and how near their neighbours are once they know it.
+    /// Updates which drones hover under a pilot's control, and the distances required of their neighbours.
     fn watch_pilots(&mut self) {
         for k in 0..self.drones.len() {
             let drone = &self.drones[k];
@@ -323,7 +322,7 @@ impl World {
         }
     }
 
-    /// Prints where the drones are, for a person.
+    /// Prints the positions and goals of the drones for debugging.
     fn tell(&self) {
         let each = self.drones.iter().map(|drone| {
             let at = drone.line.along(drone.at);
@@ -366,7 +365,7 @@ impl World {
     }
 }
 
-/// Places on a line, in order and the separation apart; across it within the box.
+/// Returns random positions in order and the separation apart along the line, within the box across it.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.fence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;
@@ -405,7 +404,7 @@ fn config(rng: &mut ChaCha8Rng, relays: usize) -> GuardConfig {
     }
 }
 
-/// Where drones begin: anywhere across the line, and a little along it.
+/// Returns random start positions: anywhere across the line, and close together along it.
 fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let apart = f64::from(config.separation_m);
     let step = apart

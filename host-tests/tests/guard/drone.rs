@@ -1,4 +1,4 @@
-//! One drone: where it is, what its flight controller was told, and its guard.
+//! Simulated drone: its motion, its flight controller's setpoints and reports, and its guard.
 
 use std::collections::VecDeque;
 
@@ -13,17 +13,15 @@ pub(crate) fn instant(at_s: f64) -> Instant {
     Instant::from_micros((at_s * 1e6).round() as u64)
 }
 
-/// From one place to another, m.
 pub(crate) fn way(from: Point, to: Point) -> Point {
     [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
 }
 
-/// How long that is, m.
 pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
     dx.hypot(dy).hypot(dh)
 }
 
-/// As far from `at` as `share` of `way` leads.
+/// Returns the point at the fraction `share` of the vector `way` from `at`.
 pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
     [0, 1, 2].map(|part| at[part] + share * way[part])
 }
@@ -31,49 +29,48 @@ pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
 #[derive(Debug)]
 pub(crate) struct Drone {
     pub(crate) body: Body,
-    /// Where it was a step before.
+    /// Position one step earlier.
     pub(crate) was: Point,
-    /// What the flight controller flies to.
+    /// Point that the flight controller flies to.
     goal: Point,
-    /// Setpoints on their way there: when each gets there.
+    /// Setpoints in transit to the flight controller, with their arrival times.
     orders: VecDeque<(f64, Point)>,
-    /// Positions on their way to the guard: when each was measured, when each gets there.
+    /// Position reports in transit to the guard: time of measurement, time of arrival, position.
     reports: VecDeque<(f64, f64, Point)>,
     pub(crate) speed: f64,
-    /// How fast that changes, m/s^2.
+    /// Acceleration limit, m/s².
     pub(crate) acceleration: f64,
-    /// How long a setpoint is on its way, s: at most the guard's lag.
+    /// Delay of setpoints, s: at most the guard's lag.
     pub(crate) latency_s: f64,
-    /// `None` while it is switched off.
+    /// Guard; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint since it had none.
+    /// First setpoint after a time without a setpoint.
     begun: Option<Placement>,
-    /// Which nodes are its neighbours.
+    /// Indices of the neighbours toward Tx and Rx.
     pub(crate) links: [Option<usize>; 2],
-    /// Whether it is in the air.
     pub(crate) flies: bool,
-    /// Whether its radio works.
+    /// True while the radio works.
     pub(crate) speaks: bool,
-    /// Whether its pilot has it: what the guard says is ignored.
+    /// True while the pilot flies the drone and the guard's setpoint is ignored.
     pub(crate) taken: bool,
-    /// Whether the neighbours toward Tx and Rx have heard so.
+    /// True once the neighbour toward Tx or Rx knows that the pilot flies this drone.
     pub(crate) told: [bool; 2],
-    /// Where those beyond may be since, along x.
+    /// Range along x that the neighbours keep out of since then.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
-    /// The numbers of the associations in which it has spoken last.
+    /// Association numbers that this drone sent last, by side.
     pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,
     pub(crate) messages: u64,
 }
 
-/// How its flight controller is connected.
+/// Reporting behaviour of the flight controller.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Board {
-    /// Between two reports, at most, s.
+    /// Longest interval between two reports, s.
     pub(crate) every_s: f64,
-    /// How old one may be when it arrives, s.
+    /// Greatest age of a report on arrival, s.
     pub(crate) stale_s: f64,
 }
 
@@ -104,7 +101,7 @@ impl Drone {
         }
     }
 
-    /// Switches the guard on: it begins with the neighbours of the mission and hears at once who is linked to it now.
+    /// Switches the guard on with the neighbours of the mission, then reports the present links to it.
     pub(crate) fn boot(
         &mut self,
         confines: GuardConfig,
@@ -128,7 +125,7 @@ impl Drone {
         self.guard = Some(guard);
     }
 
-    /// Its pilot takes it: it brakes, and hovers where it stops.
+    /// Gives control to the pilot: the drone brakes and hovers where it stops.
     pub(crate) fn take(&mut self, now_s: f64) {
         self.taken = true;
         self.taken_s = now_s;
@@ -138,8 +135,9 @@ impl Drone {
         self.goal = self.body.stops_at(self.acceleration);
     }
 
-    /// The neighbour at that side has heard, by a message of that time, that it is not flown: from then on it goes no farther than
-    /// `(low, high)`.
+    /// Records that by a message of `sent_s` the neighbour on `side` knows of the takeover.
+    ///
+    /// From then on the neighbour stays within `(low, high)` along x.
     pub(crate) fn is_known(&mut self, side: usize, sent_s: f64, (low, high): (f64, f64)) {
         if sent_s >= self.taken_s && !self.told[side] {
             self.told[side] = true;
@@ -150,17 +148,17 @@ impl Drone {
         }
     }
 
-    /// Where it hovers, or will.
+    /// Returns the point where the drone hovers or will stop.
     pub(crate) const fn stopped(&self) -> Point {
         self.goal
     }
 
-    /// Its pilot moves it by `way_m` along the axis `part`.
+    /// Moves the hovering point by `way_m` along the axis `part`, as the pilot does.
     pub(crate) fn aside(&mut self, part: usize, way_m: f64) {
         self.goal[part] += way_m;
     }
 
-    /// Its pilot gives it back: it hovers where it stops, and flies to its setpoints from then on.
+    /// Ends the pilot's control: the drone hovers where it stops and follows its setpoints from then on.
     pub(crate) fn give(&mut self, now_s: f64) {
         if core::mem::take(&mut self.taken) {
             self.goal = self.body.stops_at(self.acceleration);
@@ -168,7 +166,7 @@ impl Drone {
         }
     }
 
-    /// Its guard hears who flies it.
+    /// Reports to the guard whether the drone is under setpoint control.
     pub(crate) fn is_flown(&mut self, now_s: f64) {
         if let Some(guard) = &mut self.guard {
             guard.control(instant(now_s), !self.taken);
@@ -176,7 +174,6 @@ impl Drone {
         }
     }
 
-    /// Flies on for a step.
     pub(crate) fn fly(&mut self, now_s: f64, step_s: f64) {
         while self.orders.front().is_some_and(|(due, _)| *due <= now_s) {
             self.goal = self.orders.pop_front().unwrap().1;
@@ -186,7 +183,7 @@ impl Drone {
             .fly(self.goal, self.speed, self.acceleration, step_s);
     }
 
-    /// Has the flight controller report, and hands the guard what has arrived.
+    /// Generates position reports and passes those that have arrived to the guard.
     pub(crate) fn report(&mut self, rng: &mut ChaCha8Rng, board: Board, hover_m: f64, now_s: f64) {
         if now_s >= self.next_report_s {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;
@@ -203,7 +200,7 @@ impl Drone {
         }
     }
 
-    /// Has the guard move the setpoint, and the flight controller hear of it soon.
+    /// Updates the guard's setpoint and sends a change to the flight controller with a delay.
     pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, confines: &GuardConfig, now_s: f64) {
         let Some(guard) = &mut self.guard else {
             return;
@@ -217,7 +214,7 @@ impl Drone {
         let Some(setpoint) = after.filter(|_| after != before && !self.taken) else {
             return;
         };
-        // It begins where it is, and comes into the box as soon as it may.
+        // The setpoint starts at the drone's position and enters the permitted box as soon as it may.
         let begun = *self.begun.get_or_insert(setpoint);
         let fence = confines.fence;
         for (is, begun, least, most) in [
@@ -236,14 +233,14 @@ impl Drone {
             );
         }
         let lag_s = self.latency_s.min(confines.lag.as_micros() as f64 / 1e6);
-        // In the order in which they were given.
+        // Setpoints arrive in the order in which they were sent.
         let before_s = self.orders.back().map_or(0.0, |order| order.0);
         let due_s = (now_s + lag_s * rng.random_range(0.0..=0.99)).max(before_s);
         let point = [setpoint.x_m, setpoint.y_m, setpoint.altitude_m].map(f64::from);
         self.orders.push_back((due_s, point));
     }
 
-    /// Whether it is time to tell everything again.
+    /// Calls the guard's reminder once per second.
     pub(crate) fn reminded(&mut self, now_s: f64) {
         if now_s >= self.next_reminder_s {
             self.next_reminder_s = now_s + 1.0;
@@ -253,7 +250,7 @@ impl Drone {
         }
     }
 
-    /// From the lowest to the highest x, y and altitude where it may be from now on if nobody tells it anything any more.
+    /// Returns the ranges of x, y and altitude in which the drone can be from now on without further messages.
     pub(crate) fn stretch(&self) -> [(f64, f64); 3] {
         let stop = self.body.stops_at(self.acceleration);
         [0, 1, 2].map(|part| {
@@ -268,7 +265,6 @@ impl Drone {
     }
 }
 
-/// The node number of drone `k`.
 pub(crate) fn node(k: usize) -> u16 {
     k as u16 + 1
 }

@@ -1,4 +1,4 @@
-//! A chain that is as tight as it can be shifts at once, and how long that takes.
+//! Shift of a chain with the smallest possible spacing, and the time it takes.
 
 use uav_relay::HoldReason;
 use uav_relay::{Duration, Side};
@@ -45,7 +45,7 @@ fn commit(world: &mut World, places: &[Point]) {
     }
 }
 
-/// How long until everybody is there, s.
+/// Returns the time until all drones have arrived, s.
 fn time(world: &mut World) -> f64 {
     let begun_s = world.now_s;
     while !world
@@ -75,13 +75,12 @@ fn a_tight_row_shifts_either_way() {
         println!(
             "12 relays 10 m apart: {agreed_s:.1} s to agree on the fences, {shifted_s:.1} s for {shift_m} m"
         );
-        // One after the other at the worst: a flight and a second for what has to be said.
+        // In the worst case the drones fly one after the other, each with a second for its messages.
         assert!(shifted_s < 12.0 * (1.0 + shift_m.abs() / SPEED));
     }
 }
 
-/// Three places agreed 4 m apart, and two of them 12 m aside of the one between: they are approached as far as the two outer ones, that
-/// know nothing of each other, stay 10 m apart along x, and that is said.
+/// Checks three agreed positions 4 m apart along x, of which the outer two stay 10 m apart.
 #[test]
 fn places_too_close_are_approached() {
     let mut world = world(5, 100.0, 100.0);
@@ -126,7 +125,7 @@ fn places_too_close_are_approached() {
     assert_eq!(before, after, "they stay");
 }
 
-/// Places above and beside one another are flown to, left again, and two relays change sides: one climbs down where the other was.
+/// Checks positions above and beside one another, and an exchange of sides.
 #[test]
 fn places_above_each_other_are_flown_to_and_left() {
     let mut world = world(4, 300.0, 20.0);

@@ -1,6 +1,6 @@
-//! The motion guard: a line of simulated drones, a hostile medium, and agreements that come at all times and not to everybody.
+//! Motion guard of simulated drones on a faulty medium with random agreements.
 //!
-//! `COUNT` and `SEED` in the environment take other schedules; a failure names the seed of its one.
+//! `COUNT` and `SEED` select other schedules; a failure names its seed.
 
 mod agenda;
 mod anywhere;
@@ -21,7 +21,7 @@ fn count() -> u64 {
     count.and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// No two drones come closer than agreed in any schedule, and everybody arrives in the end.
+/// Checks that no two drones come closer than the separation in any schedule, and that every drone arrives.
 #[test]
 fn nobody_comes_too_close_and_everybody_arrives() {
     let first = seed(20_260);

@@ -1,36 +1,33 @@
-//! A medium that loses, duplicates, reorders and delays.
+//! Medium that loses, duplicates, reorders and delays messages.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Side;
 use uav_relay::guard::Fence;
 
-/// How bad it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Faults {
-    /// The part that is lost, 0 to 1.
+    /// Fraction of messages that is lost, 0 to 1.
     pub(crate) loss: f64,
-    /// The part that comes twice.
+    /// Fraction of messages that is duplicated, 0 to 1.
     pub(crate) twice: f64,
-    /// The longest delay, s.
     pub(crate) delay_s: f64,
 }
 
-/// One message under way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Letter {
     pub(crate) sent_s: f64,
     due_s: f64,
     pub(crate) to: usize,
     pub(crate) from: usize,
-    /// On whose side of the receiver the sender is.
+    /// Side of the receiver on which the sender is.
     pub(crate) side: Side,
     pub(crate) fence: Fence,
-    /// Number of the line that its places are along.
+    /// Number of the line in whose coordinates the message is.
     pub(crate) line: u32,
 }
 
-/// Everything under way.
+/// Messages in transit.
 #[derive(Debug, Default)]
 pub(crate) struct Medium {
     letters: Vec<Letter>,
@@ -50,7 +47,7 @@ impl Medium {
             if rng.random_bool(faults.loss) {
                 continue;
             }
-            // Most come soon, some very late: the square keeps the long delays rare.
+            // The cube keeps long delays rare.
             let delay = faults.delay_s * rng.random_range(0.0..=1.0_f64).powi(3);
             self.letters.push(Letter {
                 sent_s: now_s,
@@ -64,7 +61,7 @@ impl Medium {
         }
     }
 
-    /// Those that arrive by `now_s`, in no order.
+    /// Removes and returns the messages due by `now_s`, in no particular order.
     pub(crate) fn arrived(&mut self, now_s: f64) -> Vec<Letter> {
         if self.letters.is_empty() {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! A random schedule: a line of drones, what happens to them, and how it ends.
+//! Random schedule: a line of drones, random events, and a final check.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
@@ -6,18 +6,18 @@
 //! | separation | log-uniform 1 m to 50 m; in 5 % 0 |
 //! | D | 0.1 % to 50 % more than the relays take at the separation in 40 %; else 2 to 20 times that |
 //! | reports off by | 0 in 70 %; else up to a twentieth of the separation |
-//! | start and agreed places | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
-//! | neighbours | closer along x than the separation in half of the agreements, by where they are across the line |
-//! | agreements, too | 40 s before and some seconds after a relay is linked around: closer neighbours, and others |
-//! | agreements | 0 to 6 in 200 s, each heard by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
+//! | start and agreed positions | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
+//! | neighbours | closer along x than the separation in half of the agreements, depending on their positions across the line |
+//! | further agreements | 40 s before and some seconds after a relay's neighbours link past it: on close neighbours, then on other positions |
+//! | agreements | 0 to 6 in 200 s, each received by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
 //! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
 //! | acceleration | without a limit in 50 %, else 4 m/s^2 to 40 m/s^2 |
 //! | medium | loses 0 to 50 %, duplicates 0 to 30 %, delays up to 0.1 s to 8 s |
 //! | reports | every 0.1 s to 10 s, up to 0 to 5 s old |
-//! | happens to some | rebooted for up to 15 s; unheard of for up to 60 s, and linked around; taken away for good |
-//! | pilots | in half of the schedules each takes its drone with 30 %, up to twice: for 5 s to 60 s, or until the end; it brakes and hovers, its guard hears of it up to 1.5 s later; in half of the cases the pilot then moves it up to 30 m across the line, away from the others, and in half, once both neighbours have heard of it, along the line to anywhere the separation from where others may be |
+//! | failures | a reboot of up to 15 s; silence of up to 60 s while the neighbours link past the relay; removal for good |
+//! | pilots | in half of the schedules each takes its drone with 30 %, up to twice: for 5 s to 60 s, or until the end; it brakes and hovers, its guard is informed up to 1.5 s later; in half of the cases the pilot then moves it up to 30 m across the line, away from the others, and in half, once both neighbours know of the takeover, along the line, the separation clear of the others |
 //!
-//! In the end the medium loses up to 30 %, everybody flies, and everybody hears of the same places.
+//! In the final phase the medium loses up to 30 %, all drones fly, and all relays receive the same agreement.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -31,7 +31,6 @@ use crate::drone::{Board, length, place, way};
 use crate::medium::Faults;
 use crate::world::{World, beside};
 
-/// What became of one.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
     pub(crate) steps: u64,
@@ -39,11 +38,11 @@ pub(crate) struct Report {
     pub(crate) reboots: u64,
     pub(crate) silences: u64,
     pub(crate) gone: u64,
-    /// Drones that their pilots took.
+    /// Drones taken by their pilots.
     pub(crate) taken: u64,
-    /// Those that they moved along the line.
+    /// Drones moved along the line by their pilots.
     pub(crate) along: u64,
-    /// Neighbours that end closer along x than the separation.
+    /// Neighbours whose final positions are closer along x than the separation.
     pub(crate) close: u64,
     pub(crate) closest_m: f64,
     pub(crate) share_of_time: f64,
@@ -106,7 +105,7 @@ fn confines(rng: &mut ChaCha8Rng) -> GuardConfig {
     }
 }
 
-/// How long the line is, and where everybody begins.
+/// Returns the guard's configuration with the line's length, and the start positions.
 fn line(
     rng: &mut ChaCha8Rng,
     mut confines: GuardConfig,
@@ -124,7 +123,7 @@ fn line(
     (confines, starts)
 }
 
-/// Everything that may happen does.
+/// Runs the phase of the flight with all faults.
 fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     world.faults = Faults {
         loss: rng.random_range(0.0..=0.5),
@@ -143,7 +142,7 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         .filter(|(_, what)| matches!(what, What::Around(..)))
         .map(|(at_s, _)| *at_s)
         .collect();
-    // Who is left agrees on other places: first they were close to the one that fell silent, then they are not.
+    // The remaining relays agree twice: first on positions close to the silent relay, then on others.
     for at_s in around_s {
         let before = places(rng, &world.confines, world.drones.len());
         let before = closer(rng, &world.confines, before, false);
@@ -203,7 +202,7 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
         What::Back(who, side, k) => world.link(who, side, Some(k)),
         What::Forget(k, side) => {
             if let Some(guard) = &mut world.drones[k].guard {
-                guard.forget(side);
+                guard.forget(side, false);
             }
         }
         What::Speed(k, speed) => world.drones[k].speed = speed,
@@ -218,7 +217,7 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
     }
 }
 
-/// Everybody hears of the same places, and gets there.
+/// Runs the final phase: all relays receive the same agreement and reach their positions.
 fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     world.faults = Faults {
         loss: rng.random_range(0.0..=0.3),
@@ -249,13 +248,13 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         drone.messages = 0;
         drone.speed = rng.random_range(SLOWEST..=20.0);
         let guard = drone.guard.as_mut().unwrap();
-        // Who has been rebooted since does not know who is gone.
+        // A relay that was rebooted does not know which relays are gone.
         for (side, there) in [Side::Upstream, Side::Downstream]
             .into_iter()
             .zip(beside(*k, relays))
         {
             if there.is_some_and(|there| gone[there]) {
-                guard.forget(side);
+                guard.forget(side, false);
             }
         }
         guard.commit(place(*target));

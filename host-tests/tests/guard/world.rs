@@ -1,4 +1,4 @@
-//! All drones, the medium between them, and the check that is made at every step.
+//! All drones, the medium between them, and the distance check at every step.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,6 @@ use uav_relay_sim::simulator::drones::Point;
 use crate::drone::{Board, Drone, along, length, node, way};
 use crate::medium::{Faults, Medium};
 
-/// Between two looks at everything, s.
 pub(crate) const STEP_S: f64 = 0.1;
 
 #[derive(Debug)]
@@ -24,7 +23,7 @@ pub(crate) struct World {
     medium: Medium,
     pub(crate) faults: Faults,
     pub(crate) board: Board,
-    /// The smallest margin seen, m.
+    /// Smallest margin seen, m.
     pub(crate) closest_m: f64,
     pub(crate) steps: u64,
 }
@@ -59,14 +58,12 @@ impl World {
         world
     }
 
-    /// Switches the guard of drone `k` on, or off and on.
     pub(crate) fn boot(&mut self, k: usize) {
         let seed = self.rng.random();
         let mission = beside(k, self.drones.len());
         self.drones[k].boot(self.confines, mission, seed, self.now_s);
     }
 
-    /// Tells drone `k` who its neighbour is.
     pub(crate) fn link(&mut self, k: usize, side: Side, neighbour: Option<usize>) {
         let drone = &mut self.drones[k];
         drone.links[usize::from(side == Side::Downstream)] = neighbour;
@@ -75,8 +72,7 @@ impl World {
         }
     }
 
-    /// What may be missing of the separation, m: what the reports may be off where either was switched on, at most twice each,
-    /// and four roundings of a place at either side.
+    /// Returns the permitted shortfall of the separation, m: four times the report error, and rounding.
     pub(crate) fn allowed_m(&self) -> f64 {
         let rounding = f64::from(self.confines.fence.most_x_m) * f64::from(f32::EPSILON);
         4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
@@ -100,18 +96,18 @@ impl World {
             if let Some(guard) = drone.guard.as_mut().filter(|_| drone.speaks && drone.flies) {
                 guard.hear(letter.side, node(letter.from), &letter.fence);
                 let side = usize::from(letter.side == Side::Downstream);
-                // Of the association that it is in.
+                // Only a message of the present association counts.
                 let told = letter.fence.flags & Fence::RELEASED != 0
                     && letter.fence.echo == drone.said[side];
                 tell.extend(told.then_some((letter, drone.stretch()[0])));
-                // Nobody need look at the setpoint between two messages, but somebody may.
+                // The setpoint may be read at any time between two messages.
                 if self.rng.random_bool(0.5) {
                     drone.steer(&mut self.rng, &self.confines, now_s);
                 }
             }
         }
         for (letter, stretch) in tell {
-            // On whose downstream side the sender is, that is upstream of it.
+            // A sender upstream of the receiver has the receiver on its downstream side.
             let side = usize::from(letter.side == Side::Upstream);
             self.drones[letter.from].is_known(side, letter.sent_s, stretch);
         }
@@ -127,7 +123,7 @@ impl World {
         self.check();
     }
 
-    /// Sends what drone `k` has to say.
+    /// Sends all pending messages of drone `k`.
     fn talk(&mut self, k: usize) {
         let drone = &mut self.drones[k];
         let Some(guard) = &mut drone.guard else {
@@ -155,7 +151,7 @@ impl World {
         }
     }
 
-    /// The pilot of drone `k` moves it up to `most_m` along one axis across the line, away from the others near it, if there is such a way.
+    /// Moves drone `k` up to `most_m` along an axis across the line, away from nearby drones if possible.
     pub(crate) fn aside(&mut self, k: usize, (part, up, most_m): (usize, bool, f64)) {
         let (low, high) = self.drones[k].stretch()[part];
         let near = k.saturating_sub(3)..(k + 4).min(self.drones.len());
@@ -170,7 +166,7 @@ impl World {
         }
     }
 
-    /// The pilot of drone `k`, whose neighbours have both heard so, moves it along the line, the separation from where they may be.
+    /// Moves drone `k` along the line, clear of its neighbours, once both know that its pilot flies it.
     pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;
@@ -195,7 +191,7 @@ impl World {
         least < most
     }
 
-    /// Nobody can come too close to another one from where they are, wherever they stop, and nobody has in this step.
+    /// Checks that no two drones came too close in this step, or can from here, wherever they stop.
     fn check(&mut self) {
         let separation = f64::from(self.confines.separation_m);
         let floor = separation - self.allowed_m();
@@ -226,12 +222,12 @@ impl World {
     }
 }
 
-/// The neighbours of drone `k` of so many, as the mission has it.
+/// Returns the neighbours of drone `k` in a mission with so many relays.
 pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
     [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
 }
 
-/// How far apart two boxes are, m.
+/// Returns the distance between two boxes, m.
 fn between(one: [(f64, f64); 3], other: [(f64, f64); 3]) -> f64 {
     length([0, 1, 2].map(|part| {
         let ((low, high), (least, most)) = (one[part], other[part]);
@@ -239,7 +235,7 @@ fn between(one: [(f64, f64); 3], other: [(f64, f64); 3]) -> f64 {
     }))
 }
 
-/// How close two drones come that both fly straight on during a step, m.
+/// Returns the smallest distance of two drones during a step of straight flight, m.
 fn nearest(one: (Point, Point), other: (Point, Point)) -> f64 {
     let (from, to) = (way(other.0, one.0), way(other.1, one.1));
     let change = way(from, to);

@@ -1,4 +1,4 @@
-//! The stored optima of numbered scenarios.
+//! Stored optima of numbered scenarios.
 
 use std::time::Instant;
 
@@ -9,10 +9,10 @@ use uav_relay_oracle::reference::joint::Effort;
 
 use crate::checked;
 
-/// Two searches that share no draw.
+/// Two searches without a common random draw.
 const EFFORTS: [Effort; 2] = [Effort { seed: 1, rounds: 1 }, Effort { seed: 2, rounds: 2 }];
 
-/// Searches for the optima anew and stores them; some ten minutes on two cores.
+/// Searches for all optima and stores them; takes about ten minutes on two cores.
 #[test]
 #[ignore = "writes the file that others read"]
 fn optima_are_stored() {
@@ -52,7 +52,7 @@ fn the_stored_optima_are_found_again() {
     }
 }
 
-/// Few relays and many, with room to the side and without: and all of them missions that relays take.
+/// Checks that the scenarios are diverse and valid missions.
 #[test]
 fn the_numbered_scenarios_are_of_many_kinds() {
     let (mut narrow, mut one_sided, mut level, mut apart, mut few, mut right) = (0, 0, 0, 0, 0, 0);

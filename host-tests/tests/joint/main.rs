@@ -1,5 +1,4 @@
-//! The optimiser of the joint problem judged on its own, before it may judge anything: against known optima, against the exact
-//! reference at given altitudes, against brute force for one relay, and against itself from other seeds.
+//! Reference optimiser of the joint problem, compared with known optima, brute force and other seeds.
 
 use std::iter::successors;
 
@@ -24,7 +23,7 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
     );
 }
 
-/// The optimum, and that it is one: flyable, and with the SIR of its places.
+/// Returns the optimum, after a check of its constraints and its SIR.
 fn checked(of: &Scenario, effort: Effort) -> JointOptimum {
     let found = optimum(&of.link, of.corridor, &of.held, effort).unwrap();
     assert!(
@@ -36,7 +35,6 @@ fn checked(of: &Scenario, effort: Effort) -> JointOptimum {
     found
 }
 
-/// The link with its relays at these altitudes.
 fn flown(link: &Link, altitudes: &[f64]) -> Link {
     let relays = link.relays.iter().zip(altitudes);
     let relays = relays.map(|(relay, &altitude_m)| Station {
@@ -49,7 +47,7 @@ fn flown(link: &Link, altitudes: &[f64]) -> Link {
     }
 }
 
-/// Runs `check` on random scenarios, with the generator that drew them.
+/// Runs `check` on random scenarios, with their random generator.
 fn for_scenarios(
     default_seed: u64,
     count: u32,
@@ -63,7 +61,7 @@ fn for_scenarios(
     }
 }
 
-/// The same without a least separation, which the reference at given altitudes does not know.
+/// Returns the scenario without a separation, which the reference at given altitudes does not support.
 fn unseparated(mut of: Scenario) -> Scenario {
     of.link.min_separation_m = 0.0;
     of
@@ -95,7 +93,7 @@ fn known_optima_are_found() {
     }
 }
 
-/// Two levels only, near the axis: going as far as possible on each level misses the best chain by a quarter.
+/// Checks two levels near the axis, where flying as far as possible on each level is worse by a quarter.
 #[test]
 fn the_best_of_two_levels_is_beaten() {
     let relay = Station {
@@ -129,7 +127,7 @@ fn the_best_of_two_levels_is_beaten() {
     close(found.sir, 6.002_149_05, 1e-8, "in the band");
 }
 
-/// The largest optimum over every assignment of levels to relays.
+/// Returns the best optimum over every assignment of levels to relays.
 fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
     let relays = u32::try_from(link.len()).unwrap();
     let assignments = (0..levels.len().pow(relays)).map(|number| {
@@ -177,7 +175,7 @@ fn no_common_altitude_is_better() {
     assert!(gained >= 4, "altitudes of their own helped {gained} times");
 }
 
-/// One relay: every altitude of a fine grid, then of a finer one around the best.
+/// Compares one relay with a fine grid of altitudes, and a finer one around the best.
 #[test]
 fn one_relay_agrees_with_brute_force() {
     for_scenarios(33, 40, 1, |of, _| {
@@ -210,7 +208,7 @@ fn seeds_agree() {
     });
 }
 
-/// Random moves of any size, of one relay or of all: none may gain.
+/// Checks that random moves of any size, of one relay or all, do not improve the optimum.
 #[test]
 fn no_move_is_better() {
     for_scenarios(35, 30, 50, |of, rng| {

@@ -1,4 +1,4 @@
-//! Relays that may stand to the side of the Tx-Rx plane.
+//! Joint optimum of relays with lateral room.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use uav_relay_oracle::reference::joint::{
 
 use crate::{PAPER_BAND, checked, close, flown};
 
-/// Runs `check` on random scenarios with room to the side, half of them with relays that differ.
+/// Runs `check` on random scenarios with lateral room, half of them with unlike relays.
 fn for_scenarios(
     default_seed: u64,
     count: u32,
@@ -28,7 +28,7 @@ fn for_scenarios(
     }
 }
 
-/// Places to the side: all of (x, y, h) free in a general-purpose optimiser of 24 starts.
+/// Compares with a general-purpose optimiser of all (x, y, h), with 24 starts.
 #[test]
 fn known_optima_in_space_are_found() {
     let wide = Corridor {
@@ -84,7 +84,7 @@ fn seeds_agree() {
     });
 }
 
-/// Random moves of any size, of one relay or of all: none may gain.
+/// Checks that random moves of any size, of one relay or all, do not improve the optimum.
 #[test]
 fn no_move_is_better() {
     for_scenarios(52, 30, 40, |of, rng| {
@@ -117,7 +117,7 @@ fn no_move_is_better() {
     });
 }
 
-/// The largest of `of` over [low, high], by grids that close in on the best place.
+/// Returns the maximum of `of` over [low, high], by successively finer grids.
 fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f64) -> f64 {
     let (mut from, mut to, mut best) = (low, high, (f64::NEG_INFINITY, low));
     for _ in 0..grids {
@@ -134,7 +134,7 @@ fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f
     best.0
 }
 
-/// One relay: the best place along for every offset to the side, for every altitude.
+/// Compares one relay with the best x for every lateral offset and altitude.
 #[test]
 fn one_relay_agrees_with_brute_force() {
     for_scenarios(53, 30, 1, |mut of, _| {
@@ -158,7 +158,6 @@ fn one_relay_agrees_with_brute_force() {
     });
 }
 
-/// What is on the left may as well be on the right.
 #[test]
 fn mirrored_scenarios_have_the_same_optimum() {
     for_scenarios(54, 20, 30, |of, _| {
@@ -174,7 +173,7 @@ fn mirrored_scenarios_have_the_same_optimum() {
     });
 }
 
-/// In the plane, every relay at its altitude: what the exact reference finds.
+/// Compares relays in the plane at held altitudes with the exact reference.
 #[test]
 fn held_altitudes_are_the_reference_at_those() {
     for_scenarios(55, 20, 50, |mut of, rng| {
@@ -194,7 +193,7 @@ fn held_altitudes_are_the_reference_at_those() {
     });
 }
 
-/// Room to the side never harms, and often helps; nor does letting go of what is held.
+/// Checks that more room, or fewer held altitudes, never harms and often helps.
 #[test]
 fn more_room_is_no_worse() {
     let mut gained = 0;

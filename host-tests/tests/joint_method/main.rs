@@ -1,4 +1,4 @@
-//! Places, sides and altitudes together: how near the true optimum the chain comes, in how many messages, whatever happens to frames.
+//! Joint choice of positions, sides and altitudes: quality, cost, and independence from faults.
 
 use host_tests::flights::with_room;
 use rand::SeedableRng;
@@ -15,7 +15,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 mod own;
 
-/// The setup of a chain that chooses altitudes within `corridor`; `None` where a relay would refuse the numbers.
+/// Returns a chain that chooses altitudes within `corridor`; `None` if a relay would reject the numbers.
 fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     let (mission, profiles) = of_link(link, 1e-4)?;
     let mut setup = Setup::new(with_room(mission.config(), corridor)?);
@@ -24,7 +24,7 @@ fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     Some(setup)
 }
 
-/// Asserts that a run of so many relays took `messages`, and claims at their times at most: each with its echo.
+/// Asserts that a run took `messages`, and at most each relay's claims with their echoes.
 fn assert_messages(outcome: &Outcome, relays: u64, messages: u64) {
     let seconds = outcome.ended.as_micros() as f64 * 1e-6;
     let times = [2.25, 2.75, 3.75, 5.75, 9.75, 17.75];
@@ -52,10 +52,10 @@ fn places(outcome: &Outcome) -> Vec<Place> {
         .collect()
 }
 
-/// What one random scenario came to.
+/// Result of a random scenario.
 struct Result {
     of: String,
-    /// Reached over the optimum.
+    /// SIR over the optimum.
     ratio: f64,
     sweeps: u32,
     bytes: u64,
@@ -91,7 +91,7 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
         assert_eq!(outcome.ending, Ending::Settled, "{of}");
         assert_eq!(outcome.unsafe_setpoints, 0, "{of}");
         let places = places(&outcome);
-        // What an f32 rounds away between two places.
+        // The f32 rounding of two positions reduces the separation.
         let rounded = Link {
             min_separation_m: (link.min_separation_m - 1e-6 * link.distance_m).max(0.0),
             ..link.clone()
@@ -107,7 +107,7 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     results
 }
 
-/// The scenario that the figures are for: X = 500, Y = 150, altitudes of 20 m to 300 m, 4 m apart.
+/// Returns the scenario of the figures: X = 500, Y = 150, altitudes of 20 m to 300 m, 4 m of separation.
 fn close_by(relays: usize) -> (Link, Corridor) {
     let link = Link {
         y_i: 150.0,
@@ -124,7 +124,7 @@ fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// The scenario that the figures are for with room to either side, `lateral_m`, and altitudes of 20 m to `most_m`.
+/// Returns the scenario of the figures with lateral room `lateral_m` and altitudes of 20 m to `most_m`.
 fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Link, Corridor) {
     let link = Link {
         x_i: x_m,
@@ -141,7 +141,7 @@ fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Lin
     (link, corridor)
 }
 
-/// What is asked of the method, the optima from an independent program, and one round trip for each.
+/// Compares the method with the optima of an independent program; each takes one round trip.
 #[test]
 fn the_joint_optima_are_reached_in_one_round_trip() {
     for (relays, x_m, y_m, lateral_m, most_m, best) in [
@@ -186,7 +186,7 @@ fn the_joint_optima_are_reached_in_one_round_trip() {
     }
 }
 
-/// However long they solve: nobody asks a neighbour for a sign of life that is at the same chain.
+/// Checks that a long computation causes no question to a neighbour, which is computing too.
 #[test]
 fn a_chain_of_any_length_needs_one_round_trip() {
     println!("| N | to the side | sweeps | messages | bytes | virtual time |");
@@ -208,7 +208,7 @@ fn a_chain_of_any_length_needs_one_round_trip() {
     }
 }
 
-/// A relay that fails while all solve is missed by both neighbours once they are done, and not before it can be told.
+/// Checks that a relay that fails during the computation is reported lost by both neighbours afterwards.
 #[test]
 fn who_fails_while_all_solve_is_missed() {
     let (link, corridor) = roomy(50, 500.0, 150.0, 280.0, 300.0);
@@ -228,7 +228,7 @@ fn who_fails_while_all_solve_is_missed() {
     }
 }
 
-/// Prints what fell short and what it all took; how many are within 0.1 %, the worst, the best and all passes.
+/// Prints the results. Returns the number within 0.1 %, the worst and best ratio, and the sum of passes.
 fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     results.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
     for result in results.iter().take_while(|result| result.ratio < 0.999) {
@@ -253,25 +253,24 @@ fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     (near, worst, best, passes)
 }
 
-/// How many scenarios to draw: the environment variable `COUNT`, or `usual`.
 fn count(usual: usize) -> usize {
     std::env::var("COUNT").map_or(usual, |text| text.parse().unwrap())
 }
 
-/// A hundred random scenarios against an optimiser that shares no formula with the crate.
+/// Compares random scenarios with an optimiser that shares no formula with the crate.
 #[test]
 fn random_chains_come_near_the_joint_optimum() {
     let count = count(100);
     let mut results = random_results(count, random::seed(41), ROOMY);
     let (near, worst, best, passes) = summary(&mut results);
-    // What a search costs that finds its way with the first rise: 8.5 on average.
+    // A search that adapts to the first rise takes 8.5 passes on average.
     assert!(f64::from(passes) <= 10.0 * count as f64, "{passes}");
     assert!(near * 100 >= 98 * count, "{near} of {count}");
     assert!(worst >= 0.94, "{worst}");
     assert!(best <= 1.0 + 1e-5, "{best}");
 }
 
-/// Where the least separation binds the best chain may need relays that hold back, which farthest places do not offer.
+/// Checks binding separations: the optimum may need relays that stay back, which the farthest chain lacks.
 #[test]
 fn crowded_chains_are_safe_and_seldom_far_from_the_joint_optimum() {
     let count = count(60);

@@ -1,4 +1,4 @@
-//! Chains whose relays differ: altitudes they hold, powers of their own, bands of one altitude; and faults.
+//! Chains of unlike relays (held altitudes, own powers, fixed bands), and faults.
 
 use std::task::Poll;
 
@@ -18,12 +18,12 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// A random chain in the plane above the line, some of whose relays bring along a power or an altitude of their own.
+/// Draws a chain in the vertical plane with own powers or altitudes of some relays.
 fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     let drawn = scenario(rng, &(2..=20), ROOMY);
     let mut drawn = with_own(rng, drawn).as_relays_know_it();
     let common = drawn.link.relays.iter().map(|relay| relay.power_w);
-    // The mission says what relay 1 has: that one is alike.
+    // Relay 1 has the mission's profile, so that it is not unlike.
     let first = common.clone().next()?;
     if drawn.held.is_empty() && common.into_iter().all(|power_w| power_w == first) {
         return None;
@@ -61,7 +61,7 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     Some((drawn, setup))
 }
 
-/// Two hundred random chains whose relays differ, against the same optimiser, and against the places that they were given.
+/// Compares unlike chains with the optimiser and with the configured positions.
 #[test]
 fn relays_that_differ_come_near_the_joint_optimum_and_never_below_their_given_places() {
     let count = count(200);
@@ -142,7 +142,7 @@ fn faults_change_nothing() {
     assert!(hurt > 100, "{hurt}");
 }
 
-/// A relay that was given an altitude of its own, and is to hold it, does; the others choose around it.
+/// Checks that a relay keeps its held altitude, and the others choose around it.
 #[test]
 fn a_relay_may_hold_its_altitude() {
     let (link, corridor) = close_by(6);
@@ -166,8 +166,9 @@ fn a_relay_may_hold_its_altitude() {
     );
 }
 
-/// A sweep that shows that one differs, a gathering of eight at most, and a sweep of the places that come of it; a leader that differs
-/// itself begins with the gathering.
+/// Checks the round trips: a sweep, one collection per eight unlike relays, a sweep of the result.
+///
+/// An unlike leader starts with the collection.
 #[test]
 fn relays_that_differ_take_three_round_trips_and_one_more_for_every_eight() {
     for (relays, own, trips) in [
@@ -203,7 +204,7 @@ fn relays_that_differ_take_three_round_trips_and_one_more_for_every_eight() {
     }
 }
 
-/// Where relays bring powers of their own the leader's prediction is wrong, and the chain finds its altitudes all the same.
+/// Checks own powers: the leader mispredicts, and the chain still finds its altitudes.
 #[test]
 fn own_powers_are_found_out_about() {
     let (link, corridor) = close_by(8);
@@ -226,7 +227,6 @@ fn own_powers_are_found_out_about() {
     assert!((0.99..=1.0 + 1e-6).contains(&ratio), "{ratio}");
 }
 
-/// There is nothing to choose in a band of one altitude.
 #[test]
 fn a_band_of_one_altitude_is_algorithm_1() {
     let (link, _) = close_by(5);
@@ -238,7 +238,7 @@ fn a_band_of_one_altitude_is_algorithm_1() {
     assert_eq!(outcome.bits(), settle(align).bits());
 }
 
-/// Random links, relays with an altitude or a power of their own, both joint methods: faults change nothing.
+/// Checks both joint methods on random links with unlike relays and faults.
 #[test]
 fn faults_change_nothing_on_random_links() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(44));
@@ -284,7 +284,7 @@ fn faults_change_nothing_on_random_links() {
     assert!(injected > 10_000);
 }
 
-/// Starts that cannot become the best are given up, and the best one is not among them.
+/// Checks that hopeless starts are abandoned and the best one is not.
 #[test]
 fn few_portions_lead_to_the_joint_optimum() {
     for (relays, lateral_m, most, best) in [

@@ -1,4 +1,4 @@
-//! Plans on earth: read by libraries that are not ours, and where GeographicLib has them.
+//! Plans as map files, read by independent libraries and compared with GeographicLib.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use uav_relay_scenario::Scenario;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::{Ask, Number, Plan, plan};
 
-/// How far a place on the map may be from where it is, m.
+/// Largest permitted error of a position on the map, m.
 const ALLOWED_M: f64 = 0.01;
 
 fn best(scenario: &Scenario, relays: u16) -> Plan {
@@ -22,7 +22,7 @@ fn best(scenario: &Scenario, relays: u16) -> Plan {
     plan(scenario, &ask).unwrap()
 }
 
-/// What the libraries find in both files, after what must hold of every plan.
+/// Returns the libraries' reading of both files, after checks that hold for every plan.
 fn read(scenario: &Scenario, plan: &Plan) -> Value {
     let line = scenario.line.unwrap();
     let map = Map::new(scenario, plan).unwrap();
@@ -58,7 +58,7 @@ fn read(scenario: &Scenario, plan: &Plan) -> Value {
     let hops = plan.places.len() + 1;
     assert_eq!(found["kml_hops"], hops);
     assert_eq!(found["lines"].as_array().unwrap().len(), hops);
-    // What relays are told by `flight` is what the map shows, to the unit.
+    // The map and `flight` give the same coordinates.
     let text = geojson::text(&map);
     for (place, _) in &plan.places {
         let at = line.axis.point(*place).unwrap();
@@ -86,7 +86,7 @@ fn others_read_the_plan_where_it_is() {
     let found = read(&scenario, &plan);
     let kinds = [&["tx", "rx"][..], &["relay"; 7], &["interferer"]].concat();
     assert_eq!(found["geojson_kinds"], json!(kinds));
-    // With the geoid there are three numbers, and the third is above the ellipsoid.
+    // With the geoid there is a third number, the height above the ellipsoid.
     assert_eq!(found["geojson_dimensions"], json!([3]));
     let line = scenario.line.unwrap();
     let amsl: Vec<f64> = plan
@@ -122,7 +122,7 @@ fn without_a_geoid_there_is_no_height_that_would_be_wrong() {
     assert_eq!(found["geojson_dimensions"], json!([2]));
 }
 
-/// A line from west to east of 180 degrees, with room beside it: its middle hops are cut in two there.
+/// Checks a line across the antimeridian, with lateral room: its middle hops are cut in two there.
 #[test]
 fn a_line_across_the_antimeridian_is_cut() {
     let text = "[geometry]\naltitude_m = 30\naltitude_max_m = 90\nlateral_min_m = -200\nlateral_max_m = 200\n\

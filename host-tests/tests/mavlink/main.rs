@@ -1,4 +1,4 @@
-//! The codec against two that nobody here wrote, in both directions, and in noise.
+//! MAVLink codec compared with two independent ones, in both directions, and with noise.
 
 #![cfg(target_os = "linux")]
 
@@ -50,7 +50,6 @@ fn unhex(line: &str) -> Vec<u8> {
         .collect()
 }
 
-/// All that a parser finds in those bytes.
 fn parse(parser: &mut Parser, bytes: &[u8]) -> Vec<Received> {
     let mut all = Vec::new();
     for byte in bytes {

@@ -1,18 +1,18 @@
-//! A line that hurts frames.
+//! Damaged frames on a line.
 
 use super::theirs::{by_the_crate, said};
 use super::*;
 
 const FRAMES: usize = 20_000;
 
-/// One frame in five is hurt: a bit of it flips, bytes are missing, bytes come between.
+/// Damages a frame: a bit flips, bytes are missing, or bytes are inserted.
 fn hurt(rng: &mut ChaCha8Rng, frame: &mut Vec<u8>) {
     let at = rng.random_range(0..frame.len());
     match rng.random_range(0..4) {
         0 => frame[at] ^= 1 << rng.random_range(0..8),
         1 => drop(frame.drain(at..frame.len().min(at + rng.random_range(1..5)))),
         2 => drop(frame.splice(at..at, (0..rng.random_range(1..40)).map(|_| rng.random()))),
-        // It looks as if it were long.
+        // The length field is wrong.
         _ => frame[1] = 255,
     }
 }
@@ -34,7 +34,7 @@ fn every_frame_that_is_whole_is_found_whatever_is_around_it() {
             line.extend((0..rng.random_range(0..20)).map(|_| rng.random::<u8>()));
         }
     }
-    // What a false start waits for comes in the end.
+    // The trailing bytes complete any false start.
     line.extend([0; 300]);
     let mut parser = Parser::new();
     let found: Vec<_> = parse(&mut parser, &line)
@@ -42,7 +42,7 @@ fn every_frame_that_is_whole_is_found_whatever_is_around_it() {
         .filter_map(|read| read.message)
         .collect();
     println!("{} of {FRAMES} whole, {} found", whole.len(), found.len());
-    // In order, each that is whole; a frame may be hurt where nobody sees it, behind its end.
+    // All intact frames are found in order; damage behind a frame's end is harmless.
     let mut left = found.iter();
     for expected in &whole {
         assert!(
@@ -54,7 +54,7 @@ fn every_frame_that_is_whole_is_found_whatever_is_around_it() {
     assert!(extra < FRAMES / 100, "{extra} more than were whole");
 }
 
-/// Frames inside the payload of another are bytes of that.
+/// Checks that frames inside another frame's payload are not read.
 #[test]
 fn what_is_carried_by_another_message_is_not_read() {
     let inner = by_the_crate(&said(&mut rng(5)).0, 1);
@@ -71,7 +71,7 @@ fn what_is_carried_by_another_message_is_not_read() {
     assert_eq!((read[0].id, read[0].message), (385, None));
 }
 
-/// A message that the table has not, and one cut short by zeros at its end.
+/// Checks an unknown message, and one truncated by zeros at its end.
 #[test]
 fn an_unknown_message_costs_nothing_but_its_bytes() {
     let mut rng = rng(6);
@@ -90,7 +90,7 @@ fn an_unknown_message_costs_nothing_but_its_bytes() {
     assert_eq!(parser.counters().broken, 0);
 }
 
-/// The most work that was found: three long false starts in sixteen bytes, each of which costs a checksum of some 260 bytes.
+/// Checks the worst known input: three false starts in sixteen bytes, each a checksum of 260 bytes.
 #[test]
 fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
     let made = [
@@ -102,7 +102,7 @@ fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
     let checksums = parser.counters().broken as usize;
     println!("{checksums} checksums in {} bytes", line.len());
     assert!((line.len() / 6..=line.len() / 5).contains(&checksums));
-    // And what follows is found.
+    // The next frame is found.
     let (message, expected) = said(&mut rng(7));
     let after = [by_the_crate(&message, 1), vec![0; 300]].concat();
     let read = parse(&mut parser, &after);

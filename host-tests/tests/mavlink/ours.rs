@@ -1,4 +1,4 @@
-//! What a companion says, read by others.
+//! Companion's messages, read by other codecs.
 
 use host_tests::python;
 use mavlink::dialects::common::MavMessage;
@@ -9,7 +9,7 @@ use uav_relay::flight::mavlink::outgoing::{Outgoing, severity};
 
 use super::*;
 
-/// So many messages of every kind.
+/// Number of messages of each kind.
 const EACH: usize = 200;
 
 fn messages() -> Vec<Outgoing<'static>> {
@@ -70,7 +70,7 @@ pub(super) fn framed() -> Vec<(Outgoing<'static>, u8, Vec<u8>)> {
         .collect()
 }
 
-/// What fits of a text.
+/// Returns the part of a text that fits.
 fn cut(text: &str, most: usize) -> &str {
     &text[..text.len().min(most)]
 }

@@ -1,4 +1,4 @@
-//! Signatures, against pymavlink's in both directions, and what is refused.
+//! Signatures compared with pymavlink in both directions, and refused frames.
 
 use host_tests::python;
 use sha2::{Digest as _, Sha256};
@@ -15,18 +15,18 @@ use super::*;
 const KEY: [u8; 32] = [0x5A; 32];
 const OTHER: [u8; 32] = [0xA5; 32];
 
-/// 2026-11-22 12:00 UTC, s, and in units of a stamp.
+/// 2026-11-22 12:00 UTC, s, and in time stamp units.
 const UNIX_S: u64 = 1_795_348_800;
 const STAMP: u64 = (UNIX_S - 1_420_070_400) * 100_000;
 
-/// A minute.
+/// Minute in time stamp units.
 const MINUTE: u64 = 6_000_000;
 
 fn at(units: u64) -> Instant {
     Instant::from_micros(units * 10)
 }
 
-/// One that has the time.
+/// Returns a signer that knows the time.
 fn signing(key: [u8; 32]) -> Signing {
     Signing::new(key, 2, Stamp::of_unix_micros(UNIX_S * 1_000_000), at(0))
 }
@@ -37,7 +37,7 @@ fn stamp_of(frame: &[u8]) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// What a signature is, written down once more.
+/// Returns a signed frame, by an independent implementation.
 fn signed(key: [u8; 32], from: Address, link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = Outgoing::Heartbeat.encode(from, from, 0).to_vec();
     frame.truncate(frame.len() - 2);
@@ -51,7 +51,7 @@ fn signed(key: [u8; 32], from: Address, link: u8, stamp: u64) -> Vec<u8> {
     frame
 }
 
-/// What becomes of the only frame in those bytes.
+/// Returns the verdict on the only frame in `bytes`.
 fn checked(signing: &mut Signing, now: Instant, bytes: &[u8]) -> Result<(), Flaw> {
     let mut parser = Parser::new();
     let mut all = Vec::new();
@@ -72,7 +72,7 @@ fn pymavlink_takes_what_is_signed_here_once_and_with_its_own_key_alone() {
     let (mut input, mut stamps) = (String::new(), Vec::new());
     for (step, (_, _, bytes)) in (0..).zip(framed()) {
         let bytes = bytes.as_slice().try_into().unwrap();
-        // Several at one time, too.
+        // Several frames have the same time.
         let frame = ours.sign(at(step / 3 * 500), bytes);
         stamps.push(stamp_of(&frame));
         input += &(hex(&frame) + "\n");
@@ -127,7 +127,7 @@ fn what_pymavlink_signs_is_taken_once_and_with_its_own_key_alone() {
     for frame in &known {
         assert_eq!(checked(&mut ours, at(0), frame), Err(Flaw::Old), "again");
     }
-    // What is changed and has the right checksum: a byte of the payload, the link, the stamp, the signature.
+    // Frames with a changed byte and a valid checksum: in the payload, link, stamp and signature.
     let (last, length) = (*known.last().unwrap(), known[known.len() - 1].len());
     for changed in [10, length - 13, length - 9, length - 1] {
         let mut frame = last.to_vec();
@@ -156,10 +156,10 @@ fn a_stamp_is_judged_by_its_sender_and_link_and_the_first_by_the_time() {
     assert_eq!(check(frame(AUTOPILOT, 0, behind)), Ok(()));
     assert_eq!(check(frame(AUTOPILOT, 0, behind)), Err(Flaw::Old));
     assert_eq!(check(frame(AUTOPILOT, 0, behind + 1)), Ok(()));
-    // Each for itself.
+    // Each link and sender has its own stamps.
     assert_eq!(check(frame(AUTOPILOT, 1, behind)), Ok(()));
     assert_eq!(check(frame(COMPANION, 0, behind)), Ok(()));
-    // What is ahead takes the time with it.
+    // A stamp in the future advances the time.
     assert_eq!(check(frame(AUTOPILOT, 0, STAMP + 3 * MINUTE)), Ok(()));
     assert_eq!(check(frame(AUTOPILOT, 2, behind)), Err(Flaw::Old));
     assert_eq!(check(frame(AUTOPILOT, 2, STAMP + 2 * MINUTE)), Ok(()));
@@ -171,7 +171,7 @@ fn a_stamp_is_judged_by_its_sender_and_link_and_the_first_by_the_time() {
     );
 }
 
-/// It learns the time by the first frame that it takes, and goes on by its own clock.
+/// Checks that a signer without a clock adopts the time of its first accepted frame.
 #[test]
 fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
     let mut ours = Signing::new(KEY, 0, Stamp::UNKNOWN, at(500));
@@ -183,7 +183,7 @@ fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
     assert_eq!(stamp_of(&ours.sign(at(2_000), heartbeat())), STAMP);
     assert_eq!(stamp_of(&ours.sign(at(2_000), heartbeat())), STAMP + 1);
     assert_eq!(stamp_of(&ours.sign(at(9_000), heartbeat())), STAMP + 7_000);
-    // Nothing was heard for days.
+    // No frame was received for days.
     let day = 86_400 * 100_000;
     for turn in 1..100 {
         ours.sign(at(9_000 + turn * day / 50), heartbeat());
@@ -194,7 +194,7 @@ fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
     );
 }
 
-/// Senders come and go; the one that is heard of all the while is not forgotten.
+/// Checks that changing senders do not displace an active one.
 #[test]
 fn many_senders_do_not_make_an_old_frame_new() {
     let mut ours = signing(KEY);

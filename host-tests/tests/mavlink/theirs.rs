@@ -1,4 +1,4 @@
-//! What an autopilot says, written by others.
+//! Autopilot's messages, written by other codecs.
 
 use host_tests::python;
 use mavlink::dialects::common::{
@@ -11,14 +11,14 @@ use uav_relay::flight::mavlink::incoming::Incoming;
 
 use super::*;
 
-/// So many messages of every kind.
+/// Number of messages of each kind.
 const EACH: usize = 200;
 
 fn bytes(rng: &mut ChaCha8Rng) -> [u8; 4] {
     [0; 4].map(|_| rng.random())
 }
 
-/// What pymavlink is asked to write, and what is to be read of it. Numbers of enums are any.
+/// Returns messages for pymavlink to write, with arbitrary enum values, and the expected readings.
 #[expect(clippy::too_many_lines, reason = "a table")]
 pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
     let mut rng = rng(2);
@@ -119,7 +119,7 @@ pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
                 is_repeated: confirmation > 0,
             }),
         ));
-        // What says nothing to a companion is passed over.
+        // Messages without meaning for a companion are ignored.
         all.push((
             json!({"name": "SYSTEM_TIME", "time_unix_usec": 1, "time_boot_ms": boot_ms}),
             None,
@@ -148,7 +148,7 @@ fn every_field_that_pymavlink_writes_is_read() {
     }
 }
 
-/// A frame by the other codec.
+/// Encodes a frame with the mavlink crate.
 pub(super) fn by_the_crate(message: &MavMessage, sequence: u8) -> Vec<u8> {
     let header = MavHeader {
         system_id: 3,
@@ -160,7 +160,7 @@ pub(super) fn by_the_crate(message: &MavMessage, sequence: u8) -> Vec<u8> {
     raw.raw_bytes().to_vec()
 }
 
-/// Messages as an autopilot says them, with what is to be read of them.
+/// Draws an autopilot's message, and its expected reading.
 pub(super) fn said(rng: &mut ChaCha8Rng) -> (MavMessage, Incoming) {
     match rng.random_range(0..4) {
         0 => {

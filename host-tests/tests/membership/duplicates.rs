@@ -1,6 +1,4 @@
-//! Two drones with one index: a cloned image, so that number, key and epoch are equal.
-//!
-//! `COUNT` gives the number of chains for each kind of medium.
+//! Two drones with equal index, number, key and epoch, as from a cloned image; `COUNT` sets the chains.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,38 +7,37 @@ use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
 
 use super::*;
 
-/// Time from one step of the medium to the next; a frame arrives one step after it was sent.
+/// Step of the medium, ms; a frame arrives one step after it was sent.
 const STEP_MS: u64 = 10;
 
-/// Time in which one of two duplicates has to give up its setpoint once it has heard of the other.
+/// Time limit for one duplicate to give up its setpoint after it has received the other, ms.
 const LIMIT_MS: u64 = 2_000;
 
-/// The same for two that receive each other: the first frames may all be lost, and a chain that has its places sends few.
+/// Time limit for two setpoints at duplicates that receive each other, ms: a settled chain sends few frames.
 const HEARD_MS: u64 = 10_000;
 
-/// Longest time that two duplicates that do not receive each other may both have a setpoint: at a loss of 30 % several claims and their
-/// echoes may be lost in a row.
+/// Time limit for duplicates that do not receive each other, ms: several claims in a row may be lost.
 const HIDDEN_MS: u64 = 40_000;
 
-/// Time until the whole chain has setpoints for good, with one of the two.
+/// Time limit until the whole chain has setpoints for good, with one of the duplicates, ms.
 const FLIES_MS: u64 = 60_000;
 
-/// Time that each chain is watched after the second duplicate was switched on.
+/// Time of observation after the second duplicate was switched on, ms.
 const WATCHED_MS: u64 = 100_000;
 
-/// How frames reach the duplicates.
+/// Medium between the duplicates and the other relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Medium {
-    /// One channel; the duplicates receive each other.
+    /// Shared channel on which the duplicates receive each other.
     Shared,
-    /// A link to each neighbour, to which both duplicates are connected; they receive each other.
+    /// Links to both neighbours, shared by the duplicates, which receive each other.
     Links,
-    /// A link to each neighbour, to which both duplicates are connected; they do not receive each other.
+    /// Links to both neighbours, shared by the duplicates, which do not receive each other.
     HiddenLinks,
 }
 
 impl Medium {
-    /// The port at which another drone with index `receiver` receives what `sender` sends through `port`, if it does.
+    /// Returns the port at which drone `receiver` receives a frame that `sender` sends through `port`, if any.
     fn carries(self, sender: u16, port: Port, receiver: u16) -> Option<Port> {
         match port {
             Port::Shared => Some(Port::Shared),
@@ -56,25 +53,25 @@ struct Case {
     medium: Medium,
     signed: bool,
     loss: f64,
-    /// Whether both are switched on at time 0.
+    /// True if both are switched on at time 0.
     at_once: bool,
     seed: u64,
 }
 
-/// What became of one chain, in ms.
+/// Results of one chain, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
-    /// Longest time that both duplicates had a setpoint, counted from `LIMIT_MS` after the first frame that one received of the other.
+    /// Longest time with two setpoints, from `LIMIT_MS` after the first frame between the duplicates.
     both: u64,
-    /// Longest time that both had a setpoint, counted from the start of the second.
+    /// Longest time with two setpoints, from the start of the second duplicate.
     both_at_all: u64,
-    /// Total time, after the second was switched on, in which neither had a setpoint.
+    /// Total time without a setpoint at either duplicate, from the start of the second.
     neither: u64,
-    /// Time from the start of the second until the whole chain, with one of the two, has setpoints for good.
+    /// Time from the second start until the whole chain, with one duplicate, has setpoints for good.
     flies: u64,
-    /// Whether the duplicate that was switched on first has the setpoint in the end.
+    /// True if the duplicate that started first has the setpoint in the end.
     first_stays: bool,
-    /// Whether each of the two raised `Event::IndexTaken`.
+    /// Records for each duplicate that it raised `Event::IndexTaken`.
     reported: [bool; 2],
 }
 
@@ -84,7 +81,7 @@ struct Drone {
     on_at: u64,
 }
 
-/// A drone for each index and the time at which it is switched on, ms, with a seed of its own.
+/// Creates a drone for each index and start time, ms, each with its own random seed.
 fn switched_on(
     mission: Mission,
     settings: Settings,
@@ -206,7 +203,7 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(12, |text| text.parse().unwrap())
 }
 
-/// Flies `count` chains of one kind and prints what became of them.
+/// Flies `count` chains of one kind and prints the results.
 fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Found)> {
     let found: Vec<(u64, Found)> = (0..count())
         .map(|seed| {
@@ -248,8 +245,7 @@ fn kinds() -> impl Iterator<Item = (bool, f64, bool)> {
     })
 }
 
-/// At most one has a setpoint from `LIMIT_MS` after the first frame heard on, and from `most_ms` after its start on in any case; one of them
-/// reports it; and the chain, with one of the two, flies for good within `FLIES_MS`.
+/// Checks the time limits, the report of a duplicate, and that the chain flies within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
     for (signed, loss, at_once) in kinds() {

@@ -1,4 +1,4 @@
-//! Drones that fly: with a guard no two of them ever come nearer than the separation, whatever is lost, late or silent.
+//! Flights with a guard: no two drones come nearer than the separation, whatever is lost, late or silent.
 
 use host_tests::flights::{eight_apart, exact};
 use rand::{RngExt, SeedableRng};
@@ -11,10 +11,10 @@ use super::*;
 
 const SEPARATION_M: f32 = 5.0;
 
-/// What a place may be off by rounding, m: places are f32 of up to 1 km.
+/// Rounding error of a position, m: positions are f32 of up to 1 km.
 const ROUNDING_M: f64 = 2e-3;
 
-/// A guarded flight of eight drones that begin at least the separation apart.
+/// Returns a guarded flight of eight drones that start at least the separation apart.
 fn guarded(rng: &mut ChaCha8Rng) -> Setup {
     let mission = eight_apart(SEPARATION_M);
     let mut setup = Setup::on_shared_channel(mission);
@@ -81,7 +81,7 @@ fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
     }
 }
 
-/// The same without a guard: the test can fail.
+/// Checks that without a guard drones come too close, so that the test is able to fail.
 #[test]
 fn without_a_guard_some_come_close() {
     let close = (1..=40).any(|seed| {

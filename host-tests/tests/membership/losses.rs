@@ -1,4 +1,4 @@
-//! Relays that are lost on a good channel, and come back.
+//! Loss and return of relays on a good channel.
 
 use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
 use uav_relay_oracle::mission::of_stochastic_link;
@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Who loses a neighbour last, and when the chain has settled after that; sweeps in between, the call for the view included.
+/// Returns the time from the last loss to the settled chain, and the sweeps since.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, Turning::Lost(_));
     let last = outcome
@@ -57,8 +57,7 @@ fn any_one_two_or_three_of_eight_may_be_lost_at_once() {
         "settled within {} ms of the last detection, by at most {most} sweeps",
         ms(slowest)
     );
-    // An end of the chain is sought for as long as a silent neighbour is asked: `lost` less `quiet`. The rest is calls,
-    // counting and sweeps.
+    // The search at an end of the chain takes `lost` less `quiet`; requests, counting and sweeps the rest.
     assert!(ms(slowest) < 10_000 + 2_000);
     assert!(most <= 6);
 }
@@ -66,7 +65,7 @@ fn any_one_two_or_three_of_eight_may_be_lost_at_once() {
 #[test]
 fn a_relay_that_comes_back_takes_its_place_again() {
     for index in 1..=8 {
-        // Before anybody has noticed; just when they do; long after.
+        // The relay returns before the loss is noticed, just when it is, or long after.
         for off in [1_000, 9_990, 10_020, 60_000] {
             let mut setup = paper(8);
             setup.kills = vec![(index, seconds(20))];
@@ -80,7 +79,7 @@ fn a_relay_that_comes_back_takes_its_place_again() {
     }
 }
 
-/// The two beside the gap have taken each other by then, and neither has anything to hear of the other one that is off.
+/// Checks that one of two adjacent lost relays returns into the closed gap while the other stays off.
 #[test]
 fn one_of_two_in_a_row_that_comes_back_is_taken_between_those_who_have_closed_up() {
     for (index, off) in [(2, 3), (3, 2), (4, 5), (5, 4), (6, 7), (7, 6)] {

@@ -1,6 +1,4 @@
-//! The chain loses relays and takes them in again: whoever is left ends in the places that a chain of just them would take.
-//!
-//! `COUNT` and `SEED` in the environment take other schedules.
+//! Loss and return of relays: the rest ends in an undisturbed chain's positions (`COUNT`, `SEED`).
 
 mod duplicates;
 mod flights;
@@ -15,12 +13,12 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, Turning};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
-/// The paper's chain of `relays` on one radio channel.
+/// Returns the paper's chain of `relays` on one radio channel.
 fn paper(relays: u16) -> Setup {
     Setup::on_shared_channel(mission(relays))
 }
 
-/// The relays that are left in the end, by their number from 1.
+/// Returns the numbers of the relays that are alive at the end, from 1.
 fn left(outcome: &Outcome) -> Vec<u16> {
     let living = (1..).zip(&outcome.relays);
     living
@@ -29,7 +27,7 @@ fn left(outcome: &Outcome) -> Vec<u16> {
         .collect()
 }
 
-/// Where a chain of just the relays `left` of `setup` ends when nothing happens to it, and the SIR it meets, to the bit.
+/// Returns the bits of the positions and SIR of an undisturbed chain of the relays `left` of `setup`.
 fn alone(setup: &Setup, left: &[u16]) -> (Vec<Option<[u32; 3]>>, u32) {
     let relays = u16::try_from(left.len()).unwrap();
     let mut clean = Setup::new(setup.mission.with_relays(relays).unwrap());
@@ -46,7 +44,7 @@ fn alone(setup: &Setup, left: &[u16]) -> (Vec<Option<[u32; 3]>>, u32) {
     (outcome.bits(), outcome.relays[0].target.unwrap().to_bits())
 }
 
-/// Holds the relays `left` of a run to what a chain of just them does; what is wrong with it, if anything is.
+/// Compares the relays `left` with an undisturbed chain. Returns the first difference as an error.
 fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     let (bits, target) = alone(setup, left);
     let relays: Vec<_> = left
@@ -76,7 +74,7 @@ fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     Ok(())
 }
 
-/// How often a relay has agreed to a new view.
+/// Returns how often a relay accepted a new view.
 fn views(outcome: &Outcome, relay: u16) -> usize {
     let reformed = |what| matches!(what, Turning::Reformed { .. });
     outcome
@@ -90,7 +88,6 @@ fn ms(span: Duration) -> u64 {
     span.as_micros() / 1_000
 }
 
-/// The environment variable `name` as a number, or `usual`.
 fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }

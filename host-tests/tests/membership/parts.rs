@@ -1,10 +1,10 @@
-//! Chains that are split in two, and links that come and go.
+//! Split chains, and links that come and go.
 
 use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Which part goes on when eight relays are split after `after`: half with its leader, or more.
+/// Returns the part that continues after a split behind relay `after`: the majority, or the leader's half.
 fn goes_on(after: u16) -> Vec<u16> {
     if after >= 4 {
         (1..=after).collect()
@@ -74,7 +74,7 @@ fn a_split_chain_heals() {
     }
 }
 
-/// Ten minutes of a link that is down and up for `half` seconds each: how often the chain forms anew, at most.
+/// Returns the most views of any relay in ten minutes of a link that toggles every `half` seconds.
 fn flaps(half: u64, after: u16) -> usize {
     let mut setup = paper(8);
     for n in 0..600 / (2 * half) {
@@ -99,8 +99,8 @@ fn a_link_that_comes_and_goes_disturbs_the_chain_less_and_less() {
         println!(
             "down and up for {half} s each: the chain forms anew {views:?} times in ten minutes"
         );
-        // Away for less than it takes to be lost, nothing happens. Else three losses are forgiven, each of which costs up to three
-        // views; from the fourth on it is taken back after 15, 30, 60, 120, 240 s of being heard, which soon is longer than it stays.
+        // Short outages have no effect. Three losses are forgiven, at up to three views each; then the neighbour is accepted
+        // after 15, 30, 60, 120, 240 s of reception, soon longer than the link stays up.
         let most = if half < 10 { 0 } else { 18 };
         assert!(
             views.iter().all(|views| *views <= most),

@@ -1,4 +1,4 @@
-//! Random schedules of faults at eight relays.
+//! Random schedules of faults for eight relays.
 
 use host_tests::flights::{bad_day, own_profiles};
 use rand::{RngExt, SeedableRng};
@@ -9,12 +9,10 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// After the last loss or start, while frames go on being lost and corrupted, a chain has settled within this time: twenty
-/// times `Settings::dead_after`.
+/// Time limit to a settled chain, while frames are lost and corrupted: twenty times `dead_after`.
 const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// Eight relays, alike or not, loss up to 50 %, corruption up to 20 %, duplicates, reordering, up to three relays lost at any
-/// time of the first minute, half of them switched on again after up to another minute.
+/// Draws a fault schedule for eight relays: loss up to 50 %, corruption up to 20 %, up to three relays lost.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = paper(8);
     setup.profiles = own_profiles(rng);
@@ -25,12 +23,12 @@ fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut relays: Vec<u16> = (1..=8).collect();
     for _ in 0..rng.random_range(0..=3) {
         let relay = relays.swap_remove(rng.random_range(0..relays.len()));
-        // In the midst of the first agreement, or later.
+        // Loss during the first agreement, or later.
         let early = rng.random_bool(0.3);
         let at = rng.random_range(0..if early { 500 } else { 60_000 });
         setup.kills.push((relay, Instant::from_millis(at)));
         if rng.random_bool(0.5) {
-            // Before anybody has noticed, or not.
+            // Return before the loss is noticed, or after.
             let soon = rng.random_bool(0.5);
             let off = rng.random_range(1..if soon { 2_000 } else { 60_000 });
             setup.boots.push((relay, Instant::from_millis(at + off)));

@@ -1,4 +1,4 @@
-//! The relays, connected, and the clock: after every turn of a main loop the rules are checked.
+//! The connected relays and the clock; the rules are checked after every turn of a main loop.
 
 use proptest::prop_assert;
 use uav_relay::MAX_FRAME;
@@ -13,13 +13,13 @@ use super::seal::{Seal, taken};
 use super::tally::Tally;
 use super::wires::{FLIGHT, Flying, Wires, end, message, pass};
 
-/// By how much f32 arithmetic may miss a target, relative.
+/// Relative error by which f32 arithmetic may miss a target.
 pub(crate) const MISS: f64 = 2e-4;
 
-/// By how much it may miss the least separation, relative.
+/// Relative error by which f32 arithmetic may miss the least separation.
 const CLOSE: f64 = 1e-5;
 
-/// A chain, the model of it, and the clock.
+/// Chain of relays, its model, and the clock.
 pub(crate) struct World<'a> {
     pub(crate) scenario: &'a Scenario,
     pub(crate) now: Instant,
@@ -27,12 +27,12 @@ pub(crate) struct World<'a> {
     pub(crate) wires: Wires,
     pub(crate) ledgers: Vec<Ledger>,
     pub(crate) tally: Tally,
-    /// The largest epoch that a relay was started with.
+    /// Largest epoch with which a relay was started.
     pub(crate) epochs: u32,
 }
 
 impl<'a> World<'a> {
-    /// Every relay has just been switched on.
+    /// Creates a chain of relays that have just been switched on.
     pub(crate) fn new(scenario: &'a Scenario, seed: u32) -> Checked<Self> {
         let now = Instant::from_millis(1);
         let relays = scenario.relays();
@@ -51,7 +51,7 @@ impl<'a> World<'a> {
         Ok(world)
     }
 
-    /// One turn of the main loop of relay `at`, from 0: time, frames, events, and when to come back.
+    /// Runs one turn of the main loop of relay `at`, counted from 0: time, frames, events, next wake-up time.
     pub(crate) fn turn(&mut self, at: usize) -> Checked {
         let now = self.now;
         let relay = &mut self.relays[at];
@@ -59,7 +59,7 @@ impl<'a> World<'a> {
         let mut frame = [0; MAX_FRAME];
         let mut sent = 0;
         self.ledgers[at].look_up(relay)?;
-        // As a firmware stores it: before what it says to others leaves.
+        // A firmware stores the record before the votes leave.
         self.ledgers[at].record = Some(relay.view_record());
         let most = MOST_FRAMES + if self.scenario.signs() { 2 } else { 0 };
         while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
@@ -122,14 +122,14 @@ impl<'a> World<'a> {
         (0..self.relays.len()).try_for_each(|at| self.turn(at))
     }
 
-    /// Relays next to each other that hold places for one target keep apart, and the hops between them meet it.
+    /// Checks neighbours that hold positions for the same target: separation, and SIR of the hop.
     fn neighbours_agree(&mut self) -> Checked {
         let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
         let hops = self.scenario.judge.hops(&places);
         let apart = f64::from(self.scenario.mission.config().min_separation_m) * (1.0 - CLOSE);
         let last = self.ledgers.len();
         for (hop, sir) in hops.into_iter().enumerate() {
-            // Neither Tx nor Rx has a say: their one neighbour's target is that of the hop.
+            // Tx and Rx have no target: the target of the hop is that of their one neighbour.
             let from = &self.ledgers[hop.saturating_sub(1)];
             let to = &self.ledgers[hop.min(last - 1)];
             let Some(target) = from.target.filter(|_| {
@@ -143,7 +143,7 @@ impl<'a> World<'a> {
                 continue;
             };
             let is_between = hop > 0 && hop < last;
-            // Where relays measure, passes go toward Tx: `to` hands them on to `from`.
+            // Where relays measure, passes go toward Tx: relay `to` forwards them to `from`.
             let measures = self.scenario.kind == Kind::Measured;
             if is_between && measures && to.begins_anew() {
                 self.tally.add("hops excused");
@@ -173,13 +173,13 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Bytes of a frame arrive at the end of a line, and are dealt with.
+    /// Delivers bytes of a frame at the end of a line and runs the receiver's main loop.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
         self.hear(line, bytes, frame)?;
         self.turn(end(line).0)
     }
 
-    /// They arrive. What a pass is to the relay the ledger knows.
+    /// Delivers bytes of a frame; the ledger checks how the relay counts a pass.
     pub(crate) fn hear(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
         let (to, port) = end(line);
         let from = match port {
@@ -208,7 +208,6 @@ impl<'a> World<'a> {
         self.ledgers[to].look_up(&self.relays[to])
     }
 
-    /// When the next timer of any relay runs out.
     fn next_timer(&self) -> Option<Instant> {
         self.relays.iter().filter_map(Relay::poll_timeout).min()
     }
@@ -237,7 +236,7 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// What happens next where nothing is wrong; whether anything does by `until`.
+    /// Processes the next frame or timer in order. Returns true if there was one by `until`.
     pub(crate) fn flow(&mut self, until: Instant) -> Checked<bool> {
         let timer = self.next_timer();
         match self.wires.next() {
@@ -254,7 +253,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Whether every relay holds a place, all for one target.
+    /// Returns true if every relay holds a position, all for the same target.
     pub(crate) fn agrees(&self) -> bool {
         let target = self.ledgers[0].target.map(f32::to_bits);
         self.ledgers

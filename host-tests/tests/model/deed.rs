@@ -1,4 +1,4 @@
-//! What each operation does to a chain.
+//! Effect of each operation on a chain.
 
 use proptest::prop_assert;
 use uav_relay::{Duration, Sample};
@@ -10,7 +10,6 @@ use super::scenario::{Kind, SAMPLES};
 use super::wires::end;
 
 impl World<'_> {
-    /// Does what an operation says.
     pub(crate) fn apply(&mut self, operation: &Operation) -> Checked {
         self.wires.hurry(self.now);
         match *operation {
@@ -48,7 +47,7 @@ impl World<'_> {
         }
     }
 
-    /// The frame `behind` the next one of a line arrives so many times.
+    /// Delivers the frame `behind` places after the next one of a line `times` times.
     fn deliver(&mut self, line: u8, behind: u8, times: usize) -> Checked {
         let Some(line) = self.wires.pick(line) else {
             return Ok(());
@@ -153,7 +152,7 @@ impl World<'_> {
         self.turn(leader)
     }
 
-    /// As many samples as a relay wants, with some spread, about so many per cent of the interference agreed on.
+    /// Hands a relay the samples that it wants, at about `part` per cent of the agreed interference.
     fn measure(&mut self, relay: u8, part: u8) -> Checked {
         let at = usize::from(relay) % self.relays.len();
         let field = self.scenario.mission.field();

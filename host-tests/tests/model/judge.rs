@@ -1,27 +1,27 @@
-//! What a mission's chain can meet, in f64 and by the formulas of the reference alone.
+//! Performance that a mission's chain can reach, in f64 and by the reference formulas alone.
 
 use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
 
-/// How far above the best a target may be, relative: the rounding of f32 arithmetic.
+/// Relative excess over the optimum that f32 rounding permits a target.
 const ABOVE: f64 = 1e-4;
 
-/// The chain of a mission.
+/// Reference model of a mission's chain.
 #[derive(Debug)]
 pub(crate) enum Judge {
-    /// With an interferer at a known place.
+    /// Chain with an interferer at a known position.
     Source {
         link: Link,
-        /// The best that its relays can have, within their altitudes.
+        /// Best target within the relays' altitudes.
         optimum: f64,
     },
-    /// In a field of interference.
+    /// Chain in a field of interference.
     Field(StochasticLink),
 }
 
 impl Judge {
-    /// SIRs of the N + 1 hops; those from or to a relay without a place mean nothing.
+    /// Returns the SIRs of the N + 1 hops; those of a relay without a position are meaningless.
     pub(crate) fn hops(&self, places: &[Option<Place>]) -> Vec<f64> {
         let x: Vec<f64> = places
             .iter()
@@ -44,7 +44,7 @@ impl Judge {
         }
     }
 
-    /// How many times the SIR at `x_m` is what it would be with that Upsilon there, 1/W: 1 where it was agreed on.
+    /// Returns the SIR at `x_m` over that with the measured Upsilon, 1/W; 1 for a known interferer.
     pub(crate) fn louder(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,
@@ -52,12 +52,12 @@ impl Judge {
         }
     }
 
-    /// Whether there may be a chain that meets `target`, relays having measured no Upsilon above `measured_per_w`, 1/W.
+    /// Returns true if a chain may meet `target`, when no measured Upsilon is above `measured_per_w`, 1/W.
     pub(crate) fn may_meet(&self, target: f64, measured_per_w: Option<f64>) -> bool {
         match self {
             Self::Source { optimum, .. } => target <= optimum * (1.0 + ABOVE),
             Self::Field(link) => match measured_per_w {
-                // No hop is worse for an Upsilon that is larger everywhere.
+                // No hop gets worse when Upsilon is larger everywhere.
                 Some(measured) => {
                     let all = link.upsilon.iter().map(|(_, upsilon)| *upsilon);
                     let even = StochasticLink {

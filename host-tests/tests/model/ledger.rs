@@ -1,4 +1,4 @@
-//! What one relay was told and has counted, as plain data, and what may never happen to a relay by itself.
+//! Commands and counters of one relay as plain data, and rules that no relay may break on its own.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::message::Message;
@@ -14,14 +14,13 @@ use super::seal::{Taken, refused, taken};
 use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
-/// The most frames that one drain may give: a pass or what came of one, "busy", what came of a proposal, a pulse and what came of it,
-/// and to each side a heartbeat and a hello.
+/// Most frames of one drain: a pass, busy, decision, two for a renewal, and per side a heartbeat and a hello.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
-/// One relay, by what it has said since it was switched on.
+/// Observed state of one relay since it was switched on.
 #[derive(Debug)]
 pub(crate) struct Ledger {
-    /// Where it was told to fly.
+    /// Last setpoint.
     pub(crate) place: Option<Place>,
     pub(crate) target: Option<f32>,
     pub(crate) holding: bool,
@@ -30,48 +29,46 @@ pub(crate) struct Ledger {
     ended: Ended,
     refused: u32,
     signs: [Signs; 2],
-    /// The longest lease that was given, or `dead_after`.
+    /// Longest lease granted, at least `dead_after`.
     longest: Duration,
-    /// The view of the chain that it has agreed to, from 0 in every life.
+    /// Accepted view, 0 after each start.
     pub(crate) view: ViewId,
-    /// The last pass of that view that it took part in.
+    /// Last pass of that view in which the relay took part.
     pub(crate) pass: Option<u16>,
-    /// The last ones of its lives before.
+    /// Last passes of earlier lives.
     pub(crate) passes_before: Vec<u16>,
-    /// The largest Upsilon that it has measured, 1/W, in this life or in one before.
+    /// Largest Upsilon measured in this life or an earlier one, 1/W.
     pub(crate) measured_per_w: Option<f64>,
-    /// Of this life: 1 and up, larger in each, and no two relays' are the same.
+    /// Epoch of this life: at least 1, increasing, unique among the relays.
     pub(crate) epoch: u32,
-    /// What it had said in the votes on views when it said something last, as its flash keeps it.
+    /// Acceptor state in flash after the last vote.
     pub(crate) record: Option<ViewRecord>,
-    /// The frames that it has taken.
+    /// Accepted frames.
     taken: Taken,
 }
 
-/// How long after one question the next one is asked, at the soonest: as often as all of a chain can do on one channel, sixteen times within
-/// the span between `probe_after` and `dead_after` at least, and 64 times at most.
+/// Returns the shortest interval of questions to a neighbour, limited by the channel's capacity.
 fn tick(settings: &Settings, relays: usize) -> Duration {
     let span = settings.dead_after.as_micros() - settings.probe_after.as_micros();
     let round = 2 * relays as u64 * settings.hop_time.as_micros();
     Duration::from_micros(round.clamp(span / 64 + 1, span / QUESTIONS as u64))
 }
 
-/// And at the latest.
+/// Returns the longest interval of questions to a neighbour.
 fn spread(tick: Duration) -> Duration {
     Duration::from_micros(tick.as_micros() + tick.as_micros() / 8 + 1)
 }
 
-/// What one turn of a relay's main loop gave.
+/// Results of one turn of a relay's main loop.
 pub(crate) struct Turn<'a> {
     pub(crate) now: Instant,
     pub(crate) relay: &'a Relay,
     pub(crate) sent: u32,
     pub(crate) events: &'a [Event],
-    /// The largest Upsilon that any other relay has measured, 1/W.
+    /// Largest Upsilon measured by any other relay, 1/W.
     pub(crate) measured_per_w: Option<f64>,
 }
 
-/// The number of a side in a pair.
 fn side(of: Side) -> usize {
     usize::from(of == Side::Downstream)
 }
@@ -102,7 +99,7 @@ impl Ledger {
         }
     }
 
-    /// The relay has been switched off and on again: it has forgotten everything but what its flash keeps.
+    /// Resets the ledger after a reboot, in which the relay loses everything but its flash.
     pub(crate) fn reboot(&mut self, now: Instant, epoch: u32) {
         let mut passes_before = core::mem::take(&mut self.passes_before);
         passes_before.extend(self.pass);
@@ -114,7 +111,7 @@ impl Ledger {
         };
     }
 
-    /// Frames have ended at the relay that came from the neighbour at `from`, and perhaps one was taken.
+    /// Records frames received from the neighbour at `from`, one of which may have been accepted.
     pub(crate) fn heard(
         &mut self,
         from: Side,
@@ -141,7 +138,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// The relay says something to its neighbour at `to`.
+    /// Records a message sent to the neighbour at `to`.
     pub(crate) fn told(&mut self, to: Side, message: &Message, now: Instant) {
         if let Message::Heartbeat { ask: 1.., .. } = message {
             self.signs[side(to)].ask(message, now);
@@ -156,12 +153,12 @@ impl Ledger {
         }
     }
 
-    /// Samples were given to a relay that has no use for them.
+    /// Records samples given to a relay that does not use them.
     pub(crate) fn refuses(&mut self, samples: u32) {
         self.refused += samples;
     }
 
-    /// Holds a turn of relay `at`, from 0, against the rules; whether it stands, aims or holds otherwise than before it.
+    /// Checks a turn of relay `at`, from 0. Returns true if setpoint, target or phase has changed.
     pub(crate) fn audit(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked<bool> {
         let before = (self.place, self.target, self.holding);
         self.sent += turn.sent;
@@ -175,7 +172,7 @@ impl Ledger {
         Ok(before != (self.place, self.target, self.holding))
     }
 
-    /// The chain has the same relays in every view: each knows its place, and tells of the views it comes to.
+    /// Checks that the chain has the same relays in every view, and that new views are reported.
     fn form(&self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let own = at as u16 + 1;
@@ -201,7 +198,7 @@ impl Ledger {
             .reduce(f64::max);
     }
 
-    /// A setpoint is never lost, and moves only where the firmware is told.
+    /// Checks that a setpoint is never lost and changes only together with its event.
     fn follow(&mut self, turn: &Turn) -> Checked {
         let place = turn.relay.setpoint().map(as_told);
         let told = turn.events.contains(&Event::SetpointChanged);
@@ -218,7 +215,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// A setpoint is finite, between Tx and Rx, and at an altitude the relay may have.
+    /// Checks that a setpoint is finite, between Tx and Rx, and within the relay's altitude limits.
     fn bounds(&self, scenario: &Scenario, at: usize) -> Checked {
         let Some(place) = self.place else {
             return Ok(());
@@ -243,7 +240,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// A relay holds a place for a target, one that the chain can meet, and says that it is agreed on only then.
+    /// Checks that a relay holds its position only for a target that the chain can meet.
     fn aim(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let target = relay.target();
@@ -281,7 +278,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Counters never fall, and each frame that has ended is counted once.
+    /// Checks that counters never fall, and that each complete frame is counted once.
     fn count(&mut self, scenario: &Scenario, stats: &Stats) -> Checked {
         let rising = [self.stats, *stats].map(|stats| {
             [
@@ -333,8 +330,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// A neighbour is asked again and again once nothing has come for `probe_after`. It is missed once it has answered nothing for
-    /// `dead_after`, or for as long as a lease may be, and enough questions, and until it answers.
+    /// Checks questions after `probe_after` of silence, and losses after enough of them or the longest lease.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {
@@ -359,11 +355,11 @@ impl Ledger {
         let longest = settings.dead_after.times(LONGEST);
         let most = self.longest.max(settings.dead_after);
         for (signs, there) in self.signs.iter().zip(there) {
-            // While it solves the chain, silence is excused.
+            // Silence is excused while the relay solves the chain.
             let looks = there && settings.method != Method::Joint;
             let idle = !looks || signs.missed;
             let asked = signs.asked.last().map_or(signs.last, |(_, asked)| *asked);
-            // It looks once a tick. The bound shows only in a turn that something else causes, a claim for example.
+            // Questions are checked once per tick. The bound shows only in a turn with another cause, for example a claim.
             let due = (signs.perhaps + settings.probe_after).max(signs.last) + tick;
             // Signed questions wait for the handshake.
             prop_assert!(

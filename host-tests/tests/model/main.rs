@@ -1,21 +1,21 @@
-//! The protocol by sequences of operations: real relays on a hostile chain, against a plain model of what they may do.
+//! Model test of the protocol: random operations on real relays, compared with a plain model of the permitted behaviour.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `operation` | what may happen to a chain, and how it is drawn |
-//! | `scenario` | the missions that are flown |
-//! | `judge` | what a mission's chain can meet, in f64 |
-//! | `wires` | which frames are in flight, and what their bytes must be counted as |
-//! | `ledger` | what one relay was told, and what may never happen to it |
-//! | `chain` | the relays, connected, and the clock: rules of neighbours checked |
-//! | `deed` | what each operation does to a chain |
-//! | `seal` | signed frames: taken once, and in the lives they were sent in |
-//! | `passes` | which passes a relay may take part in |
-//! | `recovery` | from any state to one agreement |
-//! | `tally` | what happened at all, and what it took |
+//! | `operation` | operations on a chain and their distribution |
+//! | `scenario` | random missions |
+//! | `judge` | best performance of a mission's chain, in f64 |
+//! | `wires` | frames in flight and their expected counts |
+//! | `ledger` | observed state of one relay, and rules that it may not break |
+//! | `chain` | connected relays and the clock, with the rules of neighbours |
+//! | `deed` | effect of each operation |
+//! | `seal` | signed frames: accepted once, in the lives in which they were sent |
+//! | `passes` | passes in which a relay may take part |
+//! | `recovery` | recovery from any state to one agreement |
+//! | `tally` | coverage counters |
 //!
-//! `COUNT` (2 000) and `SEED` (1) in the environment say how many sequences are drawn, and which. A failure prints both, and
-//! the shortest sequence that still fails.
+//! The environment variables `COUNT` (2 000) and `SEED` (1) select the number of sequences and the random seed. A failure prints
+//! both and the shortest sequence that still fails.
 
 use std::cell::RefCell;
 
@@ -41,20 +41,18 @@ use operation::{Operation, operations, seeds};
 use scenario::{Scenario, pool};
 use tally::Tally;
 
-/// What every check of the model comes to.
 type Checked<T = ()> = Result<T, TestCaseError>;
 
-/// The most operations of one sequence.
 const LONGEST: usize = 200;
 
-/// Sequences for each mission that is drawn.
+/// Sequences for each random mission.
 const SEQUENCES_A_MISSION: u32 = 10;
 
 fn count() -> u32 {
     std::env::var("COUNT").map_or(2_000, |text| text.parse().unwrap())
 }
 
-/// One sequence, from switching on to the agreement after the last fault.
+/// Runs one sequence, from power-on to the agreement after the last fault.
 fn flown(scenario: &Scenario, seed: u32, sequence: &[Operation], tally: &mut Tally) -> Checked {
     let mut world = World::new(scenario, seed)?;
     for operation in sequence {
@@ -65,7 +63,7 @@ fn flown(scenario: &Scenario, seed: u32, sequence: &[Operation], tally: &mut Tal
     Ok(())
 }
 
-/// A failure as a reader wants it: which mission, what was done, in order.
+/// Returns a readable failure report: the reason, the mission, and the operations in order.
 fn described(reason: &str, seed: u64, scenario: &Scenario, sequence: &[Operation]) -> String {
     let listed: Vec<String> = (1..)
         .zip(sequence)

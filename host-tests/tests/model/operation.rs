@@ -1,12 +1,12 @@
-//! What may happen to a chain, and how it is drawn.
+//! Operations on a chain and their random distribution.
 //!
-//! A byte that picks a line, a relay or a frame is taken modulo how many there are, so that every operation does something
-//! whatever has gone before it, and goes on doing something while a sequence is being shortened.
+//! Bytes that select a line, a relay or a frame are taken modulo their number, so that every operation has an effect, also while
+//! proptest shortens the sequence.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Something that happens to a chain. Lines are directions of links, counted among those that have a frame in flight.
+/// Operation on a chain. A line is one direction of a link, counted among those with a frame in flight.
 #[derive(Clone, Debug)]
 pub(crate) enum Operation {
     /// The next frame of a line arrives.
@@ -17,44 +17,43 @@ pub(crate) enum Operation {
     Twice(u8),
     /// A frame of a line overtakes those before it.
     Overtake(u8, u8),
-    /// So many frames of a line arrive in one read.
+    /// Several frames of a line arrive in one read: line, number of frames.
     Burst(u8, u8),
-    /// The next frame of a line is held up for so many ms.
+    /// The next frame of a line is delayed: line, ms.
     Delay(u8, u16),
-    /// The next frame of a line arrives with these bytes changed: where, and by which bits.
+    /// The next frame of a line arrives damaged: line, and for each byte its position and the flipped bits.
     Damage(u8, Vec<(u8, u8)>),
-    /// Time passes until the next timer of any relay.
+    /// The clock advances to the next timer of any relay.
     Tick,
-    /// Time passes, ms; every timer is served at its time, and nothing arrives.
+    /// The clock advances by so many ms: every timer is served in time, and no frames arrive.
     Wait(u16),
-    /// Time passes, ms, while every main loop stands still: timers are served late, and after what arrives next.
+    /// The clock advances by so many ms while all main loops stand still: timers are served late.
     Sleep(u16),
-    /// Time passes, ms, without faults: frames arrive in order.
+    /// The clock advances by so many ms without faults: frames arrive in order.
     Flow(u16),
-    /// A relay is switched off and on again, with another seed.
+    /// A relay reboots with another seed.
     Reboot(u8, u32),
-    /// A link is cut, when so many bytes of the next frames have got through.
+    /// A link is cut after so many bytes of the next frames.
     Cut(u8, u8),
-    /// A link is joined again.
+    /// A link is restored.
     Join(u8),
-    /// The leader is told to begin again.
+    /// The leader is commanded to restart the agreement.
     Restart,
-    /// A frame that was sent on a line, whatever became of it, arrives: on a chain that signs its frames, which is meant to
-    /// bear that.
+    /// A recorded frame of a line arrives again, if the chain signs its frames, which must withstand that.
     Replay(u8, u8),
-    /// A relay measures, so many times the interference that was agreed on, in per cent.
+    /// A relay measures so many per cent of the agreed interference.
     Measure(u8, u8),
 }
 
-/// From one seed to the next so many, the number of a leader's first pass is 64 larger: as near as two first ones can be.
+/// Seed increment that raises the number of a leader's first pass by 64, the smallest distance.
 const NEXT_LIFE: u32 = 54_336;
 
-/// What a relay is started with: any seed, or one with which a leader's numbers are near those of a life before.
+/// Draws a relay's seed: any, or one that makes a leader's pass numbers close to those of an earlier life.
 pub(crate) fn seeds() -> impl Strategy<Value = u32> {
     prop_oneof![any::<u32>(), (0..4_u32).prop_map(|life| life * NEXT_LIFE)]
 }
 
-/// Operations as a bad day has them: most let the chain go on, each fault comes every few dozen.
+/// Draws an operation: most let the chain proceed, each fault comes every few dozen operations.
 pub(crate) fn operations() -> impl Strategy<Value = Operation> {
     let pick = any::<u8>;
     prop_oneof![

@@ -1,9 +1,9 @@
-//! Which passes a relay may take part in: each once, in order, from the first one of its view on.
+//! Passes in which a relay may take part: each once, in order, starting with the first one of its view.
 //!
-//! One weakness is excused, of chains in a closed loop. A relay that was rebooted in the midst of the first pass of a view takes part
-//! in it again. If a relay has measured something else since, it hands on something else than before; the next relay calls for a
-//! view when it hears that, but may have handed back already what came of the pass as it was, or do so yet: the hop between those
-//! two then misses the target until the new view. Frames with tags are not taken that late.
+//! One weakness of closed-loop chains is excused: a relay that reboots during the first pass of a view takes part in it again,
+//! and forwards other content if it has measured other interference since. The next relay then requests a new view, but may
+//! return the result of the earlier content: until then the hop between the two misses the target. Frames with tags are not
+//! accepted that late.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::digest::digest;
@@ -14,38 +14,37 @@ use super::ledger::Ledger;
 use super::scenario::Scenario;
 use super::wires::Pass;
 
-/// The first pass of a leader's life or view has a number divisible by this, and no other one has.
+/// Divisor of the number of the first pass of a leader's life or view, and of no other number.
 const FIRST: u16 = 64;
 
-/// So many numbers behind a pass is one that is over; a leader that is told to begin again may leave as many unsaid.
+/// Window of numbers behind a pass that count as over; a restarted leader may also skip that many.
 const NEAR: u16 = 32;
 
-/// What a view adds to the digest of the mission: its lower half, and its upper half with the bytes turned round.
+/// Returns a view's contribution to the mission digest: its lower half plus its byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
 }
 
-/// The number after `last`.
 const fn next(last: u16) -> u16 {
     let next = last.wrapping_add(1);
-    // First ones are left out.
+    // Numbers of first passes are skipped.
     next.wrapping_add(next.is_multiple_of(FIRST) as u16)
 }
 
-/// What a pass was to a relay.
+/// Classification of a received pass.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Met {
     TakenUp,
     Again,
-    /// One that is over: late.
+    /// The pass is over: late.
     Late,
-    /// Of another view, of another life of the leader, or one before which something was missed.
+    /// The pass is of another view or another life of the leader, or follows one that was missed.
     Foreign,
 }
 
 impl Ledger {
-    /// What relay `at` says of its view. A new one begins without a pass.
+    /// Checks that a relay's view never goes back; a new view begins without a pass.
     pub(crate) fn look_up(&mut self, relay: &Relay) -> Checked {
         let view = relay.view();
         prop_assert!(view >= self.view, "{view:?} after {:?}", self.view);
@@ -56,7 +55,9 @@ impl Ledger {
         Ok(())
     }
 
-    /// The relay, which `stands` somewhere or nowhere and may have been `suspended` by a view change, was handed a pass, and counted from `before` to `after`.
+    /// Checks the counters of a relay that received a pass.
+    ///
+    /// `stands`: the relay has a position. `suspended`: it may be in a view change.
     pub(crate) fn meets(
         &mut self,
         scenario: &Scenario,
@@ -69,11 +70,11 @@ impl Ledger {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         let met = match self.rule(pass.number) {
             _ if pass.digest != view => Met::Foreign,
-            // Its view is being changed.
+            // The relay's view is being changed.
             _ if suspended => Met::Late,
-            // Places are moved where there are some.
+            // A pass that moves relays needs a position to move.
             Met::TakenUp if pass.moves && !stands => Met::Foreign,
-            // Rebooted in the midst of the pass before, it does not know what the others brought along.
+            // The relay rebooted during the previous pass and does not know the others' profiles.
             Met::TakenUp if pass.follows && self.begins_anew() && after.stale > before.stale => {
                 Met::Foreign
             }
@@ -90,7 +91,7 @@ impl Ledger {
         let again = after.repeated - before.repeated;
         let counted = match met {
             Met::TakenUp => stale == 0 && again == 0,
-            // What is not the same but for its number is of another life.
+            // A pass that differs in more than its number is of another life.
             Met::Again => stale + again == 1,
             Met::Late => stale == 1,
             Met::Foreign => stale + other == 1,
@@ -102,7 +103,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Whether its pass is the first one of its view, and it has taken part in it in a life before.
+    /// Returns true if the relay takes part in the first pass of its view for a second time, after a reboot.
     pub(crate) fn begins_anew(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))
@@ -122,8 +123,7 @@ impl Ledger {
         }
     }
 
-    /// The relay hands a pass onward: the one that it has taken up, or, as the leader, one that is new. The leader's first one
-    /// may never have been said: another may have come between, or its neighbour could not read it.
+    /// Checks a pass that the relay sends: the accepted one, or at the leader a new one.
     pub(crate) fn says(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         prop_assert_eq!(pass.digest, view, "a pass of another view is said");

@@ -1,4 +1,4 @@
-//! From any state to one agreement: faults stop, links are whole, and the leader is told once to begin again.
+//! Recovery from any state to one agreement after the end of all faults and a restart of the leader.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::{Duration, Relay, ViewId};
@@ -7,17 +7,17 @@ use super::Checked;
 use super::chain::{MISS, World};
 use super::scenario::{Calm, Kind};
 
-/// The longest that an undisturbed chain may take, ms of virtual time.
+/// Longest time to agreement of an undisturbed chain, ms of virtual time.
 const LONGEST_MS: u64 = 20_000;
 
-/// Views that may come after the agreement.
+/// Largest number of views after the agreement.
 const MOST_VIEWS: u32 = 2;
 
-/// How long the chain is watched after it has agreed, ms: nobody may be missed, and nothing may move.
+/// Time of observation after the agreement, ms, in which no relay may be lost or move.
 const WATCH_MS: u64 = 16_000;
 
 impl World<'_> {
-    /// What the chain agrees on by itself.
+    /// Returns the agreement of an undisturbed chain.
     pub(crate) fn calm(&mut self) -> Checked<Calm> {
         let took = self.agree(Duration::from_millis(LONGEST_MS))?;
         let target = self.ledgers[0].target.unwrap_or_default();
@@ -35,7 +35,7 @@ impl World<'_> {
             .collect()
     }
 
-    /// Lets the chain go on until every relay holds a place for one target; how long it takes.
+    /// Runs the chain until every relay holds a position for the same target. Returns the time taken.
     fn agree(&mut self, at_most: Duration) -> Checked<Duration> {
         let begun = self.now;
         while !self.agrees() {
@@ -50,32 +50,31 @@ impl World<'_> {
         Ok(self.now.since(begun))
     }
 
-    /// What a chain of this mission may take, told to begin again in whatever state.
+    /// Returns the longest time that this mission's chain may take after a restart in any state.
     ///
-    /// As long as an undisturbed one, and on each line the first frame may be lost to what was left there of a broken one:
-    /// the relay that waits for what comes back of it over `h` hops, 2 h + 2 times `hop_time` and an eighth, sends it again.
+    /// It adds one retransmission per line to an undisturbed chain's time: a relay that waits for the result over `h` hops
+    /// retransmits after (2 h + 2) `hop_time` and an eighth.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;
         let waits: u64 = hops.map(|hops| (2 * hops + 2) * hop_us * 9 / 8).sum();
-        // Where handshakes were lost too, they are said again when there has been silence for long enough.
+        // Lost handshakes are repeated after enough silence.
         let greets = if self.scenario.signs() { 2 } else { 0 };
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
         let silence_us = greets * probe_after_us + 2 * self.a_call().as_micros();
-        // A relay that was rebooted may be needed for a view that it has forgotten: places are not taken before its lease is over.
+        // A view may need a relay that rebooted and forgot it: positions are not used before its lease has expired.
         let lease_us = self.scenario.settings[0].dead_after.as_micros();
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
-    /// How long a call for a new view may take to the leader where nothing is lost: each relay on its way may just have called in
-    /// vain, and calls again after no more than `quiet`.
+    /// Returns the longest time of a view request to the leader: each relay may wait for `quiet` first.
     fn a_call(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
         Duration::from_micros(calls * probe_after_us)
     }
 
-    /// What Algorithm 2 ends with is what its worst hop has, no more and no less; other methods may leave hops that have more.
+    /// Checks that the target of Algorithm 2 equals the SIR of its worst hop. Other methods may leave a margin.
     fn is_as_good_as_it_says(&self) -> Checked {
         if self.scenario.kind == Kind::Adjust
             && let Some(target) = self.ledgers[0].target
@@ -91,7 +90,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// A view that was called for before the agreement may come after it: then the chain agrees again.
+    /// Waits for a view requested before the agreement, after which the chain agrees again.
     fn settle(&mut self, at_most: Duration) -> Checked {
         for _ in 0..MOST_VIEWS {
             let views: Vec<ViewId> = self.relays.iter().map(Relay::view).collect();
@@ -107,7 +106,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// The end of every sequence; how long the agreement took.
+    /// Ends a sequence: repairs the chain and returns the time to agreement.
     pub(crate) fn recover(&mut self) -> Checked<Duration> {
         (0..self.wires.links()).for_each(|link| self.wires.join(link));
         self.wires.hurry_all(self.now);

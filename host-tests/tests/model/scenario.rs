@@ -1,4 +1,4 @@
-//! The missions that are flown: 2 to 6 relays, every method, drawn as the random tests of the placements draw theirs.
+//! Missions of the model test: 2 to 6 relays, every method, drawn like those of the random placement tests.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,26 +17,25 @@ use uav_relay_oracle::reference::{Link, Station};
 use super::chain::World;
 use super::judge::Judge;
 
-/// Samples that a relay takes at a place before it believes them.
+/// Number of samples that a relay averages at a position.
 pub(crate) const SAMPLES: u32 = 100;
 
-/// How far apart neighbours must stay in half of the chains that choose altitudes, as a part of D / (N + 1): it often binds.
+/// Range of the separation, as a fraction of D / (N + 1), in half of the chains with free altitudes.
 const TIGHT: (f64, f64) = (0.05, 0.95);
 
-/// What the leader has the chain do.
+/// Optimisation method of the leader.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Algorithm 1, solved by the leader first.
+    /// Algorithm 1, predicted by the leader.
     Predicted,
-    /// Algorithm 1 by trying; relays may bring an altitude and a power of their own.
+    /// Algorithm 1 by trial; relays may have altitudes and powers of their own.
     Tried,
-    /// Altitudes as well.
+    /// Algorithm 1 with free altitudes.
     Altitude,
-    /// Algorithm 2.
     Adjust,
-    /// Algorithm 4 in the field that was agreed on.
+    /// Algorithm 4 in the configured field.
     Field,
-    /// Algorithm 4 in the field as it is measured.
+    /// Algorithm 4 in the measured field.
     Measured,
 }
 
@@ -51,30 +50,29 @@ impl Kind {
     ];
 }
 
-/// What an undisturbed chain agrees on.
+/// Agreement of an undisturbed chain.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Calm {
-    /// x, y and altitude of every relay, as their bits.
+    /// Bits of x, y and altitude of every relay.
     pub(crate) places: Vec<[u32; 3]>,
-    /// The target, as its bits.
+    /// Bits of the target.
     pub(crate) target: u32,
-    /// Virtual time that it takes, µs.
+    /// Virtual time to the agreement, µs.
     pub(crate) took_us: u64,
 }
 
-/// A mission, and what is known of it.
+/// Mission with its reference model and its undisturbed agreement.
 #[derive(Debug)]
 pub(crate) struct Scenario {
     pub(crate) kind: Kind,
     pub(crate) mission: Mission,
-    /// By relay.
     pub(crate) settings: Vec<Settings>,
     pub(crate) judge: Judge,
     pub(crate) calm: Calm,
 }
 
 impl Scenario {
-    /// Relay `at`, from 0, switched on.
+    /// Returns relay `at`, counted from 0, just switched on.
     pub(crate) fn relay(&self, at: usize, seed: u32, epoch: u32, now: Instant) -> Relay {
         let mut settings = self.settings[at];
         if let Some(auth) = &mut settings.auth {
@@ -87,12 +85,12 @@ impl Scenario {
         Relay::new(self.mission, identity, settings, seed, now).unwrap()
     }
 
-    /// Whether frames are signed.
+    /// Returns true if frames are signed.
     pub(crate) fn signs(&self) -> bool {
         self.settings.iter().all(|one| one.auth.is_some())
     }
 
-    /// The same mission with signed frames: undisturbed, its chain agrees on the same.
+    /// Returns the mission with signed frames, whose undisturbed chain must reach the unsigned agreement.
     fn signed(mut self) -> Self {
         for one in &mut self.settings {
             one.auth = Some(Auth {
@@ -116,7 +114,7 @@ impl Scenario {
     }
 }
 
-/// `count` missions of all kinds.
+/// Draws `count` missions of all kinds.
 pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     (0..count as usize)
@@ -124,7 +122,7 @@ pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
             let kind = Kind::ALL[at % Kind::ALL.len()];
             loop {
                 if let Some(scenario) = drawn(&mut rng, kind) {
-                    // Of each kind one in four.
+                    // One in four of each kind is signed.
                     let signs = at / Kind::ALL.len() % 4 == 3;
                     break if signs { scenario.signed() } else { scenario };
                 }
@@ -133,7 +131,7 @@ pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
         .collect()
 }
 
-/// One mission, if what is drawn is one.
+/// Draws a mission; `None` if the draw is infeasible.
 fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
     let (mission, settings, judge) = match kind {
         Kind::Predicted | Kind::Tried => aligned(rng, kind)?,
@@ -160,7 +158,7 @@ fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
 
 type Parts = (Mission, Vec<Settings>, Judge);
 
-/// What every relay is set to, with what single ones hold of their own.
+/// Returns the settings of every relay, with individual profiles where given.
 fn settings(relays: usize, common: Settings, own: &[(u16, Profile)]) -> Vec<Settings> {
     let mut all = vec![common; relays];
     for (index, profile) in own {
@@ -202,7 +200,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     };
     let corridor = Corridor::plane(f64::from(narrow.least_m), f64::from(narrow.most_m));
     let mut link = drawn.link;
-    // All at one altitude to begin with, but for single ones.
+    // All relays start at one altitude, except single ones.
     let common_m = log_uniform(rng, corridor.least_m, corridor.most_m);
     for relay in &mut link.relays {
         let own = rng.random_bool(0.2);
@@ -237,7 +235,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     for one in &mut settings {
         one.hold_altitude = rng.random_bool(0.1);
     }
-    // A search that need not keep relays apart finds more than any that must, and finds it surely.
+    // A search without the separation finds a better optimum than any with it, and finds it reliably.
     let unseparated = Link {
         min_separation_m: 0.0,
         ..link.clone()
@@ -246,7 +244,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     Some((mission, settings, Judge::Source { link, optimum }))
 }
 
-/// How Algorithm 2 goes, up to some part of the highest altitude at a time.
+/// Draws the steps of Algorithm 2, up to some fraction of the highest altitude at a time.
 fn turns(rng: &mut ChaCha8Rng, most_m: f32) -> Adjust {
     Adjust {
         rounds: rng.random_range(1..=6),
@@ -272,7 +270,7 @@ fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
         power_w: round(log_uniform(rng, 0.1, 10.0)),
     };
     let mu_los = log_uniform(rng, 1.0, 1e4);
-    // So that SIRs are about 1.
+    // The unit makes the SIRs about 1.
     let unit = mu_los * (distance_m / f64::from(relays)).powi(2) / relay.power_w;
     let upsilon: Vec<(f64, f64)> = (0..points)
         .map(|at| {
@@ -292,7 +290,7 @@ fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
         upsilon,
         relays: vec![relay; usize::from(relays)],
     };
-    // In an uneven field a chain that must keep apart may do without a target that it would meet without.
+    // In an uneven field the separation may prevent a target that would be met without it.
     let apart = if points == 1 && rng.random() {
         0.1 * distance_m / f64::from(relays)
     } else {

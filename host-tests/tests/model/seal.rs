@@ -1,6 +1,4 @@
-//! What signed frames may be taken for: once each, in the lives of both ends that they were sent in.
-//!
-//! An attacker who records everything plays it back (`Operation::Replay`): nothing of that may count that has counted before.
+//! Acceptance of signed frames: each once, in the lives of both ends in which it was sent.
 
 use std::collections::BTreeSet;
 
@@ -11,32 +9,32 @@ use uav_relay::wire::frame;
 
 use super::Checked;
 
-/// Of a frame: the epochs of its two ends when it was sent.
+/// Epochs of both ends at the time a frame was sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Seal {
     pub(crate) from: u32,
     pub(crate) to: u32,
 }
 
-/// What a relay has taken since it was switched on, from its neighbours upstream and downstream.
+/// Frames accepted by a relay since it was switched on, from its upstream and downstream neighbours.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Taken {
     frames: [BTreeSet<(u32, Vec<u8>)>; 2],
-    /// The largest epoch that was taken.
+    /// Largest accepted epoch by side.
     newest: [u32; 2],
 }
 
-/// Frames that have counted.
+/// Returns the number of accepted frames.
 pub(crate) fn taken(stats: &Stats) -> u32 {
     stats.received + stats.handshakes
 }
 
-/// Frames that were no member's, or not new.
+/// Returns the number of frames refused as forged or replayed.
 pub(crate) fn refused(stats: &Stats) -> u32 {
     stats.forged + stats.replayed
 }
 
-/// The epoch of the receiver that a handshake tells, if `wire` is one: all of it, or the upper half of a nonce.
+/// Returns the body of the handshake in `wire`, or `None` for other frames.
 fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
     let mut deframer = Deframer::new();
     for &byte in wire {
@@ -49,7 +47,7 @@ fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
 }
 
 impl Taken {
-    /// A relay of this epoch takes a frame from the neighbour at `side`: it may. Whether it is a sign of life.
+    /// Checks that a relay may accept a frame from `side`. Returns true if it is a sign of life.
     pub(crate) fn take(
         &mut self,
         side: usize,
@@ -72,7 +70,7 @@ impl Taken {
         self.newest[side] = seal.from;
         let is_new = self.frames[side].insert((seal.from, wire.to_vec()));
         prop_assert!(is_new, "a frame is taken twice");
-        // A handshake that shows another nonce, or none, may have been recorded.
+        // A handshake with another nonce, or none, may be a recorded one.
         let told = handshake.as_ref().and_then(|body| body.get(12..16));
         Ok(told.is_none_or(|told| told == epoch.to_le_bytes()))
     }

@@ -3,29 +3,29 @@
 use uav_relay::wire::message::Message;
 use uav_relay::{Duration, Instant};
 
-/// Questions that a neighbour leaves open at least until it is missed, and how many of them may still be answered.
+/// Unanswered questions required before a loss, and how many of them may still be answered.
 pub(crate) const QUESTIONS: usize = 16;
 const OPEN: u32 = 4;
 
-/// How many times as many questions as were open before an answer, and how many times `dead_after`, are enough in any case.
+/// Multiples of the questions open before an answer, and of `dead_after`, that always suffice.
 const MARGIN: usize = 3;
 pub(crate) const LONGEST: u32 = 8;
 
-/// What is known of a neighbour's being there.
+/// Evidence that a neighbour is alive.
 #[derive(Debug)]
 pub(crate) struct Signs {
-    /// Its number, and when it was asked, of every question.
+    /// Number and time of every question.
     pub(crate) asked: Vec<(u16, Instant)>,
-    /// When it was there for certain, and when it may have been.
+    /// Last time when the neighbour was certainly alive, and when it may have been.
     pub(crate) surely: Instant,
     pub(crate) perhaps: Instant,
-    /// When something came that may have been a sign of it.
+    /// Reception time of the last possible sign of life.
     pub(crate) last: Instant,
-    /// Questions since a certain sign, since one that may have been, and the most since a certain one.
+    /// Questions since the last certain sign, since the last possible one, and the most before a certain one.
     pub(crate) open: usize,
     pub(crate) perhaps_open: usize,
     pub(crate) most_open: usize,
-    /// Whether the relay has said that it is lost.
+    /// True while the relay reports the neighbour as lost.
     pub(crate) missed: bool,
 }
 
@@ -52,8 +52,7 @@ impl Signs {
         }
     }
 
-    /// An answer is a sign of when its question was asked; what comes back of a pulse or a pass, of when that was handed on; and the next
-    /// one, of when what came back of the last was.
+    /// Records signs of life: an answer counts from its question, a completion from the forwarding.
     pub(crate) fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { answer, .. } => {
@@ -64,7 +63,7 @@ impl Signs {
                 self.last = now;
                 self.perhaps_open = 0;
                 self.perhaps = self.perhaps.max(*asked);
-                // So few questions can have followed it that it is open yet.
+                // So few questions followed this one that it must still be open.
                 if now.since(*asked) < tick.times(OPEN) {
                     self.surely = self.surely.max(*asked);
                     self.open = 0;
@@ -77,7 +76,7 @@ impl Signs {
             | Message::Decision(_)
             | Message::Offer { .. }
             | Message::Claim(_) => {}
-            // A pulse, a pass, or what came of one.
+            // Lease renewal, pass, or result of a pass.
             _ => {
                 (self.last, self.perhaps) = (now, now);
                 self.perhaps_open = 0;
@@ -85,8 +84,7 @@ impl Signs {
         }
     }
 
-    /// Whether it was to be missed when it was asked last, as nothing had come for `most`: that often it had been asked before, or that
-    /// long it may be silent at most.
+    /// Returns true if the neighbour was lost after `most` of silence and enough questions, or `longest`.
     pub(crate) fn is_to_be_missed(&self, most: Duration, longest: Duration) -> bool {
         let Some((_, asked)) = self.asked.last() else {
             return false;

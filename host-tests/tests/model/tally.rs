@@ -1,4 +1,4 @@
-//! What happened at all, and what it took: a rule that nothing was held against proves nothing.
+//! Coverage counters of the model test: a rule that was never exercised proves nothing.
 
 use std::collections::BTreeMap;
 
@@ -6,17 +6,17 @@ use uav_relay::Duration;
 
 use super::scenario::{Kind, Scenario};
 
-/// How often things happened, and the most of what was measured.
+/// Event counts and maxima of measured values.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     counts: BTreeMap<&'static str, u64>,
     most: BTreeMap<&'static str, u64>,
-    /// By kind, and whether frames are signed.
+    /// Times to agreement by kind and by whether frames are signed.
     took_us: BTreeMap<(Kind, bool), u64>,
     sequences: BTreeMap<(Kind, bool), u64>,
 }
 
-/// What must happen at least once in so many sequences.
+/// Events with the number of sequences in which each must happen at least once.
 const EXPECTED: [(&str, u64); 18] = [
     ("frames in bursts", 1),
     ("frames delayed", 1),
@@ -48,7 +48,7 @@ impl Tally {
         *most = value.max(*most);
     }
 
-    /// Adds what happened in one sequence, which ended with an agreement within `took`.
+    /// Adds the counts of one sequence, which ended with an agreement after `took`.
     pub(crate) fn sequence(&mut self, scenario: &Scenario, other: &Self, took: Duration) {
         let kind = (scenario.kind, scenario.signs());
         for (what, count) in &other.counts {
@@ -62,7 +62,7 @@ impl Tally {
         *longest = took.as_micros().max(*longest);
     }
 
-    /// Prints it all; fails where too little has happened in `sequences` sequences.
+    /// Prints the counts; panics if an expected event is too rare in `sequences` sequences.
     pub(crate) fn judge(&self, sequences: u32) {
         println!("{sequences} sequences: {:?}", self.counts);
         println!("at most: {:?}", self.most);

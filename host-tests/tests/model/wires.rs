@@ -1,4 +1,4 @@
-//! Which frames are in flight, and what the bytes that arrive must be counted as.
+//! Frames in flight, and the expected counts for received bytes.
 
 use std::collections::VecDeque;
 
@@ -9,16 +9,15 @@ use uav_relay::{Duration, Instant, Port};
 
 use super::seal::Seal;
 
-/// From the moment a frame is handed to its line to the moment it arrives, where nothing is wrong.
+/// Time of flight of an undisturbed frame.
 pub(crate) const FLIGHT: Duration = Duration::from_millis(5);
 
-/// The most frames in flight on one line: what is sent beyond that is lost.
+/// Most frames in flight on one line: further ones are lost.
 const ROOM: usize = 12;
 
-/// Frames that an attacker remembers of a line.
+/// Number of frames of a line that an attacker records.
 const RECORDED: usize = 64;
 
-/// A frame in flight.
 #[derive(Clone, Debug)]
 pub(crate) struct Flying {
     pub(crate) bytes: Vec<u8>,
@@ -26,47 +25,45 @@ pub(crate) struct Flying {
     pub(crate) seal: Seal,
 }
 
-/// One direction of a link.
 #[derive(Debug, Default)]
 struct Line {
     flying: VecDeque<Flying>,
-    /// Frames that are held up: the others pass them by.
+    /// Delayed frames, which the others overtake.
     late: Vec<Flying>,
-    /// What has arrived since the last delimiter.
+    /// Bytes received since the last delimiter.
     begun: Vec<u8>,
-    /// What has been sent, the newest last.
+    /// Sent frames, newest last.
     recorded: VecDeque<Flying>,
 }
 
-/// Frames that a receiver has seen the ends of.
+/// Numbers of frames completely received.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ended {
-    /// As they were sent.
+    /// Frames that arrived as sent.
     pub(crate) intact: u32,
-    /// Anything else that is not empty.
+    /// Other frames that are not empty.
     pub(crate) broken: u32,
 }
 
-/// The links of a chain: link `k` is between relays `k` and `k + 1`, counted from 0; line `2 k` goes downstream on it.
+/// Links of a chain: link `k` connects relays `k` and `k + 1`, from 0; its line `2 k` goes downstream.
 #[derive(Debug)]
 pub(crate) struct Wires {
     lines: Vec<Line>,
     cut: Vec<bool>,
 }
 
-/// One pass of one view of the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
-    /// The digest of the mission, and the mark of the view more.
+    /// Digest of the mission plus the mark of the view.
     pub(crate) digest: u16,
-    /// Whether it is one of Algorithm 2.
+    /// True for a pass of Algorithm 2.
     pub(crate) moves: bool,
-    /// Whether it is one that some relays have been asked before, or of places chosen by what they said.
+    /// True if the pass builds on data that earlier passes collected from relays.
     pub(crate) follows: bool,
 }
 
-/// The message in a frame; a handshake is none.
+/// Returns the message in a frame; `None` for a handshake.
 pub(crate) fn message(frame: &[u8]) -> Option<Message> {
     let mut deframer = Deframer::new();
     for &byte in frame {
@@ -77,7 +74,6 @@ pub(crate) fn message(frame: &[u8]) -> Option<Message> {
     None
 }
 
-/// The pass that a frame hands onward, if that is what it does.
 pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
     let message = message(frame)?;
     let number = match &message {
@@ -98,7 +94,6 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
     })
 }
 
-/// Where a line ends: the relay, and its port.
 pub(crate) fn end(line: usize) -> (usize, Port) {
     if line.is_multiple_of(2) {
         (line / 2 + 1, Port::Upstream)
@@ -116,7 +111,7 @@ impl Wires {
         }
     }
 
-    /// Relay `from` hands a frame to its line.
+    /// Queues a frame sent by relay `from`.
     pub(crate) fn send(&mut self, from: usize, port: Port, frame: Flying) {
         let line = match port {
             Port::Upstream => 2 * from - 1,
@@ -134,14 +129,14 @@ impl Wires {
         }
     }
 
-    /// A frame that was sent on a line.
+    /// Returns a recorded frame of a line.
     pub(crate) fn recorded(&self, line: usize, which: u8) -> Option<Flying> {
         let recorded = &self.lines[line].recorded;
         let at = usize::from(which) % recorded.len().max(1);
         recorded.get(at).cloned()
     }
 
-    /// One of the lines that have a frame in flight.
+    /// Selects one of the lines with a frame in flight.
     pub(crate) fn pick(&self, pick: u8) -> Option<usize> {
         let busy: Vec<usize> = (0..self.lines.len())
             .filter(|&line| !self.lines[line].flying.is_empty())
@@ -149,14 +144,14 @@ impl Wires {
         busy.get(usize::from(pick) % busy.len().max(1)).copied()
     }
 
-    /// Takes the next frame off a line, or that so many behind it, as far as there are any.
+    /// Removes the next frame from a line, or one of those `behind` it.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;
         flying.remove(usize::from(behind).min(last))
     }
 
-    /// Bytes of a frame that was sent as `whole` arrive at the end of a line.
+    /// Receives bytes of a frame that was sent as `whole` at the end of a line.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], whole: &[u8]) -> Ended {
         let begun = &mut self.lines[line].begun;
         let mut ended = Ended::default();
@@ -171,7 +166,7 @@ impl Wires {
         ended
     }
 
-    /// Relay `at` is switched on: what had begun to arrive is forgotten.
+    /// Discards the partial frames at relay `at`, which has just been switched on.
     pub(crate) fn forget(&mut self, at: usize) {
         for (number, line) in self.lines.iter_mut().enumerate() {
             if end(number).0 == at {
@@ -180,7 +175,7 @@ impl Wires {
         }
     }
 
-    /// Cuts a link: what was in flight is lost but for what is given back, the next frame of each of its lines.
+    /// Cuts a link; frames in flight are lost, and the next one of each of its lines is returned.
     pub(crate) fn cut(&mut self, link: usize) -> [(usize, Option<Flying>); 2] {
         self.cut[link] = true;
         [2 * link, 2 * link + 1].map(|line| {
@@ -200,13 +195,13 @@ impl Wires {
         self.cut.len()
     }
 
-    /// Holds the next frame of a line up until `due`, and lets the others pass.
+    /// Delays the next frame of a line until `due` while the others pass.
     pub(crate) fn delay(&mut self, line: usize, due: Instant) {
         let Line { flying, late, .. } = &mut self.lines[line];
         late.extend(flying.pop_front().map(|frame| Flying { due, ..frame }));
     }
 
-    /// What has been held up until `now` goes on its way, ahead of what has been sent since.
+    /// Releases the frames whose delay has ended by `now`, ahead of later ones.
     pub(crate) fn hurry(&mut self, now: Instant) {
         for Line { flying, late, .. } in &mut self.lines {
             let due = late.extract_if(.., |frame| frame.due <= now);
@@ -214,14 +209,14 @@ impl Wires {
         }
     }
 
-    /// Nothing is held up any more.
+    /// Releases all delayed frames.
     pub(crate) fn hurry_all(&mut self, now: Instant) {
         let late = self.lines.iter_mut().flat_map(|line| &mut line.late);
         late.for_each(|frame| frame.due = now);
         self.hurry(now);
     }
 
-    /// When the next frame arrives where nothing is wrong, and on which line.
+    /// Returns the arrival time and line of the next undisturbed frame.
     pub(crate) fn next(&self) -> Option<(Instant, usize)> {
         let lines = self.lines.iter().zip(0..);
         let coming = lines.flat_map(|(line, number)| {

@@ -1,34 +1,32 @@
-//! The best chain by brute force: dynamic programming over grids of places, which are then drawn together around good chains.
-//!
-//! It shares no formula with what it judges. A chain of a grid is a real chain, so what is found is never above the optimum.
+//! Best chain by dynamic programming over successively refined grids, without the crate's formulas.
 
 use uav_relay_scenario::scene::Scene;
 
-/// Cells of the first grid.
+/// Number of cells of the first grid.
 const CELLS: u32 = 600;
 
-/// Parts of the line: of the chains whose first relay stands in one of them, the best is a candidate.
+/// Number of segments of the line; the best chain with its first relay in each is a candidate.
 const PARTS: f64 = 16.0;
 
-/// The best candidates, which are refined.
+/// Number of best candidates, which are refined.
 const CANDIDATES: usize = 4;
 
-/// Places of each relay in a refinement, on either side of the best one so far.
+/// Number of positions of each relay in a refinement, on either side of the best one so far.
 const BESIDE: i32 = 40;
 
-/// How far the first refinement reaches to either side, as a part of D.
+/// Half width of the first refinement, as a fraction of D.
 const WINDOW: f64 = 0.06;
 
-/// Refinements, each of a narrower window.
+/// Number of refinements, each with a narrower window.
 const REFINEMENTS: u32 = 32;
 
-/// Width of a window over that of the one before.
+/// Ratio of successive window widths.
 const SHRINK: f64 = 0.6;
 
-/// A chain's SIR and its places.
+/// SIR and positions of a chain.
 type Found = (f64, Vec<f64>);
 
-/// The SIR of the best chain found at altitude `h`; 0 where the least separation leaves no chain of the first grid.
+/// Returns the SIR of the best chain at altitude `h`; 0 if the separation leaves no chain on the grid.
 pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     let d = scene.distance_m;
     let mut grid: Vec<f64> = (0..=CELLS)
@@ -62,8 +60,7 @@ pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     refined.fold(0.0, f64::max)
 }
 
-/// The best chains whose relay k stands at one of `grids[k - 1]`, one for each of `parts` of the line that relay 1 may stand
-/// in, the best one first.
+/// Returns the best chains with relay k on `grids[k - 1]`, one for each of `parts` segments for relay 1.
 fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
     let d = scene.distance_m;
     let (mut worth, mut ways) = (at_last(scene, h, &grids[grids.len() - 1]), Vec::new());
@@ -116,7 +113,7 @@ fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
     firsts.iter().map(chain).collect()
 }
 
-/// The SIR at Rx from each of the last relay's places.
+/// Returns the SIR at Rx from each position of the last relay.
 fn at_last(scene: &Scene, h: f64, places: &[f64]) -> Vec<f64> {
     let d = scene.distance_m;
     let power = scene.relays[scene.relays.len() - 1].power_w / scene.eta;
@@ -125,7 +122,7 @@ fn at_last(scene: &Scene, h: f64, places: &[f64]) -> Vec<f64> {
     places.iter().map(sir).collect()
 }
 
-/// The interference power at (x, h) through a path-loss factor.
+/// Returns the interference power at (x, h) through a path-loss factor.
 fn noise(scene: &Scene, x: f64, h: f64, factor: f64) -> f64 {
     let each = scene.sources.iter().map(|s| {
         let square = (x - s.x_m).powi(2) + s.y_m.powi(2) + h.powi(2);

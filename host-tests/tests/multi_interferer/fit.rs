@@ -1,4 +1,4 @@
-//! The hypothetical interferer where it is known: the cases of a separate program, one source, sources at one place.
+//! Hypothetical interferer in known cases: published values, one source, sources at one position.
 
 use std::time::Instant;
 
@@ -35,7 +35,7 @@ fn count(case: &Case, name: &str) -> u32 {
     case.args[name].as_u64().unwrap().try_into().unwrap()
 }
 
-/// The file's errors are those of the midpoint rule on nx x nh cells.
+/// Compares with the file, whose errors are those of the midpoint rule on nx x nh cells.
 #[test]
 fn the_cases_of_a_separate_program_are_met() {
     let cases = cases::of("hyp_msi").unwrap();
@@ -89,7 +89,7 @@ fn equal_sources_at_one_place_are_one_of_their_common_power() {
         let mut scene = scene(&mut rng, 1..=1, 1..=1);
         let mut source = scene.sources[0].clone();
         for _ in 1..copies {
-            // The other side of the line is the same distance away.
+            // The other side of the line is at the same distance.
             source.y_m = -source.y_m;
             scene.sources.push(source.clone());
         }
@@ -99,7 +99,7 @@ fn equal_sources_at_one_place_are_one_of_their_common_power() {
     }
 }
 
-/// What the fit is found on and reported on, against ten times as many places; how long it takes is printed.
+/// Compares the rasters of the fit and its report with ten times as many points; prints the time.
 #[test]
 fn the_rasters_are_fine_enough() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(74));
@@ -124,7 +124,7 @@ fn the_rasters_are_fine_enough() {
     assert!(search < 1e-3 && report < 3e-5);
 }
 
-/// The widest ranges a scenario may have.
+/// Checks the widest permitted ranges of a scenario.
 #[test]
 fn extreme_scenes_have_a_finite_fit() {
     let of = |d: f64, h: (f64, f64), sources: &[(f64, f64, f64)]| {
@@ -178,7 +178,7 @@ fn extreme_scenes_have_a_finite_fit() {
     assert_eq!(hypothetical(&nobody), None);
 }
 
-/// Relays with room beside the line are told on which side the interferers are; above the line that makes no difference.
+/// Checks that the interferers' side matters with lateral room and not without.
 #[test]
 fn with_room_beside_the_line_the_side_is_known() {
     let source = |x_m: f64, y_m: f64| Source {

@@ -1,6 +1,4 @@
-//! What it costs to place a chain by the hypothetical interferer instead of the true sum.
-//!
-//! COUNT scenes of each kind (30 if unset); the table is printed. The relays' own placement maths does the placing.
+//! SIR lost by placing a chain with the hypothetical interferer; `COUNT` scenes of each kind (30 if unset).
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -15,19 +13,19 @@ use uav_relay_tools::multi_interferer::optimum;
 
 use super::scenes::{Sources, scenario};
 
-/// Tolerance on the SIR that the relays are asked for, relative.
+/// Relative SIR tolerance of the relays.
 const TOLERANCE: f64 = 1e-5;
 
-/// Upper ends of the classes of relative error.
+/// Upper bounds of the classes of relative error.
 const CLASSES: [f64; 6] = [0.001, 0.01, 0.03, 0.1, 0.3, 1.0];
 
-/// A scene's relative error, and the share of the best SIR that is lost.
+/// Relative error of the fit, and fraction of the best SIR that is lost.
 struct Outcome {
     error: f64,
     lost: f64,
 }
 
-/// Where the relays go in a scenario of one interferer.
+/// Returns the relays' positions in a scenario of one interferer.
 fn placed(scenario: &Scenario, n: u16) -> Option<Vec<(f64, f64)>> {
     let (mission, own) = mission::mission(scenario, n, TOLERANCE).ok()?;
     let of = |index: u16| {
@@ -68,7 +66,7 @@ fn outcomes(default_seed: u64, kind: Sources) -> Vec<Outcome> {
     outcomes
 }
 
-/// How many of them lose more than `limit`.
+/// Returns the number of outcomes that lose more than `limit`.
 fn losing(outcomes: &[&Outcome], limit: f64) -> usize {
     outcomes
         .iter()
@@ -105,7 +103,7 @@ fn placing_by_the_hypothetical_interferer_costs_sir() {
         let all: Vec<&Outcome> = outcomes.iter().collect();
         losing(&all, limit) as f64 / all.len() as f64
     };
-    // As good as its fit: a small relative error goes with a small loss, and a large one does not.
+    // The loss follows the fit: a small relative error goes with a small loss.
     assert!(share(&aloof, 0.05) < share(&any, 0.05));
     let halves = |outcomes: &[Outcome]| {
         let mut sorted: Vec<&Outcome> = outcomes.iter().collect();

@@ -1,4 +1,4 @@
-//! The best chain at one altitude, and the best such altitude.
+//! Best chain at one altitude, and best such altitude.
 
 use std::time::Instant;
 
@@ -13,7 +13,7 @@ use uav_relay_tools::multi_interferer::{self, best_common_altitude, optimum};
 use super::scenes::{level, of_link, scene};
 use super::{above, brute};
 
-/// That a chain keeps order, band and separation, and has the SIR that it says.
+/// Returns the chain after a check of its order, band, separation and SIR.
 pub(crate) fn checked(scene: &Scene, chain: multi_interferer::Chain) -> multi_interferer::Chain {
     let places = &chain.places;
     assert_eq!(places.len(), scene.relays.len());
@@ -60,7 +60,7 @@ fn of_one_source_it_is_the_optimum_of_the_reference() {
     assert!(worst < 1e-9, "{worst}");
 }
 
-/// One to four relays, powers of their own in a third of the scenes, a least separation in half.
+/// Compares one to four relays with brute force; a third have own powers, half a separation.
 #[test]
 fn brute_force_finds_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(77));
@@ -118,7 +118,7 @@ fn what_has_no_best_chain_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// As many relays as there is room for, and one more; a thousand whose powers all differ.
+/// Checks as many relays as fit, one more, and a thousand with different powers.
 #[test]
 fn crowded_and_long_chains_are_placed() {
     let crowd = |n, apart| Scene {
@@ -143,7 +143,7 @@ fn crowded_and_long_chains_are_placed() {
     assert!(found.sir > 40.0, "more than a hundred relays reach");
 }
 
-/// The best common altitudes of the paper's scenario with the interferer at 150 m, 20 m to 300 m, relays 4 m apart.
+/// Checks the best common altitudes of the paper's scenario: interferer at 150 m, 20 m to 300 m, 4 m apart.
 #[test]
 fn known_best_common_altitudes_are_found() {
     for (n, sir, altitude_m) in [

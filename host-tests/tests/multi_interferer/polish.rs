@@ -1,4 +1,4 @@
-//! Chains made better one relay at a time.
+//! Improvement of chains one relay at a time.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use uav_relay_tools::multi_interferer::{Polished, best_common_altitude, optimum,
 use super::above;
 use super::scenes::{level, of_link, scene};
 
-/// The relays evenly divided over the line.
+/// Returns evenly spaced relays.
 fn even(scene: &Scene, h: f64) -> Vec<(f64, f64)> {
     let hops = scene.relays.len() as f64 + 1.0;
     let step = scene.distance_m / hops;
@@ -21,7 +21,7 @@ fn even(scene: &Scene, h: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The polished chain, and that it is no worse than its start, in order, within the band and apart.
+/// Returns the polished chain after a check of its SIR, order, band and separation.
 fn checked(scene: &Scene, start: &[impl Copy + Into<Place>], band: Corridor) -> Polished {
     let found = polish(scene, start, band).unwrap();
     assert!(found.sir >= scene.chain_sir(start), "{scene:?}");
@@ -48,13 +48,13 @@ fn checked(scene: &Scene, start: &[impl Copy + Into<Place>], band: Corridor) -> 
     found
 }
 
-/// At one altitude the optimum is known: it cannot be left upward, and an even start comes near it in three of four.
+/// Compares with the optimum at one altitude, which three of four even starts nearly reach.
 #[test]
 fn at_one_altitude_it_stays_below_the_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(79));
     let (mut reached, mut start_reached, count) = (0, 0, 150);
     for _ in 0..count {
-        // An even start has room for this; the generator's may be more.
+        // An even start must have room for the separation, which the generator does not ensure.
         let mut scene = level(scene(&mut rng, 1..=20, 2..=5));
         let hops = scene.relays.len() as f64 + 1.0;
         scene.min_separation_m = scene.min_separation_m.min(0.9 * scene.distance_m / hops);
@@ -73,7 +73,7 @@ fn at_one_altitude_it_stays_below_the_optimum() {
     assert!(4 * reached > 3 * count && start_reached < reached / 2);
 }
 
-/// In a band, one source: from the best common altitude toward the joint optimum of the reference, never above it.
+/// Checks that the chain approaches the joint optimum of one source without exceeding it.
 #[test]
 fn in_a_band_it_comes_near_the_joint_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(80));
@@ -124,7 +124,7 @@ fn with_several_sources_in_a_band_the_rules_are_kept() {
     assert!(gained >= 20, "{gained}");
 }
 
-/// With room to the side the chain only gains, and keeps to the room.
+/// Checks that with lateral room the chain only gains, and stays within the room.
 #[test]
 fn with_room_to_the_side_it_gains() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(83));

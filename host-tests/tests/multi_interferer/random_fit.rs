@@ -1,4 +1,4 @@
-//! The hypothetical interferer against places drawn at random, each with its best power.
+//! Hypothetical interferer compared with random positions at their best power.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,10 +8,10 @@ use uav_relay_scenario::hypothetical::{Raster, fit};
 use super::above;
 use super::scenes::scene;
 
-/// Places drawn in each scene.
+/// Number of random positions in each scene.
 const DRAWN: usize = 20_000;
 
-/// Of those, how many are weighed on the raster of the fit: the best by a rough one.
+/// Number of positions compared on the fit's raster: the best by a coarse one.
 const WEIGHED: usize = 100;
 
 #[test]

@@ -3,7 +3,7 @@
 //! | quantity | distribution |
 //! | --- | --- |
 //! | D | log-uniform, 100 m to 10 km |
-//! | N, number of sources | uniform over what is asked for |
+//! | N, number of sources | uniform over the requested range |
 //! | source's x | 70 % uniform in [0, D]; 15 % each in [-D, 0] and [D, 2 D] |
 //! | source's y, either side | 10 % exactly 0; 30 % log-uniform 0.003 D to 0.1 D; else log-uniform 0.1 D to D |
 //! | source's power | log-uniform 1 to 300 times a relay's |
@@ -14,8 +14,8 @@
 //! | channel | 2 GHz, 0.1 dB and 0.1 to 21 dB of excess loss, eta a uniform mixture |
 //! | least separation | 0 in half; else log-uniform 0.03 to 1 times D / N |
 //!
-//! Aloof sources all stand beside the line, 0.3 D to D from it, with powers of 50 to 100 times a relay's: more alike, as the paper
-//! wants them where one hypothetical interferer is to stand in for them.
+//! Aloof sources are 0.3 D to D beside the line, with powers of 50 to 100 times a relay's. Such similar sources are the case for
+//! which the paper replaces them by one hypothetical interferer.
 
 use std::ops::RangeInclusive;
 
@@ -29,16 +29,14 @@ use uav_relay_scenario::{
     AirGround, ChannelSpec, Interference, Noise, RelayOverride, Scenario, Source,
 };
 
-/// Where sources stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sources {
-    /// Anywhere, on the line too.
+    /// Sources at any position, also on the line.
     Any,
-    /// Well beside the line.
+    /// Sources well beside the line.
     Aloof,
 }
 
-/// A scenario and a number of relays.
 pub(crate) fn scenario(
     rng: &mut ChaCha8Rng,
     relays: RangeInclusive<u16>,
@@ -95,7 +93,6 @@ pub(crate) fn scenario(
     (scenario, n)
 }
 
-/// The scene of one of these, its sources anywhere.
 pub(crate) fn scene(
     rng: &mut ChaCha8Rng,
     relays: RangeInclusive<u16>,
@@ -105,12 +102,12 @@ pub(crate) fn scene(
     Scene::new(&scenario, n).unwrap()
 }
 
-/// The scene of a reference link, its band the altitude of the first relay.
+/// Returns the scene of a reference link at the first relay's altitude.
 pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// The scene with its band drawn together to its lowest altitude.
+/// Returns the scene with its band reduced to the lowest altitude.
 pub(crate) fn level(mut scene: Scene) -> Scene {
     scene.band.most_m = scene.band.least_m;
     scene

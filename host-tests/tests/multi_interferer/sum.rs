@@ -1,4 +1,4 @@
-//! The true sum: what a scene makes of a scenario, and the SIR of its hops against the reference.
+//! True sum of interferers: conversion of a scenario to a scene, and SIRs compared with the reference.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +10,7 @@ use uav_relay_scenario::{Field, Interference, RelayOverride, Scenario, Source};
 use super::above;
 use super::scenes::scene;
 
-/// Interference powers add up, so the inverse SIRs of the sources one by one do; each alone is a case of the reference.
+/// Checks that the inverse SIRs of single sources, each a reference case, add up.
 #[test]
 fn the_inverse_sirs_of_the_sources_add_up() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(71));
@@ -43,7 +43,6 @@ fn the_inverse_sirs_of_the_sources_add_up() {
     }
 }
 
-/// The link with this source and no other.
 fn alone(scene: &Scene, source: &Source) -> Link {
     let station = |relay: &Relay| Station {
         altitude_m: relay.altitude_m,

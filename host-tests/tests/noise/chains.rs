@@ -1,4 +1,4 @@
-//! Chains by Algorithm 1 with noise.
+//! Chains by Algorithm 1 with receiver noise.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +15,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::{count, profile_of};
 
-/// A random link, as relays know it: one in ten without noise.
+/// Draws a link in the relays' precision, in one of ten cases without noise.
 fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     let link = random::link(rng, style);
     as_relays_know_it(&if rng.random_bool(0.1) {
@@ -25,7 +25,7 @@ fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     })
 }
 
-/// How much of the worst hop's noise and interference is noise, by the SIR that the same places have without noise.
+/// Returns the fraction of noise in the worst hop's noise and interference.
 fn share(link: &Link, x: &[f64]) -> f64 {
     let silent = Link {
         noise_w: 0.0,
@@ -67,7 +67,7 @@ fn hop_sinrs_agree_with_the_reference() {
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// Chains of 1 to 50 equals, noise from none to what drowns the interferer: within 1e-4 of the optimum, which they never exceed.
+/// Compares chains of 1 to 50 identical relays in noise with the optimum: within 1e-4, never above.
 #[test]
 fn the_optimum_is_found_in_noise() {
     let count = count(1_000);
@@ -115,7 +115,7 @@ fn the_optimum_is_found_in_noise() {
     );
 }
 
-/// What relays at altitudes and with powers of their own agree on is met, and no more than any chain has.
+/// Checks that unlike relays meet their agreed target, which is not above the optimum.
 #[test]
 fn mixed_chains_in_noise_meet_what_they_agree_on() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1103));
@@ -156,7 +156,7 @@ fn mixed_chains_in_noise_meet_what_they_agree_on() {
     assert!(best_of * 10 > solved * 8, "{best_of} of {solved}");
 }
 
-/// Without noise the noise changes no bit: every place is as that of a mission which has never heard of it.
+/// Checks faults on chains with noise, and that zero noise changes no bit of a position.
 #[test]
 fn chains_in_noise_settle_to_the_bit_whatever_happens_to_frames() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1104));

@@ -1,4 +1,4 @@
-//! Noise in a field: what the bound on E[1 / (I + N)] is worth, and that a chain flies by it.
+//! Noise in a field: quality of the bound on E[1 / (I + N)], and its use by a chain.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -7,9 +7,9 @@ use uav_relay::optimiser::plan;
 use uav_relay::{Field, FieldPoint, Interference, Mission, MissionConfig, Schedule, sir};
 use uav_relay_oracle::random::{self, log_uniform};
 
-/// E[f(u)] for u = I / I_max with a Beta distribution, by its density on a grid that is fine at both ends.
+/// Returns E[f(u)] for u = I / I_max of a Beta distribution, by its density on a grid.
 fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
-    // u = 1 / (1 + e^-z): the density by z is u^alpha (1 - u)^beta but for a factor.
+    // u = 1 / (1 + e^-z): the density in z is proportional to u^alpha (1 - u)^beta.
     let (mut sum, mut weight) = (0.0, 0.0);
     for step in -40_000..=40_000 {
         let z = f64::from(step) * 1e-3;
@@ -22,14 +22,14 @@ fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     sum / weight
 }
 
-/// The bound lies above, 1 / (E[I] + N) below; how far apart they are, for the shapes that a scenario takes.
+/// Compares the mean with the upper bound and with the lower bound 1 / (E[I] + N).
 #[test]
 fn noise_in_a_field_is_bounded_from_above() {
     let mut worst = Vec::new();
     for alpha in [1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 50.0] {
         let mut most = (0.0, 0.0);
         for beta in [0.5, 1.0, 2.0, 5.0, 20.0] {
-            // With I_max = 1.
+            // I_max = 1.
             let upsilon = (alpha + beta - 1.0) / (alpha - 1.0);
             let mean_i = alpha / (alpha + beta);
             for part in [1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0] {
@@ -49,7 +49,7 @@ fn noise_in_a_field_is_bounded_from_above() {
         worst.push((alpha, most.0));
     }
     println!("alpha, and how many times the true E[1 / (I + N)] the bound is at most: {worst:.3?}");
-    // The larger alpha, the less I varies.
+    // I varies less for larger alpha.
     assert!(
         worst.windows(2).all(|pair| pair[1].1 <= pair[0].1),
         "{worst:?}"
@@ -68,7 +68,7 @@ fn mission(points: &[(f32, f32)], noise_w: f32, relays: u16) -> Result<Mission, 
     })
 }
 
-/// Noise does to a chain what a table of Upsilon / (1 + N Upsilon) does.
+/// Checks that noise is equivalent to a table of Upsilon / (1 + N Upsilon).
 #[test]
 fn a_chain_in_a_noisy_field_is_that_of_its_table() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1131));

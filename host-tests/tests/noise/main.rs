@@ -1,6 +1,4 @@
-//! Receivers with noise of their own: SINR in place of SIR, against judges in f64 that know received powers alone.
-//!
-//! `COUNT` in the environment takes that many random chains or scenes in place of those of CI, `SEED` others.
+//! Receiver noise: SINR in place of SIR, compared with references; `COUNT` and `SEED` select chains or scenes.
 
 mod chains;
 mod field;
@@ -9,12 +7,10 @@ mod space;
 
 use uav_relay::{Mission, Profile};
 
-/// `COUNT`, or so many.
 fn count(few: usize) -> usize {
     std::env::var("COUNT").map_or(few, |text| text.parse().unwrap())
 }
 
-/// What relay `index` holds.
 fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
     own.iter()
         .find(|(of, _)| *of == index)

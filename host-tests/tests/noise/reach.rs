@@ -1,4 +1,4 @@
-//! How far a hop reaches in noise: against bisections of the SINR, and that it only falls with the target and only rises with the start.
+//! Reach of a hop in noise, compared with bisection of the SINR, and its monotony in target and start.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ use super::{count, profile_of};
 
 const SINGLE: f64 = f32::EPSILON as f64;
 
-/// A hop of a random link in noise, where its sender stands, and what its power is worth against the interference.
+/// Hop of a random link in noise, its sender's position, and its gain.
 struct Drawn {
     link: Link,
     mission: Mission,
@@ -66,7 +66,7 @@ fn drawn(rng: &mut impl Rng) -> Option<Drawn> {
     })
 }
 
-/// The SINR somewhere along the hop, or a target about the gain: what is met at some places and missed at others.
+/// Draws a target that some positions meet: the SINR along the hop, or a value near the gain.
 fn target(rng: &mut impl Rng, of: &Drawn) -> f32 {
     if rng.random_bool(0.2) {
         let by = f64::from(rng.random_range(-3..=3)) * log_uniform(rng, 1e-9, 1e-3);
@@ -82,8 +82,7 @@ fn target(rng: &mut impl Rng, of: &Drawn) -> f32 {
     (sir * (1.0 + log_uniform(rng, 1e-6, 1e-2))).min(1e30) as f32
 }
 
-/// The reach for a target lies between the exact reaches for targets a millionth higher and lower, and is no farther than
-/// two f32 steps (of a place at D) beyond.
+/// Checks that a reach is within the exact reaches of targets a millionth apart, and two f32 steps.
 #[test]
 fn reaches_in_noise_agree_with_the_reference() {
     const NEAR: f64 = 1e-6;
@@ -110,7 +109,7 @@ fn reaches_in_noise_agree_with_the_reference() {
             exact(f64::from(target) * (1.0 + NEAR)),
         );
         compared += 1;
-        // Relays behind this one are left a millionth of the distance each, and no hop is shorter.
+        // Each relay behind keeps a millionth of the distance, which is also the shortest hop.
         let spare = link.distance_m * 1.1e-6;
         let room = spare * f64::from(mission.relays() - index + 1);
         match ours {
@@ -136,7 +135,7 @@ fn reaches_in_noise_agree_with_the_reference() {
                     "{target} from {from}: {place} short of {near} of {index} in {link:?}"
                 );
                 inside += u32::from(place < link.distance_m - room);
-                // Beyond places that miss the target: the far side of the interferer.
+                // Positions in between that miss the target: the reach is beyond the interferer.
                 let between = f64::from(*from)..place;
                 let missed = (1..40).any(|part| {
                     let x = between.start + f64::from(part) / 40.0 * (place - between.start);
@@ -155,7 +154,7 @@ fn reaches_in_noise_agree_with_the_reference() {
     );
 }
 
-/// A higher target is met no farther away, and a sender farther along is heard no less far, but for two f32 steps.
+/// Checks that the reach falls with the target and rises with the start, within two f32 steps.
 #[test]
 fn the_reach_in_noise_falls_with_the_target_and_rises_with_the_start() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1112));
@@ -181,7 +180,7 @@ fn the_reach_in_noise_falls_with_the_target_and_rises_with_the_start() {
             continue;
         };
         let start = of.from + rng.random_range(0.0..=1.0) * (reach - of.from);
-        // From where there is no room for a hop there is none.
+        // A start without room for a hop has none.
         if reach - start < 2e-6 * of.link.distance_m as f32 {
             continue;
         }

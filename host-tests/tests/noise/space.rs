@@ -1,4 +1,4 @@
-//! Places, sides and altitudes together in noise, against the judge that begins in many places.
+//! Joint positions, sides and altitudes in noise, compared with the multi-start reference optimiser.
 
 use std::task::Poll;
 
@@ -35,7 +35,7 @@ fn noisy(number: u64, space: bool) -> Scenario {
     .as_relays_know_it()
 }
 
-/// The solver's target over the judge's; `None` where there is no chain.
+/// Returns the solver's target over the reference's; `None` without a chain.
 fn ratio(number: u64) -> Option<f64> {
     let of = noisy(number, number.is_multiple_of(2));
     let (mission, _) = of_link(&of.link, 1e-4)?;
@@ -51,7 +51,7 @@ fn ratio(number: u64) -> Option<f64> {
     Some(target / best.sir)
 }
 
-/// Nearly all random scenes in noise end within 0.1 % of the best that the judge knows; none above it but for rounding.
+/// Checks that nearly all scenes are within 0.1 % of the reference, and few are above it.
 #[test]
 fn the_joint_optimum_is_found_in_noise() {
     let count = count(60) as u64;
@@ -68,11 +68,11 @@ fn the_joint_optimum_is_found_in_noise() {
         &ratios[..of.min(12)]
     );
     assert!(within * 100 >= of * 95, "{within} of {of}");
-    // The judge may miss the best.
+    // The reference may miss the optimum.
     assert!(above * 50 <= of, "{above} of {of}");
 }
 
-/// By messages, with thirty per cent of the frames lost and fifteen corrupted: to the bit the same.
+/// Checks that losses of 30 % and corruption of 15 % change no bit.
 #[test]
 fn joint_chains_in_noise_settle_to_the_bit_whatever_happens_to_frames() {
     let mut injected = 0;
@@ -100,7 +100,7 @@ fn joint_chains_in_noise_settle_to_the_bit_whatever_happens_to_frames() {
     assert!(injected > 100, "{injected}");
 }
 
-/// The judge's own chain is worth what received powers say, and noise that is added never helps.
+/// Checks the reference's SIR by received powers, and that added noise never helps.
 #[test]
 fn noise_only_lowers_what_the_judge_finds() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1121));

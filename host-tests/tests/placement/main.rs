@@ -1,4 +1,4 @@
-//! The placement maths against the independent f64 reference, on random links and on every degenerate kind of them.
+//! Placement compared with the f64 reference, on random and degenerate links.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -84,8 +84,7 @@ fn hop_sirs_agree_with_the_reference() {
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// The reach for a target lies between the exact reaches for targets a millionth higher and lower, and is no farther than
-/// two f32 steps (of a place at D) beyond.
+/// Checks that a reach is within the exact reaches of targets a millionth apart, and two f32 steps.
 #[test]
 fn reaches_agree_with_the_reference() {
     const NEAR: f64 = 1e-6;
@@ -113,7 +112,7 @@ fn reaches_agree_with_the_reference() {
         } else {
             rng.random_range(0.0..0.95) * mission.config().distance_m
         };
-        // Near the hop's own gain in a third of the draws: that is where the printed forms lose their digits.
+        // A third of the targets are near the hop's gain, where the printed formulas lose their digits.
         let gain = f64::from(if index == 1 {
             mission.tx_gain().value()
         } else {
@@ -140,7 +139,7 @@ fn reaches_agree_with_the_reference() {
             exact(f64::from(target) * (1.0 + NEAR)),
         );
         compared += 1;
-        // Relays behind this one are left a millionth of the distance each, and no hop is shorter.
+        // Each relay behind keeps a millionth of the distance, which is also the shortest hop.
         let spare = link.distance_m * 1.1e-6;
         let room = spare * f64::from(mission.relays() - index + 1);
         match ours {
@@ -215,8 +214,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
     assert!(met > 5_000, "{met}");
 }
 
-/// Of chains of equals the optimum is found to the tolerance and never exceeded; N 1 to 50, D 10 m to 100 km, the interferer
-/// anywhere, on the axis too.
+/// Compares 1 to 50 identical relays with the optimum, D 10 m to 100 km, the interferer anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let (mut solved, mut hopeless, mut most_sweeps, mut worst) = (0, 0, 0, 0.0_f64);
@@ -249,9 +247,7 @@ fn the_optimum_is_found_on_random_links() {
     assert!(most_sweeps <= 7, "{most_sweeps} sweeps");
 }
 
-/// Chains of relays that differ: the target that is agreed on is met by every hop, and never above the best there is.
-///
-/// The farthest chain is not always the best one once altitudes differ, so the optimum itself is not promised.
+/// Checks that unlike relays meet their agreed target, which is not always the optimum but never above.
 #[test]
 fn mixed_chains_meet_what_they_agree_on() {
     let (mut solved, mut best_of, mut most_sweeps) = (0, 0, 0);
@@ -300,7 +296,7 @@ fn mixed_chains_meet_what_they_agree_on() {
     );
 }
 
-/// With altitudes of their own these relays meet 37 743 and miss 31 292. The bracket once swung between the two for ever.
+/// Checks a chain that meets 37 743 but misses 31 292, where the search once oscillated for ever.
 #[test]
 fn a_target_that_is_met_counts_though_a_lower_one_is_missed() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);

@@ -1,4 +1,4 @@
-//! Cases worked out beforehand, of one hop, of a chain, and of the fixed step.
+//! Worked cases of one hop, of a chain, and of the fixed step.
 
 use uav_relay::Schedule;
 use uav_relay::optimiser::plan::{self};
@@ -17,7 +17,7 @@ fn close(ours: f64, theirs: f64, what: &str) {
     );
 }
 
-/// The cases of the paper's errata and of the public reference, one by one.
+/// Checks each case of the paper's errata and of the public reference.
 #[test]
 fn reference_cases_of_one_hop_hold() {
     let mut checked = 0;
@@ -53,7 +53,7 @@ fn reference_cases_of_one_hop_hold() {
         let reach = hop
             .reach(case.arg("gamma").unwrap() as f32, from as f32)
             .unwrap();
-        // A distance between two f32 places: the step of an f32 at that place is allowed for.
+        // The distance is between two f32 positions, whose rounding is tolerated.
         let d = case.part("d").unwrap();
         let ours = f64::from(reach) - from;
         assert!(

@@ -1,4 +1,4 @@
-//! Plans that choose altitudes and sides: what the relays would agree on, and against the judge of the joint problem.
+//! Plans with altitudes and sides, compared with the relays' agreement and the reference optimiser.
 
 use std::collections::BTreeMap;
 
@@ -32,7 +32,7 @@ fn free(scenario: &Scenario, number: Number) -> Plan {
     plan(scenario, &ask).unwrap()
 }
 
-/// SIR (linear) of the worst hop of what simulated relays agree on; 0 where that is nothing.
+/// Returns the linear SIR of the worst hop that simulated relays agree on; 0 without an agreement.
 fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     let (mission, own) = mission::mission(scenario, relays, TOLERANCE).unwrap();
     let mut setup = Setup::new(mission);
@@ -63,7 +63,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     sirs.into_iter().reduce(f64::min).unwrap()
 }
 
-/// A scenario with these numbers; every relay as the first.
+/// Returns a scenario of the link, with every relay like the first.
 fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     const LIGHT_M_PER_S: f64 = 299_792_458.0;
     let waves = link.mu_los.sqrt();
@@ -97,7 +97,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// By how much SIR a plan falls short of what the relays agree on, relative; minus infinity where that is nothing.
+/// Returns the relative shortfall of a plan's SIR from the relays' agreement; -inf without one.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
     1.0 - free(scenario, Number::Of(relays)).sir() / agreed(scenario, relays)
 }
@@ -160,7 +160,7 @@ fn a_plan_for_relays_that_differ_is_what_they_agree_on() {
     }
 }
 
-/// A relay that is held high above the others draws the chain to another side of the interferer than theirs alone.
+/// Checks that a relay held at a high altitude makes the chain choose another side of the interferer.
 #[test]
 fn a_relay_that_holds_its_altitude_has_the_others_take_the_side_that_suits_it() {
     for altitude_m in [60.0, 120.0, 200.0, 300.0] {
@@ -180,12 +180,12 @@ fn a_relay_that_holds_its_altitude_has_the_others_take_the_side_that_suits_it() 
     }
 }
 
-/// One of those scenarios: what the plan comes to over what the judge found.
+/// Returns the plan's SIR over the reference's optimum.
 fn over_the_judge(number: u32, optimum: f64) -> f64 {
     let Drawn { link, corridor, .. } = numbered(number);
     let relays = u16::try_from(link.len()).unwrap();
     let plan = free(&of_link(&link, corridor), Number::Of(relays));
-    // One relay right above the line goes by a theorem.
+    // Only a single relay right above the line is proven, by a theorem.
     assert!(!plan.proven || relays == 1);
     let places: Vec<_> = plan
         .places
@@ -196,7 +196,7 @@ fn over_the_judge(number: u32, optimum: f64) -> f64 {
             altitude_m: f64::from(at.altitude_m),
         })
         .collect();
-    // What an f32 rounds away between two places.
+    // The f32 rounding of two positions reduces the separation.
     let rounded = Link {
         min_separation_m: (link.min_separation_m - 1e-6 * link.distance_m).max(0.0),
         ..link.clone()
@@ -208,18 +208,18 @@ fn over_the_judge(number: u32, optimum: f64) -> f64 {
     joint::sir(&link, &places).unwrap() / optimum
 }
 
-/// Forty scenarios of up to 30 relays whose optima are stored. `COUNT=2000` takes all of them, of up to 100 relays, and prints how
-/// many are short, and which. Of all, none is below 0.98, and these are short by more than a thousandth:
+/// Compares forty scenarios of up to 30 relays with their stored optima.
+/// `COUNT=2000` runs all, with up to 100 relays. None is below 0.98, and these are short by more than a thousandth:
 ///
 /// | number | relays | reached | why |
 /// | --- | --- | --- | --- |
-/// | 1759 | 97 | 0.9805 | the interferer is right before Rx: a start leads into another basin |
-/// | 1637 | 70 | 0.995 | a separation that no hop keeps next to the interferer: places across the line are those of a chain without it |
-/// | 1607 | 18 | 0.996 | a band of one altitude and a separation that binds along much of the chain |
-/// | 957 | 4 | 0.997 | relays take turns at two places, which are polished one at a time |
-/// | 839 | 2 | 0.9987 | both would have to move at once |
+/// | 1759 | 97 | 0.9805 | interferer right before Rx: a start leads into another basin |
+/// | 1637 | 70 | 0.995 | separation impossible next to the interferer: lateral positions are those without the separation |
+/// | 1607 | 18 | 0.996 | band of one altitude, and separation that binds along much of the chain |
+/// | 957 | 4 | 0.997 | relays alternate between two positions, which are polished one at a time |
+/// | 839 | 2 | 0.9987 | both relays would have to move at once |
 ///
-/// The judge is short by 0.03 % itself at 566.
+/// The reference itself is short by 0.03 % at 566.
 #[test]
 fn a_plan_comes_near_the_optimum_of_the_judge() {
     let optima = optima().unwrap();
@@ -272,7 +272,7 @@ fn the_fewest_for_a_target_use_the_room() {
     assert!(free(&scenario, Number::Of(fewer)).sir() < target);
     let aside = fewest.places.iter().map(|(place, _)| place.y_m.abs());
     assert!(aside.fold(0.0, f32::max) > 1.0);
-    // The same where the interferer has sides changed.
+    // Mirrored interferer.
     let Interference::Sources(sources) = &scenario.interference else {
         panic!("{scenario:?}");
     };
@@ -287,7 +287,7 @@ fn the_fewest_for_a_target_use_the_room() {
     assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
 }
 
-/// Interferers in one place are one: its judge is theirs.
+/// Checks two interferers at one position, which are equivalent to one.
 #[test]
 fn two_interferers_in_one_place_are_one() {
     let scenario = example("side.toml");

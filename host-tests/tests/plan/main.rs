@@ -1,4 +1,4 @@
-//! `cargo plan`: what it prints, and random scenarios against judges that share nothing with the crate.
+//! `cargo plan`: its output, and random scenarios compared with independent references.
 
 mod joint;
 

@@ -1,4 +1,4 @@
-//! Random scenarios of every kind: plans keep every limit, and what is said to be proven is.
+//! Random scenarios of every kind: plans keep every limit, and claims of proof are true.
 
 use std::collections::BTreeMap;
 
@@ -16,8 +16,7 @@ fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// A scenario with one interferer, several, or a field; a band; room to the side in half; a separation in half; relays of their own
-/// in a third.
+/// Draws a scenario: interferers or a field, a band, lateral room, a separation, own relay profiles.
 fn scenario(rng: &mut impl Rng) -> Scenario {
     let style = Style {
         relays: 1..=1,
@@ -115,7 +114,7 @@ fn ask(rng: &mut impl Rng) -> Ask {
     }
 }
 
-/// The scenario with its one interferer as the judge's link of `n` relays at the given altitude.
+/// Returns the reference link of `n` relays at the plan's altitude, for a scenario with one interferer.
 fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
     let Interference::Sources(sources) = &scenario.interference else {
         return None;
@@ -256,7 +255,7 @@ fn places(plan: &Plan) -> impl Iterator<Item = Place> + '_ {
     })
 }
 
-/// Of plans with room to the side: what they promise is what the judge makes of their places, and they come near its optimum.
+/// Checks that plans with lateral room have the stated SIR and come near the reference's optimum.
 #[test]
 fn plans_beside_the_line_are_worth_what_they_say() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(702));

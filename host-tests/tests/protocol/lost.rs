@@ -1,4 +1,4 @@
-//! A neighbour that is lost and comes back, and settings that are refused.
+//! Lost and returning neighbours, and rejected settings.
 
 use host_tests::fixtures::mission;
 use uav_relay::wire::digest::digest;
@@ -18,13 +18,13 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
         };
         encode(1, 2, &beat)
     };
-    // A relay that has had a pass has nothing to call for.
+    // A relay that took part in a pass has no view to request.
     let mut tail = relay(mission(2), 2);
     let (start, sweep) = first_sweep(&mut relay(mission(2), 1));
     tail.handle_bytes(start, Port::Upstream, &sweep);
     drain(&mut tail, start);
     events(&mut tail);
-    // When each question was asked.
+    // Time of each question.
     let mut asked = Vec::new();
     let mut now = start;
     let mut seen = Vec::new();
@@ -60,22 +60,22 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
     else {
         panic!("{seen:?}");
     };
-    // Not before `dead_after`, and no later than it is asked next: questions are 10 s / 64 apart, and up to an eighth more.
+    // The loss is reported after `dead_after` at the next question: questions are 10 s / 64 apart, and up to an eighth more.
     assert!(
         (15_000..=15_000 + 157 * 9 / 8).contains(&lost_ms),
         "{lost_ms}"
     );
     let count = asked.len();
-    // Up to 64 in the ten seconds until it is lost, and one in five seconds from then on.
+    // Up to 64 questions in the ten seconds until the loss, then one in five seconds.
     assert!((60..=75).contains(&count), "{count} heartbeats in a minute");
-    // Only an answer is a sign of life, and only one to one of the last four questions.
+    // Only an answer to one of the last four questions is a sign of life.
     let last = u16::try_from(count).unwrap();
     for (ask, answer) in [(9, 0), (0, last - 4), (0, 1), (0, last + 1), (0, u16::MAX)] {
         tail.handle_bytes(now, Port::Upstream, &beat(ask, answer));
         assert_eq!(events(&mut tail), [], "{ask} {answer}");
         drain(&mut tail, now);
     }
-    // It counts from when the question was asked.
+    // An answer counts from the time of its question.
     for before in 0..4_u16 {
         let mut after = tail.clone();
         let late = now + Duration::from_millis(100);
@@ -100,7 +100,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
             after.handle_timeout(lost);
             drain(&mut after, lost);
         }
-        // It is asked again then; `dead_after` and sixteen questions later, or three times as many as it had left open, it is lost.
+        // The neighbour is lost after `dead_after` and sixteen questions, or three times as many as were open.
         let due = heard + Duration::from_millis(15_000);
         let longest = heard + Duration::from_millis(8 * 15_000);
         let latest = longest + Duration::from_millis(157 * 9 / 8);

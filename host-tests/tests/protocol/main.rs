@@ -1,4 +1,4 @@
-//! The state table of a relay, row by row, through the bytes of its public interface.
+//! State table of a relay, row by row, through its public interface.
 
 use host_tests::fixtures::{self, NETWORK, mission};
 use uav_relay::wire::deframe::Deframer;
@@ -17,7 +17,7 @@ fn relay(mission: Mission, index: u16) -> Relay {
     fixtures::relay(mission, index, Settings::default())
 }
 
-/// Frames a relay wants to send now: where to, the message, the bytes.
+/// Returns the port, message and bytes of each pending frame.
 fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
     let mut buffer = [0; MAX_FRAME];
     let mut sent = Vec::new();
@@ -42,7 +42,7 @@ fn events(relay: &mut Relay) -> Vec<Event> {
     std::iter::from_fn(|| relay.poll_event()).collect()
 }
 
-/// Runs the head's prediction until it sends its sweep.
+/// Runs the leader's prediction until it sends its sweep.
 fn first_sweep(head: &mut Relay) -> (Instant, Vec<u8>) {
     for _ in 0..10_000 {
         let now = head.poll_timeout().unwrap();
@@ -88,7 +88,7 @@ fn two_relays_agree_in_two_frames_and_the_answer_is_repeated_for_a_repeated_swee
         matches!(&answers[..], [(Port::Upstream, Message::Verdict(answer), _)] if answer.verdict.commit.is_some())
     );
 
-    // The answer is lost: the sweep comes again, and so does the answer, and nothing else changes.
+    // The answer is lost: the repeated sweep causes the same answer and no other change.
     let before = tail.setpoint();
     tail.handle_bytes(now, Port::Upstream, &sweep);
     let again = drain(&mut tail, now);
@@ -104,7 +104,7 @@ fn two_relays_agree_in_two_frames_and_the_answer_is_repeated_for_a_repeated_swee
         [Event::SetpointChanged, Event::Converged]
     );
     assert!(drain(&mut head, now).is_empty());
-    // The first answer arrives after all.
+    // The first answer arrives late.
     head.handle_bytes(now, Port::Downstream, &answers[0].2);
     assert_eq!(
         (head.phase(), head.stats().stale, events(&mut head)),
@@ -212,7 +212,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
     );
     let (now, sweep) = first_sweep(&mut head);
     tail.handle_bytes(now, Port::Upstream, &sweep);
-    // By its digest a pass may be one of another view: the two have to say hello.
+    // By its digest a pass may be of another view: the relays must exchange hellos.
     assert_eq!(
         (tail.phase(), tail.stats().view, tail.stats().mission),
         (Phase::Idle, 1, 0)
@@ -227,7 +227,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
     assert_eq!((head.stats().mission, head.stats().rejected()), (1, 1));
     assert_eq!(events(&mut head), [Event::MissionMismatch { node: 2 }]);
     assert!(drain(&mut head, now).is_empty(), "it is not answered");
-    // And so a heartbeat tells.
+    // A heartbeat shows the mismatch too.
     let beat = Message::Heartbeat {
         mission: digest(head.mission()),
         ask: 1,
@@ -265,7 +265,7 @@ fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else
         1,
         "a port that is not wired is deaf"
     );
-    // That under its own number is of another relay 2.
+    // The frame with the relay's own number is of another relay 2.
     assert!(matches!(
         &drain(&mut relay, now)[..],
         [(Port::Upstream, Message::Claim(_), _)]

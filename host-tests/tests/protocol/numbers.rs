@@ -1,4 +1,4 @@
-//! Which pass is new, over, or of another life of its leader: by its number, and for the same number by what it says.
+//! Pass numbers: new, over, or of another life of the leader; equal numbers are compared by content.
 
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;
@@ -7,7 +7,6 @@ use uav_relay::{Duration, Instant, Phase, Port, Relay};
 
 use crate::{drain, encode, first_sweep, mission, relay};
 
-/// The sweep in these bytes.
 fn sweep_in(bytes: &[u8]) -> Sweep {
     let mut deframer = Deframer::new();
     let plain = bytes.iter().find_map(|&byte| {
@@ -20,7 +19,7 @@ fn sweep_in(bytes: &[u8]) -> Sweep {
     }
 }
 
-/// A tail that has agreed to `sweep`, and then gets it again with its number moved by `off`.
+/// Returns a tail that agreed to `sweep` and then received it with its number changed by `off`.
 fn after_two(sweep: &[u8], now: Instant, off: u16) -> Relay {
     let mut tail = relay(mission(2), 2);
     tail.handle_bytes(now, Port::Upstream, sweep);
@@ -35,7 +34,7 @@ fn again(tail: &mut Relay, sweep: &[u8], now: Instant, off: u16) {
     tail.handle_bytes(now, Port::Upstream, &encode(1, 2, &Message::Sweep(sweep)));
 }
 
-/// Whether the relay says at once, or a millisecond later, that it wants a new view.
+/// Returns true if the relay requests a view, at once or a millisecond later.
 fn calls(relay: &mut Relay, now: Instant) -> bool {
     let mut said = drain(relay, now);
     let later = now + Duration::from_millis(1);
@@ -67,7 +66,7 @@ fn the_next_number_is_new_those_before_are_over_and_no_other_can_be_taken_part_i
                 assert_eq!(stale, 0, "{off}");
                 found[0] += 1;
             }
-            // 32 to 1 behind.
+            // Numbers 32 to 1 behind.
             0xFFE0.. => {
                 assert!(!calls(&mut tail, now), "{off}");
                 assert_eq!(stale, 1, "{off}");
@@ -87,7 +86,7 @@ fn the_next_number_is_new_those_before_are_over_and_no_other_can_be_taken_part_i
 #[test]
 fn the_first_pass_of_another_life_is_never_taken_for_the_next_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
-    // The chain has gone on to so many after its first; the next first one is 64 after it.
+    // The chain is `last` passes beyond its first; the next first number is 64 after it.
     for last in [32, 62, 63] {
         let mut tail = after_two(&sweep, now, 0);
         (1..=last).for_each(|off| again(&mut tail, &sweep, now, off));
@@ -96,14 +95,14 @@ fn the_first_pass_of_another_life_is_never_taken_for_the_next_one() {
         again(&mut tail, &sweep, now, 64);
         assert_eq!(tail.stats().stale, 1, "{last}");
         assert!(calls(&mut tail, now), "{last}");
-        // The leader leaves that number out.
+        // The leader skips that number.
         again(&mut tail, &sweep, now, 65);
         let expected = if last == 63 { 1 } else { 2 };
         assert_eq!(tail.stats().stale, expected, "{last}");
     }
 }
 
-/// A first pass that was held up on its way does not let a rebooted relay into what the chain has gone on to since.
+/// Checks that a delayed first pass does not admit a rebooted relay to a later pass.
 #[test]
 fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(3), 1));
@@ -116,7 +115,7 @@ fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
     assert_eq!(rebooted.setpoint(), None);
 }
 
-/// What makes it another pass: the relay before has forgotten what it said, and says something else under that number.
+/// Checks other content with the same number, as from a relay that rebooted.
 #[test]
 fn the_same_number_with_other_reaches_or_another_profile_is_not_the_same_pass() {
     let changes: [fn(&mut Sweep); 4] = [
@@ -133,7 +132,7 @@ fn the_same_number_with_other_reaches_or_another_profile_is_not_the_same_pass() 
         let mut sweep = sweep_in(&bytes);
         change(&mut sweep);
         tail.handle_bytes(now, Port::Upstream, &encode(1, 2, &Message::Sweep(sweep)));
-        // What is measured may have changed since the sweep was said first: that is no other pass.
+        // The measured value may have changed since the sweep was first sent: it is still the same pass.
         let other = which == 1 || which == 2;
         assert_eq!(tail.stats().stale - before.stale, u32::from(other));
         assert_eq!(tail.stats().repeated - before.repeated, u32::from(!other));
@@ -152,7 +151,7 @@ fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
             assert!(!calls(&mut tail, now), "{round}");
             now = now + Duration::from_millis(1);
         }
-        // The chain goes on: those were late, all three of them.
+        // The chain proceeds, so the three stragglers were late frames.
         again(&mut tail, &sweep, now, 2 + round);
         drain(&mut tail, now);
     }

@@ -1,4 +1,4 @@
-//! Chains of emulated drones with a wire to each neighbour, held against the simulated chain.
+//! Chains of emulated drones with a wire to each neighbour, compared with the simulated chain.
 
 use uav_relay::Method;
 use uav_relay_scenario::Scenario;
@@ -10,7 +10,7 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::fleet::{Fleet, Image};
 
-/// Everything at once, as a bad day has it.
+/// Combination of all faults.
 pub(crate) const BAD_DAY: Faults = Faults {
     loss: 0.3,
     corrupt: 0.15,
@@ -22,7 +22,7 @@ pub(crate) fn paper(uavs: u16) -> Flight {
     Flight::new(&Scenario::default(), uavs, 1e-4, 7).unwrap()
 }
 
-/// Where the simulated chain settles, to the bit.
+/// Returns the bits of the simulated chain's positions.
 pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
     let mut setup = Setup::new(*flight.mission());
     setup.profiles = flight.profiles().to_vec();
@@ -46,7 +46,7 @@ fn five_settle_where_the_simulated_chain_does() {
     let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
     assert_eq!(fleet.places(), simulated(&flight));
     for drone in 1..=5 {
-        // The emulator has no clock tree: the firmware runs on from the HSI.
+        // The emulator has no clock tree: the firmware keeps running on the HSI.
         let begins = ["started: unknown", "clock 16 MHz, no PLL"];
         let begins = begins.map(str::to_owned).into_iter();
         let begins = begins.chain([format!("relay {drone} of 5, network 7")]);
@@ -80,7 +80,7 @@ fn five_settle_there_through_a_bad_day() {
     }
 }
 
-/// Built with no feature but the log.
+/// Checks the image built with no feature but the log.
 #[test]
 fn five_of_the_smallest_image_settle_there_too() {
     let flight = paper(5);
@@ -96,7 +96,7 @@ fn five_of_the_smallest_image_settle_there_too() {
     }
 }
 
-/// The runner of `uav_relay::asynch`, on an executor of its own.
+/// Checks the runner of `uav_relay::asynch` on its own executor.
 #[test]
 fn five_on_asynchronous_ports_settle_there_too() {
     let flight = paper(5);
@@ -113,7 +113,7 @@ fn five_on_asynchronous_ports_settle_there_too() {
     }
 }
 
-/// Asked for a method that it was built without, a drone says so, and does not fly.
+/// Checks that an image without a method reports it and does not fly.
 #[test]
 fn the_smallest_image_refuses_what_it_cannot_do() {
     let flight = paper(2).by(Method::Joint);

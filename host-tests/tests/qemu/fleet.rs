@@ -1,4 +1,4 @@
-//! Emulated drones that fly one mission, and what their logs have said so far.
+//! Emulated drones of one mission, and their logs.
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
@@ -18,16 +18,16 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::log::{self, Line};
 
-/// First lines of every image: the emulator has no cause of a reset and no PLL.
+/// First log lines of every image: the emulator has no reset cause and no PLL.
 pub(crate) const OF_THE_CHIP: [&str; 2] = ["started: unknown", "clock 16 MHz, no PLL"];
 
-/// How long anything may take before a test gives up.
+/// Timeout of any step of a test.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
-/// And for each drone of the fleet, since all share this machine.
+/// Additional timeout for each drone, since all share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
-/// What is flashed: the two variants, the first of them with Algorithm 1 alone, and on asynchronous ports.
+/// Flashed image: both variants, the smallest with Algorithm 1 alone, and asynchronous ports.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Image {
     Wires,
@@ -47,7 +47,7 @@ impl Image {
     }
 }
 
-/// The image of an example; all are built once for all tests.
+/// Returns the image of an example; all are built once for all tests.
 pub(crate) fn image(example: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -55,7 +55,7 @@ pub(crate) fn image(example: &str) -> PathBuf {
             image::build(names, smallest).unwrap_or_else(|error| panic!("{error}"))
         };
         let wires = Image::Wires.name();
-        // Built otherwise, an example has the same name: the smallest is put aside first.
+        // Both builds have the same name, so the smallest is copied first.
         let folder = build(&[wires], true);
         std::fs::copy(folder.join(wires), folder.join(Image::Smallest.name())).unwrap();
         let asynchronous = Image::Asynchronous.name();
@@ -64,7 +64,7 @@ pub(crate) fn image(example: &str) -> PathBuf {
     folder.join(example)
 }
 
-/// The strings of the log of an image.
+/// Returns the log strings of an image.
 fn table(which: Image) -> &'static Table {
     static TABLES: [OnceLock<Table>; 4] = [const { OnceLock::new() }; 4];
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
@@ -76,16 +76,16 @@ fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// One fleet flies at a time: the drones' clocks keep up with the wall's, or what they say comes late.
+/// Lock for one fleet at a time, so that the drones' clocks keep up with the wall clock.
 static AIR: Mutex<()> = Mutex::new(());
 
-/// The drones of a flight, switched on.
+/// Running drones of a flight.
 pub(crate) struct Fleet {
-    // Dropped in this order: without drones the threads of the network and of the logs come to their ends.
+    // The drop order matters: without drones the network and log threads end.
     drones: Vec<Emulator>,
     network: Network,
     consoles: Vec<UnixStream>,
-    /// Where each drone looks for its autopilot.
+    /// Sockets at the drones' autopilot ports.
     pub(crate) autopilots: Vec<UnixStream>,
     new: Receiver<Line>,
     pub(crate) lines: Vec<Line>,
@@ -94,12 +94,12 @@ pub(crate) struct Fleet {
 }
 
 impl Fleet {
-    /// Switches on one drone for each block, on `image`, with a medium of `faults` and `seed`.
+    /// Starts one drone for each block, on `image`, with a medium of `faults` and `seed`.
     pub(crate) fn start(which: Image, blocks: &[Vec<u8>], faults: Faults, seed: u64) -> Self {
         Self::begin(which, blocks, &[], None, faults, seed, Life::Fast)
     }
 
-    /// The same, with what each drone finds in its flash.
+    /// Starts drones with given flash contents, besides their blocks.
     pub(crate) fn with_flash(
         which: Image,
         blocks: &[Vec<u8>],
@@ -110,7 +110,7 @@ impl Fleet {
         Self::begin(which, blocks, kept, None, faults, seed, Life::Fast)
     }
 
-    /// The same, with a transmitter at the other end of `socket`.
+    /// Starts drones with a transmitter at the other end of `socket`.
     pub(crate) fn with_transmitter(
         which: Image,
         blocks: &[Vec<u8>],
@@ -184,24 +184,24 @@ impl Fleet {
         }
     }
 
-    /// Switches on every drone of `flight`.
+    /// Starts every drone of `flight`.
     pub(crate) fn of(which: Image, flight: &Flight, faults: Faults, seed: u64) -> Self {
         Self::start(which, &blocks(flight), faults, seed)
     }
 
-    /// The same with wires that do nothing to frames; the drones live in real time.
+    /// Starts every drone of `flight` on perfect wires in real time.
     pub(crate) fn in_real_time(flight: &Flight) -> Self {
         let blocks = blocks(flight);
         let (which, faults) = (Image::Wires, Faults::default());
         Self::begin(which, &blocks, &[], None, faults, 1, Life::Real)
     }
 
-    /// Takes note of what was logged so far.
+    /// Collects the log lines so far.
     pub(crate) fn listen(&mut self) {
         self.lines.extend(self.new.try_iter());
     }
 
-    /// Reads logs until `done` says so of all lines so far; in time, or the test fails with all that was logged.
+    /// Collects log lines until `done` holds for them; on a timeout the test fails with all lines.
     pub(crate) fn wait(&mut self, what: &str, mut done: impl FnMut(&[Line]) -> bool) {
         let started = Instant::now();
         let drones = u32::try_from(self.drones.len()).unwrap();
@@ -230,17 +230,16 @@ impl Fleet {
         panic!("no {what} in time");
     }
 
-    /// The lines of one drone.
     pub(crate) fn of_drone(&self, drone: u16) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(move |line| line.drone == drone)
     }
 
-    /// The lines of one drone after those about its chip.
+    /// Returns the lines of one drone after those about its chip.
     pub(crate) fn after_start(&self, drone: u16) -> impl Iterator<Item = &Line> {
         self.of_drone(drone).skip(OF_THE_CHIP.len())
     }
 
-    /// Waits until every drone has been told where to fly, and gives the bits of those places.
+    /// Waits until every drone has a setpoint. Returns their bits.
     pub(crate) fn places(&mut self) -> Vec<[u32; 3]> {
         let drones = u16::try_from(self.drones.len()).unwrap();
         let last = |lines: &[Line], drone| {
@@ -255,13 +254,13 @@ impl Fleet {
             .collect()
     }
 
-    /// Waits until the chain has agreed on `places`, to the bit: it may agree on others on its way there.
+    /// Waits until the chain has agreed on `places`, to the bit, possibly after others.
     pub(crate) fn settle_at(&mut self, places: &[[u32; 3]]) {
         assert_eq!(self.drones.len(), places.len());
         self.wait("agreement on these places", |lines| {
             (1..).zip(places).all(|(drone, place)| {
                 let mut back = lines.iter().rev().filter(|line| line.drone == drone);
-                // An agreement is logged behind the places agreed on.
+                // An agreement is logged after its positions.
                 let agreed =
                     back.find(|line| line.setpoint().is_some() || line.text == "event Converged");
                 agreed.is_some_and(|line| line.text == "event Converged")
@@ -270,7 +269,7 @@ impl Fleet {
         });
     }
 
-    /// Asks a drone for its counters, and waits for them.
+    /// Requests a drone's counters and waits for them.
     pub(crate) fn counters(&mut self, drone: u16) -> Line {
         let before = self.lines.len();
         self.consoles[usize::from(drone) - 1]
@@ -285,12 +284,11 @@ impl Fleet {
         answer(&self.lines).unwrap()
     }
 
-    /// Switches a drone off.
     pub(crate) fn kill(&mut self, drone: u16) {
         self.drones[usize::from(drone) - 1].kill();
     }
 
-    /// What the medium has done to frames.
+    /// Returns the medium's fault counters.
     pub(crate) fn injected(&self) -> Injected {
         self.network.injected()
     }

@@ -1,4 +1,4 @@
-//! Emulated drones with an autopilot at USART1: they fly where the relay agreed to be, and only while the pilot lets them.
+//! Emulated drones with an autopilot at USART1: they fly to the agreed position while the pilot permits it.
 
 use std::io::{ErrorKind, Read as _};
 
@@ -24,17 +24,14 @@ pub(crate) fn scenario() -> Scenario {
     Scenario::parse("sites.toml", SITES).unwrap()
 }
 
-/// The line between the two.
 pub(crate) fn axis() -> Axis {
     scenario().line.unwrap().axis
 }
 
-/// One relay between two sites.
 fn flight() -> Flight {
     Flight::new(&scenario(), 1, 1e-4, 7).unwrap()
 }
 
-/// Where it agrees to be.
 fn agreed() -> Placement {
     let [x_m, y_m, altitude_m] = simulated(&flight())[0].map(f32::from_bits);
     Placement {
@@ -48,10 +45,10 @@ fn said(fleet: &mut Fleet, text: &str) {
     fleet.wait(text, |lines| lines.iter().any(|line| line.text == text));
 }
 
-/// From the start to the pilot's hands again.
+/// Flies from the start until the pilot takes control again.
 fn flies_to_its_place(image: Image, kind: Kind) {
     let to = agreed();
-    // A PX4's choice of a mode is forgotten after 0.8 s of silence: this process may be kept waiting for that long in a life ten times as fast.
+    // A PX4's mode choice expires after 0.8 s of silence, and at ten times the speed this process may be delayed for as long.
     let (mut fleet, life) = match kind {
         Kind::Px4 => (Fleet::in_real_time(&flight()), Life::Real),
         Kind::ArduCopter => (
@@ -72,8 +69,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     let socket = fleet.autopilots.remove(0);
     let mut vehicle = Vehicle::new(kind, socket, axis(), from, life);
 
-    // On the ground it is found, and asked for what it says; nothing is to move.
-    // A PX4 says its target (87) to nobody.
+    // On the ground the autopilot is found and its messages are requested; a PX4 does not report its target (87).
     let asked: &[u32] = match kind {
         Kind::Px4 => &[33, 245],
         Kind::ArduCopter => &[33, 87, 245],
@@ -92,7 +88,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     vehicle.run(3_000);
     assert_eq!(vehicle.told, [], "on the ground, and in its take-off");
 
-    // In the air, in the pilot's hands: a PX4 is told where it is, an ArduCopter nothing.
+    // In the air under the pilot's control a PX4 receives its own position, an ArduCopter no target.
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     vehicle.until("readiness", |vehicle| {
         let ready = |text: &String| text == "relay: ready, its mode may be chosen";
@@ -105,7 +101,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         assert!(apart(told.place, from) < 0.1, "{told:?}");
     }
 
-    // The pilot hands it over.
+    // The pilot gives control to the relay.
     vehicle.granted = true;
     vehicle.until("flight to the agreed place", |vehicle| {
         let ends = vehicle
@@ -118,14 +114,14 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     assert!(apart(vehicle.place, to) < 1.0, "{:?}", vehicle.place);
     said(&mut fleet, "autopilot: flies to the relay's setpoints");
     for pair in vehicle.told.windows(2) {
-        // 5 m/s, and no step is longer than half a second.
+        // At 5 m/s no step is longer than half a second.
         let step = apart(pair[0].place, pair[1].place);
         assert!(step <= 2.6, "{pair:?}");
     }
     let flies = |text: &String| text == "relay: flies to its place";
     assert!(vehicle.texts.iter().any(flies), "{:?}", vehicle.texts);
 
-    // And takes it again.
+    // The pilot takes control again.
     vehicle.granted = false;
     vehicle.until("release", |vehicle| {
         vehicle
@@ -159,7 +155,7 @@ fn an_arducopter_flies_to_the_agreed_place() {
     flies_to_its_place(Image::Radio, Kind::ArduCopter);
 }
 
-/// Without sites nothing is said to an autopilot.
+/// Checks a drone without sites, which sends no targets.
 #[test]
 fn a_drone_without_sites_tells_nobody() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
@@ -174,7 +170,6 @@ fn a_drone_without_sites_tells_nobody() {
     assert_eq!(error.kind(), ErrorKind::WouldBlock);
 }
 
-/// With sites, an image that cannot tell an autopilot does not take part.
 #[test]
 fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);

@@ -1,4 +1,4 @@
-//! The golden vectors on the target: what the crate makes of a frame is the same on thumb and on this machine.
+//! Golden vectors on the target: results equal those on the host.
 
 use std::io::{Read as _, Write as _};
 
@@ -31,7 +31,7 @@ fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// What this machine answers, one answer to each frame of `heard`.
+/// Returns the host's answer to each frame of `heard`.
 fn here(heard: &[u8]) -> Vec<Vec<u8>> {
     let mut answerer = answer::Answerer::new();
     let mut answers = vec![Vec::new()];
@@ -56,7 +56,7 @@ fn the_target_makes_of_every_vector_what_this_machine_does() {
         assert!(here(&wire)[0].starts_with(&wire), "{}", vector.name);
         heard.extend(wire);
     }
-    // And what it refuses, for whatever reason: a thousand frames with up to three bytes changed.
+    // A thousand frames with up to three bytes changed, which are refused for various reasons.
     let seed = uav_relay_oracle::random::seed(31);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for _ in 0..1_000 {

@@ -1,5 +1,4 @@
-//! Emulated drones that are not told of the interferer: radios tell them what they hear, and they end where the simulated chain ends that
-//! was handed the same.
+//! Emulated drones that find the interferer by their radios, compared with the simulated chain.
 
 use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::MavLandedState;
@@ -19,14 +18,13 @@ use crate::fleet::Fleet;
 use crate::log::Line;
 use crate::vehicle::{Vehicle, apart};
 
-/// The leader first asks long after all have been heard, by then as much of each as if it were new: the chain's clock is another one than the
-/// simulated chain's, and what it finds must not depend on that.
+/// Settings with a late first query and no fading, so that the clock's difference has no effect.
 const LISTENING: &str = "[geometry]\naltitude_m = 30\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n\
     [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
     rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n\
     [listen]\nevery_s = 60\nhalf_life_s = 1e12\nrelative_error = 0.1\n";
 
-/// Where it is, for the radios alone.
+/// Interferer, for the radios alone.
 const SOURCE: &str = "[[interferer]]\npower_w = 80\nx_m = 900\ny_m = 350\n";
 
 const RELAYS: u16 = 3;
@@ -40,7 +38,7 @@ fn scene() -> Scene {
     Scene::new(&known, RELAYS).unwrap()
 }
 
-/// Where the pilot of a drone takes it, one place after the other.
+/// Returns three positions to which the pilot flies a drone.
 fn places(drone: u16) -> [Placement; 3] {
     let x_m = 336.0 * f32::from(drone);
     [[-60.0, 70.0, 30.0], [20.0, -50.0, 45.0], [90.0, 10.0, 60.0]].map(|[x, y_m, altitude_m]| {
@@ -52,13 +50,13 @@ fn places(drone: u16) -> [Placement; 3] {
     })
 }
 
-/// What a radio there says that it hears between frames.
+/// Returns a radio's noise value at a position.
 fn noise(at: Placement) -> u8 {
     let dbm = 10.0 * scene().interference_w(at).log10() + 30.0;
     ((dbm + 127.0) * 1.9).round() as u8
 }
 
-/// The simulated chain that is handed what the radios say, where the autopilots say that the drones are.
+/// Runs the simulated chain with the radios' measurements at the autopilots' positions.
 fn simulated(flight: &Flight) -> Outcome {
     let axis = unknown().line.unwrap().axis;
     let mut setup = Setup::new(*flight.mission());
@@ -106,7 +104,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
     assert!((0.5..2.0).contains(&(source.power_w / 80.0)));
 
     let axis = unknown().line.unwrap().axis;
-    // Three autopilots are stepped in turn: in a life ten times as fast a position comes late whenever this process is kept waiting for 0.1 s.
+    // Real time is needed: at ten times the speed, three autopilots stepped in turn would send late positions.
     let mut fleet = Fleet::in_real_time(&flight);
     let mut vehicles: Vec<Vehicle> = (1..)
         .zip(fleet.autopilots.drain(..))
@@ -119,7 +117,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
         })
         .collect();
 
-    // Flown by their pilots, the drones hear; nothing is known yet.
+    // The pilots fly the drones, which measure; there is no estimate yet.
     let in_air = "autopilot: in the air, not flown by the relay";
     together(&mut fleet, &mut vehicles, "flight by the pilots", |lines| {
         (1..=RELAYS).all(|drone| {
@@ -142,7 +140,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
     let found = |line: &Line| line.text.starts_with("believed: interferer");
     assert!(!fleet.lines.iter().any(found), "all is heard before");
 
-    // The pilots hand over, and the leader asks what was heard.
+    // The pilots give control to the relays, and the leader collects the measurements.
     for vehicle in &mut vehicles {
         vehicle.granted = true;
     }
@@ -164,7 +162,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
             assert!(said.contains(&format!("(0x{bits:08x})")), "{said}");
         }
     }
-    // There they arrive.
+    // The drones arrive.
     let goals: Vec<Placement> = to
         .iter()
         .map(|place| {
@@ -181,7 +179,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
     }
 }
 
-/// All live until the logs say `done`.
+/// Runs all vehicles until the logs satisfy `done`.
 fn together(
     fleet: &mut Fleet,
     vehicles: &mut [Vehicle],

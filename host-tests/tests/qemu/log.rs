@@ -1,4 +1,4 @@
-//! The log of a drone: defmt frames from its UART, decoded by the strings in the ELF.
+//! Log of a drone: defmt frames from its UART, decoded by the strings in the ELF.
 
 use std::io::Read as _;
 use std::os::unix::net::UnixStream;
@@ -7,38 +7,36 @@ use std::sync::mpsc::Sender;
 
 use defmt_decoder::{DecodeError, Table};
 
-/// One line of a log.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Line {
-    /// Which drone logged it, 1 to N.
+    /// Number of the drone, 1 to N.
     pub(crate) drone: u16,
-    /// When, by the drone's own clock, in microseconds.
+    /// Time by the drone's clock, µs.
     pub(crate) at: u64,
     pub(crate) text: String,
 }
 
 impl Line {
-    /// What the line says behind `label`.
+    /// Returns the text behind `label`.
     pub(crate) fn after(&self, label: &str) -> Option<&str> {
         self.text
             .split_once(label)
             .map(|(_, rest)| rest.trim_start())
     }
 
-    /// The bits that the line gives in parentheses behind `label`.
+    /// Returns the bits that the line gives in parentheses behind `label`.
     fn bits(&self, label: &str) -> Option<u32> {
         let (_, rest) = self.after(label)?.split_once("(0x")?;
         u32::from_str_radix(rest.split_once(')')?.0, 16).ok()
     }
 
-    /// The bits of x, y and altitude, if this is a setpoint.
+    /// Returns the bits of x, y and altitude of a setpoint line.
     pub(crate) fn setpoint(&self) -> Option<[u32; 3]> {
         self.text
             .starts_with("setpoint")
             .then(|| [" x ", " y ", " altitude "].map(|label| self.bits(label).unwrap()))
     }
 
-    /// The counter `name` of a line that lists them.
     pub(crate) fn counter(&self, name: &str) -> Option<u64> {
         let rest = self.after(&format!(" {name}: "))?;
         let end = rest.find(|c: char| !c.is_ascii_digit())?;
@@ -46,7 +44,6 @@ impl Line {
     }
 }
 
-/// The strings of an image.
 pub(crate) fn table(image: &Path) -> Table {
     let elf = std::fs::read(image).unwrap();
     Table::parse(&elf)
@@ -54,7 +51,7 @@ pub(crate) fn table(image: &Path) -> Table {
         .expect("an image with a defmt table")
 }
 
-/// Decodes until the drone is switched off. What does not decode becomes a line too, so that no test overlooks it.
+/// Decodes lines until the drone is switched off; undecodable data becomes a line too.
 pub(crate) fn listen(
     mut port: UnixStream,
     drone: u16,
@@ -89,7 +86,7 @@ pub(crate) fn listen(
     }
 }
 
-/// Seconds with six decimals, as microseconds.
+/// Converts seconds with six decimals to microseconds.
 fn micros(text: &str) -> u64 {
     let (seconds, fraction) = text.trim().split_once('.').unwrap();
     assert_eq!(fraction.len(), 6, "{text}");

@@ -1,8 +1,7 @@
-//! The image that is flashed, run by QEMU: chains of emulated drones settle where the simulated chain says, to the bit.
+//! Firmware image in QEMU: emulated drones end in the simulated chain's positions, to the bit.
 //!
-//! Every drone is a process with the very ELF that a person flashes to an STM32F405, and a configuration block in its flash.
-//! Between them is a medium that paces bytes and may spoil them; each drone's log is decoded as `defmt-print` would. Without
-//! `qemu-system-arm` these tests fail and say what to type. A chain of 20: `-- --ignored`.
+//! Every drone is a process with the same ELF as on an STM32F405 and a configuration block in its flash, on a medium that paces
+//! bytes and may damage them. Without `qemu-system-arm` these tests fail with a hint. For a chain of 20: `-- --ignored`.
 #![cfg(unix)]
 
 mod chain;

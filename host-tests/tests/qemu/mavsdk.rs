@@ -1,4 +1,4 @@
-//! MAVSDK as the autopilot of an emulated drone, at a tty that is a wire to its USART1.
+//! MAVSDK as the autopilot of an emulated drone, on a tty wired to its USART1.
 
 use std::io::{BufRead as _, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -13,7 +13,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;
 use uav_relay::Geodetic;
 
-/// The process, and what it has heard.
+/// MAVSDK process and the messages it received.
 pub(crate) struct Mavsdk {
     child: Child,
     orders: ChildStdin,
@@ -22,7 +22,7 @@ pub(crate) struct Mavsdk {
 }
 
 impl Mavsdk {
-    /// At the end of `socket`, of a drone at `at`.
+    /// Starts MAVSDK at the end of `socket`, for a drone at `at`.
     pub(crate) fn start(socket: UnixStream, at: Geodetic) -> Self {
         let tty = wired(socket);
         let script =
@@ -58,7 +58,7 @@ impl Mavsdk {
         writeln!(self.orders, "{order}").unwrap();
     }
 
-    /// Takes note of what it has heard so far.
+    /// Collects the messages received so far.
     pub(crate) fn listen(&mut self) {
         self.heard.extend(self.new.try_iter());
     }
@@ -69,19 +69,18 @@ impl Mavsdk {
             .any(|heard| heard["mavpackettype"] == name)
     }
 
-    /// Whether the operator was told that.
+    /// Returns true if the operator received the text.
     pub(crate) fn reads(&self, text: &str) -> bool {
         self.heard.iter().any(|heard| heard["text"] == text)
     }
 
-    /// Whether that message was asked for.
+    /// Returns true if the message was requested.
     pub(crate) fn is_asked_for(&self, id: u32) -> bool {
         let asks = |heard: &&Value| heard["command"] == 511;
         let mut asked = self.heard.iter().filter(asks);
         asked.any(|heard| heard["param1"].as_f64() == Some(id.into()))
     }
 
-    /// Where it was told to fly, last.
     pub(crate) fn target(&self) -> Option<Geodetic> {
         let is_target = |heard: &&Value| heard["mavpackettype"] == "SET_POSITION_TARGET_GLOBAL_INT";
         let last = self.heard.iter().rev().find(is_target)?;
@@ -95,13 +94,13 @@ impl Mavsdk {
 
 impl Drop for Mavsdk {
     fn drop(&mut self) {
-        // It may have ended already.
+        // The process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// A tty whose other side is `socket`.
+/// Creates a tty whose other side is `socket`.
 fn wired(socket: UnixStream) -> PathBuf {
     let side = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&side).unwrap();
@@ -109,7 +108,7 @@ fn wired(socket: UnixStream) -> PathBuf {
     let path = ptsname(&side, Vec::new()).unwrap().into_string().unwrap();
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let tty = open(&path, flags, Mode::empty()).unwrap();
-    // Else it would send back what it hears before anybody has opened it.
+    // A tty that is not raw would echo bytes before it is opened.
     let mut line = tcgetattr(&tty).unwrap();
     line.make_raw();
     tcsetattr(&tty, OptionalActions::Now, &line).unwrap();
@@ -118,13 +117,13 @@ fn wired(socket: UnixStream) -> PathBuf {
     std::thread::spawn(move || carry(socket, side));
     std::thread::spawn(move || {
         carry(other, back);
-        // It stays there while MAVSDK has not opened it.
+        // The tty must exist until MAVSDK opens it.
         drop(tty);
     });
     PathBuf::from(path)
 }
 
-/// Until one of them ends.
+/// Copies bytes until either end closes.
 fn carry(mut from: impl Read, mut to: impl Write) {
     let mut bytes = [0; 512];
     while let Ok(count @ 1..) = from.read(&mut bytes) {

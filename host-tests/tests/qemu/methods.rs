@@ -1,5 +1,4 @@
-//! Emulated drones that choose altitudes, and drones in a field: passes that take a while on board, and passes that begin at
-//! relay N.
+//! Emulated drones that choose altitudes, and drones in a field, where passes start at relay N.
 
 use std::time::Instant;
 
@@ -11,8 +10,7 @@ use uav_relay_tools::provision::block::Flight;
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// An interferer `y_m` beside the link, and altitudes to get away from it, `aside_m` of room to either side as well; `held` has an
-/// altitude of its own, by relay.
+/// Returns a flight past an interferer at `y_m` with lateral room `aside_m` and one `held` altitude.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {
@@ -36,7 +34,7 @@ fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Fli
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
 }
 
-/// Interference that is worst two thirds of the way.
+/// Returns a flight in a field that is worst at two thirds of the line.
 pub(crate) fn field() -> Flight {
     let beta = [
         (0.0, 2.0, 3.0),
@@ -55,7 +53,7 @@ pub(crate) fn field() -> Flight {
     Flight::new(&scenario, 5, 1e-4, 7).unwrap()
 }
 
-/// The paper's scenario with receivers of 20 MHz and a noise figure of 60 dB: a part of what they hear, everywhere.
+/// Returns the paper's scenario with receivers of 20 MHz and a noise figure of 60 dB.
 fn noisy(method: Method, most_m: f64) -> Flight {
     let scenario = Scenario {
         altitude_max_m: most_m,
@@ -69,7 +67,7 @@ fn noisy(method: Method, most_m: f64) -> Flight {
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
 }
 
-/// Searches by a bounded number of steps come to the same bits on board as here.
+/// Checks that iterative searches give the same bits on the target.
 #[test]
 fn five_in_noise_settle_at_the_places_of_the_simulated_chain() {
     let silent = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
@@ -79,7 +77,7 @@ fn five_in_noise_settle_at_the_places_of_the_simulated_chain() {
     settles(&noisy(Method::Joint, 300.0));
 }
 
-/// Emulated drones agree on the places of the simulated chain, clean and on a bad day.
+/// Checks that emulated drones agree on the simulated chain's positions, with and without faults.
 fn settles(flight: &Flight) {
     let expected = simulated(flight);
     for (faults, seed) in [(Faults::default(), 1), (BAD_DAY, 2)] {
@@ -108,7 +106,7 @@ fn five_choose_the_altitudes_of_the_simulated_chain() {
     let places = simulated(&flight);
     assert!(places.iter().all(|[.., altitude]| *altitude != low));
     settles(&flight);
-    // One of them may not.
+    // One relay has a fixed altitude.
     let flight = past(50.0, 0.0, Some((4, 200.0)), Method::Joint);
     let held = simulated(&flight);
     assert_eq!(held[3][2], 200.0_f32.to_bits());
@@ -116,7 +114,7 @@ fn five_choose_the_altitudes_of_the_simulated_chain() {
     settles(&flight);
 }
 
-/// With room to the side they leave the line, to the side that the interferer is not on, and stay low.
+/// Checks that with lateral room the drones move to the side away from the interferer, and stay low.
 #[test]
 fn five_go_to_the_side_as_the_simulated_chain_does() {
     let flight = past(150.0, 280.0, None, Method::Joint);
@@ -125,7 +123,7 @@ fn five_go_to_the_side_as_the_simulated_chain_does() {
     settles(&flight);
 }
 
-/// One of them holds its altitude all the same: it stays up there, and goes to the side with the others.
+/// Checks that a relay with a held altitude stays up and moves to the side with the others.
 #[test]
 fn five_go_to_the_side_around_one_that_holds_its_altitude() {
     let flight = past(150.0, 280.0, Some((3, 100.0)), Method::Joint);

@@ -1,4 +1,4 @@
-//! Emulated drones that share one radio channel: each hears two drones to either side.
+//! Emulated drones on one radio channel, where each receives two drones on either side.
 
 use uav_relay_sim::simulator::faults::Faults;
 
@@ -12,18 +12,17 @@ fn five_on_one_radio_settle_where_the_simulated_chain_does() {
     for (faults, seed) in [(Faults::default(), 1), (BAD_DAY, 2)] {
         let mut fleet = Fleet::of(Image::Radio, &flight, faults, seed);
         assert_eq!(fleet.places(), simulated(&flight), "{faults:?}");
-        // Drone 3 hears what 1, 2, 4 and 5 say to each other.
+        // Drone 3 receives frames between 1, 2, 4 and 5.
         let counters = fleet.counters(3);
         assert!(counters.counter("overheard").unwrap() > 0, "{counters:?}");
-        // On a bad day a drone may give up its neighbour and say a hello to the one beyond.
+        // With faults a drone may lose its neighbour and send a hello to the next one.
         if faults == Faults::default() {
             assert_eq!(counters.counter("misaddressed"), Some(0), "{counters:?}");
         }
     }
 }
 
-/// The process of drone 3 is ended. The others find each other, count themselves, and take the places that a chain of four
-/// has, to the bit.
+/// Checks that after drone 3 is killed the others take the positions of a chain of four, to the bit.
 #[test]
 fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     let flight = paper(5);
@@ -33,7 +32,7 @@ fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     fleet.kill(3);
     let left = [1, 2, 4, 5];
     let formed = simulated(&paper(4));
-    // Each logs that it has been counted, then its new place, then the agreement.
+    // Each drone logs the new view, its new position, and the agreement.
     let story = |lines: &[Line], drone: u16, place: &[u32; 3]| {
         let mut new = lines[before..].iter().filter(|line| line.drone == drone);
         let counted = new.find(|line| line.text == "event Reformed")?;
@@ -50,7 +49,7 @@ fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
         let took = story(&fleet.lines, *drone, place).unwrap();
         println!("drone {drone}: agreed {took} us after it was counted");
     }
-    // Nobody was lost but drone 3.
+    // Only drone 3 was lost.
     let lost = |drone| {
         let mut lines = fleet.of_drone(drone);
         lines.any(|line| line.text.contains("Lost"))

@@ -1,4 +1,4 @@
-//! Emulated drones whose frames are signed.
+//! Emulated drones with signed frames.
 
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
@@ -32,7 +32,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
                 assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
             }
             assert!(counters.counter("handshakes").unwrap() > 0);
-            // The emulator has no flash that can be written, and the drone notices.
+            // The emulator's flash is read-only, which the drone reports.
             let mut lines = fleet.after_start(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
@@ -42,7 +42,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
     }
 }
 
-/// One drone was given another key, and one none.
+/// Checks one drone with another key and one without a key.
 #[test]
 fn a_drone_without_the_key_takes_no_part() {
     let flight = paper(4);

@@ -1,4 +1,4 @@
-//! Drones that fall silent, and drones that were never told what to fly.
+//! Drones that fall silent, and drones without a valid configuration.
 
 use std::time::Instant;
 
@@ -12,14 +12,12 @@ use crate::fleet::{Fleet, Image, OF_THE_CHIP};
 use crate::log::Line;
 use crate::methods::field;
 
-/// What the machine may add, in microseconds of the drones' clock: it passes 10.5 times as fast as the wall's and does not
-/// stand still while an emulator waits for a processor, so 50 ms of waiting are half a second. The simulated chain, which
-/// has no such machine under it, is held to the exact time (`a_silent_relay_is_noticed_by_both_neighbours_...`).
+/// Tolerance for delays of this machine, in microseconds of the drones' clock, which runs 10.5 times too fast.
+///
+/// `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
 const SLACK: u64 = 525_000;
 
-/// Both neighbours notice in the time that the settings promise. The emulated clock is a fast one, so it is not the wall
-/// clock that counts: the neighbours are asked for the time just before the drone between them is switched off. What
-/// passes between the question and that, by the wall clock, is allowed for.
+/// Checks the time of detection by the drones' clocks, read just before the drone is killed.
 #[test]
 fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let flight = paper(5);
@@ -62,16 +60,16 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
             "drone {} noticed after {took} us of its own clock, give or take {slack}",
             side.0
         );
-        // It has to leave up to 48 questions open first, a third of a second apart.
+        // Up to 48 questions, a third of a second apart, must be unanswered first.
         let questions = quiet.as_micros() + 48 * 300_000 * 9 / 8;
         assert!(took <= questions.max(lost.as_micros()) + slack, "{took} us");
-        // What was heard last is older than the question, but not by more than a quiet link allows.
+        // The last reception precedes the query by at most the longest quiet time of a link.
         assert!(
             took + quiet.as_micros() + SLACK >= lost.as_micros(),
             "{took} us"
         );
     }
-    // They hold their places, and the others hear nothing of it.
+    // The neighbours hold their positions, and the other drones are unaffected.
     assert_eq!(fleet.places(), simulated(&flight));
     for drone in [1, 5] {
         let mut lost = fleet
@@ -157,7 +155,7 @@ fn a_drone_with_half_a_secret_takes_no_part_and_says_why() {
     }
 }
 
-/// `block` with `bytes` at `at`, and the CRC that belongs to it.
+/// Returns `block` with `bytes` at `at` and an updated CRC.
 fn with(block: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut block = block.to_vec();
     block[at..at + bytes.len()].copy_from_slice(bytes);

@@ -1,4 +1,4 @@
-//! Three images at once, each with an autopilot of its own: MAVSDK, and two that are written here. In real time, which MAVSDK lives in.
+//! Three images with their own autopilots in real time: MAVSDK for the first, and two simulated ones.
 
 use std::time::Instant;
 
@@ -19,13 +19,12 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of times that MAVSDK's link was found late in OFFBOARD, and its pilot has chosen another mode; and if OFFBOARD is due again.
+    /// Number of late-link releases handled by MAVSDK's pilot, and whether OFFBOARD is due again.
     found: usize,
     chooses: bool,
 }
 
 impl Three {
-    /// All live until `done`.
     fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
         let end = Instant::now() + PATIENCE;
         while !done(self) {
@@ -47,8 +46,7 @@ impl Three {
         }
     }
 
-    /// Does what the first drone's pilot does once its relay was released by a link that was late, as MAVSDK's is on a busy computer: chooses
-    /// another mode, and OFFBOARD when the relay is ready.
+    /// Chooses another mode after a late link released the first drone, and then OFFBOARD again.
     fn choose_again(&mut self) {
         let count = |text: &str| {
             self.fleet
@@ -74,7 +72,7 @@ impl Three {
         self.fleet.of_drone(drone).any(|line| line.text == text)
     }
 
-    /// Where the first was told to be, which is where it then is, and where the others are.
+    /// Returns the first drone's target, where it then is, and the others' positions.
     fn places(&self) -> Option<[Placement; 3]> {
         let first = axis().place(self.mavsdk.target()?)?;
         let [second, third] = self.others.each_ref().map(|vehicle| vehicle.place);
@@ -94,7 +92,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
         }
     });
     let to: Vec<Placement> = to.collect();
-    // All of them before their places, so that each has to make room for the one behind.
+    // All drones start short of their positions, so that each has to make room for the one behind.
     let from = |index: usize| Placement {
         x_m: to[index].x_m - 25.0,
         altitude_m: to[index].altitude_m - 0.5,
@@ -116,7 +114,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
         chooses: false,
     };
 
-    // Each is found, asked for what it says, and told nothing on the ground.
+    // On the ground each autopilot is found, its messages are requested, and no targets are sent.
     three.until("heartbeat of the first", |three| {
         three.mavsdk.has_heard("HEARTBEAT")
     });
@@ -133,7 +131,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
     });
     assert_eq!(three.mavsdk.target(), None);
 
-    // Their pilots take off.
+    // The pilots take off.
     three.mavsdk.order("arm");
     three.mavsdk.order("air");
     three.mavsdk.order("active");
@@ -148,7 +146,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
     });
     assert!(three.others.iter().all(|vehicle| vehicle.told.is_empty()));
 
-    // And hand over.
+    // The pilots give control to the relays.
     three.mavsdk.order("mode offboard");
     for vehicle in &mut three.others {
         vehicle.granted = true;
@@ -166,7 +164,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
             .all(|vehicle| vehicle.texts.iter().any(flies))
     );
 
-    // One pilot takes over: that drone is released, and the others stay.
+    // One pilot takes control: that drone is released, and the others stay.
     three.others[0].granted = false;
     three.until("release", |three| {
         let released = |text: &String| text.starts_with("relay: released");

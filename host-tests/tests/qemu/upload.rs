@@ -1,4 +1,4 @@
-//! Emulated drones that are handed a new mission in flight, and some that were before they were switched on.
+//! Emulated drones that receive a mission in flight, or have one stored in their flash.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -23,7 +23,7 @@ const LARGE: usize = 32 * 1024;
 
 const KEY: [u8; 32] = *b"three drones and one transmitter";
 
-/// What is uploaded: the interferer elsewhere, and drones that are higher and louder.
+/// Returns the uploaded flight: another interferer position, altitude and power.
 fn moved(uavs: u16) -> Flight {
     let scenario = Scenario {
         interference: Interference::Sources(vec![Source {
@@ -55,7 +55,7 @@ fn blocks(loaded: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// The transmitter, at the end of a socket; its clock is as fast as the drones'.
+/// Transmitter at the end of a socket; its clock is as fast as the drones'.
 struct Station {
     socket: UnixStream,
     ground: Ground,
@@ -82,7 +82,7 @@ impl Station {
         uav_relay::Instant::from_micros(u64::try_from(micros).unwrap())
     }
 
-    /// Uploads, and says which relay flies it.
+    /// Uploads a mission. Returns the relay that reports its adoption.
     fn upload(&mut self, upload: Upload) -> u16 {
         self.ground.upload(self.now(), upload).unwrap();
         let end = Instant::now() + PATIENCE;
@@ -123,7 +123,7 @@ fn three_fly_what_the_transmitter_uploads() {
         for drone in 1..=3 {
             let said = |text: &str| fleet.of_drone(drone).any(|line| line.text == text);
             assert!(said("event Uploaded") && said("mission version 3 is flown"));
-            // The emulator has no flash that can be written, and the drone flies all the same.
+            // The emulator's flash is read-only; the drone flies the mission nevertheless.
             assert!(said(
                 "mission version 3 cannot be kept: after a reboot it has to come again"
             ));
@@ -131,7 +131,7 @@ fn three_fly_what_the_transmitter_uploads() {
     }
 }
 
-/// The log in the flash of each: version 2, version 3, and a record that a loss of power has cut short.
+/// Checks flash logs with version 2, version 3, and a record truncated by a power failure.
 #[test]
 fn three_fly_what_they_were_handed_before_they_were_switched_on() {
     let loaded = paper(3);
@@ -159,7 +159,7 @@ fn three_fly_what_they_were_handed_before_they_were_switched_on() {
         assert_eq!(told.count(), 1);
     }
     drop(fleet);
-    // With other blocks they have forgotten.
+    // Drones with other blocks do not use the stored mission.
     let fresh = paper(3).signed(Some(Secret {
         key: KEY,
         epoch: 78,

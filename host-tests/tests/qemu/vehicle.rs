@@ -1,4 +1,4 @@
-//! A vehicle with an autopilot at the end of a socket; its clock is as fast as the drones'.
+//! Vehicle with an autopilot at the end of a socket; its clock is as fast as the drones'.
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -21,14 +21,12 @@ use crate::fleet::PATIENCE;
 
 const SYSTEM: u8 = 7;
 
-/// How fast it flies, m/s.
 const FASTEST_M_S: f32 = 8.0;
 
-/// So long the pilot shows another mode, ms: six heartbeats.
+/// Time for which the pilot chooses another mode, ms: six heartbeats.
 const ELSEWHERE: u64 = 1_500;
 
-/// What it says, by itself or when asked, and how often, ms. A heartbeat more often than others have it, since this process may be kept
-/// waiting, and its drones' clock goes on.
+/// Messages and their intervals, ms; heartbeats are frequent because this process may be delayed.
 const HEARTBEAT: u32 = 0;
 const POSITION: u32 = 33;
 const TARGET: u32 = 87;
@@ -40,7 +38,7 @@ const PERIODS: [(u32, u64); 4] = [
     (SYS_STATE, 500),
 ];
 
-/// A target that it was told, and when, ms.
+/// Received target, with its time, ms.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Told {
     pub(crate) at: u64,
@@ -52,7 +50,7 @@ pub(crate) struct Vehicle {
     socket: UnixStream,
     axis: Axis,
     began: Instant,
-    /// As its drone lives.
+    /// Speed of the drone's clock.
     life: Life,
     moved_at: u64,
     said_at: [u64; PERIODS.len()],
@@ -61,26 +59,26 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// The pilot wants the relay to fly: OFFBOARD or GUIDED, chosen anew where the relay asks for it. Otherwise the pilot has the sticks.
+    /// True if the pilot wants OFFBOARD or GUIDED, and chooses it again on request; else the sticks fly.
     pub(crate) granted: bool,
-    /// Until then the pilot shows another mode, ms.
+    /// Time until which the pilot chooses another mode, ms.
     elsewhere_until: u64,
     pub(crate) place: Placement,
-    /// Messages that it was asked for.
+    /// Requested messages.
     pub(crate) asked: BTreeSet<u32>,
     pub(crate) told: Vec<Told>,
     pub(crate) texts: Vec<String>,
     pub(crate) heartbeats: u32,
 }
 
-/// How far apart two places are, m.
+/// Returns the distance of two positions, m.
 pub(crate) fn apart(a: Placement, b: Placement) -> f32 {
     let [x, y, h] = [a.x_m - b.x_m, a.y_m - b.y_m, a.altitude_m - b.altitude_m];
     (x * x + y * y + h * h).sqrt()
 }
 
 impl Vehicle {
-    /// One on the ground.
+    /// Creates a vehicle on the ground.
     pub(crate) fn new(
         kind: Kind,
         socket: UnixStream,
@@ -112,13 +110,12 @@ impl Vehicle {
         }
     }
 
-    /// Milliseconds since it began.
+    /// Returns the time since the start, ms.
     pub(crate) fn now(&self) -> u64 {
         let ms = self.began.elapsed().mul_f64(self.life.speed()).as_millis();
         u64::try_from(ms).unwrap()
     }
 
-    /// Lives for so long.
     pub(crate) fn run(&mut self, ms: u64) {
         let end = self.now() + ms;
         while self.now() < end {
@@ -126,7 +123,7 @@ impl Vehicle {
         }
     }
 
-    /// Lives until `done`; in time, or the test fails.
+    /// Runs until `done`; on a timeout the test fails.
     pub(crate) fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
         let end = Instant::now() + PATIENCE;
         while !done(self) {
@@ -142,7 +139,7 @@ impl Vehicle {
         }
     }
 
-    /// Says where it is, and that a SiK radio in it hears so much between frames.
+    /// Sends the position and a SiK radio's noise value.
     pub(crate) fn hears(&mut self, noise: u8) {
         self.say(POSITION, self.now());
         let radio = MavHeader {
@@ -158,7 +155,6 @@ impl Vehicle {
         self.send(radio, &MavMessage::RADIO_STATUS(said));
     }
 
-    /// Whether it was told a target since `at`.
     pub(crate) fn was_told_since(&self, at: u64) -> bool {
         self.told.last().is_some_and(|told| told.at > at)
     }
@@ -177,12 +173,12 @@ impl Vehicle {
         std::thread::sleep(Duration::from_millis(1));
     }
 
-    /// The mode is OFFBOARD or GUIDED.
+    /// Returns true if the mode is OFFBOARD or GUIDED.
     fn is_handed_over(&self, now: u64) -> bool {
         self.granted && now >= self.elsewhere_until
     }
 
-    /// The pilot reads the ground station: a relay that found the mode chosen, or has forgotten since that another one was, asks for another mode first.
+    /// Reads an operator text: when the relay asks for another mode first, the pilot chooses one for a while.
     fn reads(&mut self, text: String) {
         if self.granted && text == "relay: waits, take another mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;
@@ -238,7 +234,7 @@ impl Vehicle {
                 })
             }
             TARGET => {
-                // A PX4 does not say it.
+                // A PX4 does not send its target.
                 let is_said = self.kind == Kind::ArduCopter && self.is_handed_over(now);
                 let Some((_, goal)) = self.goal.filter(|_| is_said) else {
                     return;
@@ -269,11 +265,11 @@ impl Vehicle {
         raw.serialize_message(header, message);
         let mut left = raw.raw_bytes();
         let begun = Instant::now();
-        // What the emulator does not read for so long is lost, as on a UART.
+        // Bytes that the emulator does not read for so long are lost, as on a UART.
         while !left.is_empty() && begun.elapsed() < Duration::from_millis(100) {
             match self.socket.write(left) {
                 Ok(count) => left = &left[count..],
-                // The emulator reads as fast as its UART.
+                // The emulator reads at its UART's speed.
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     std::thread::sleep(Duration::from_millis(1));
                 }

@@ -1,4 +1,4 @@
-//! Emulated drones that were switched off in flight: what they said in the votes on views holds.
+//! Emulated drones that rebooted in flight: their votes on views are binding.
 
 use host_tests::firmware::emulator::Kept;
 use host_tests::firmware::journal::{Journal, WhenFull};
@@ -22,7 +22,7 @@ fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// The flash of a drone that has said all of `said`, the last of it in a record that a loss of power has cut short.
+/// Returns a flash with the votes of `said`, the last record truncated by a power failure.
 fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     let check = u32::from_le_bytes(*block.last_chunk().unwrap());
     let mut flash = Ram::blank(SMALL, 1);
@@ -37,7 +37,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
 
 const HOLDS: &str = "what was said in the votes on views before holds";
 
-/// View 40 was agreed on among all three, and they fly again in a later one.
+/// Checks drones that agreed on view 40: they fly in a later view.
 #[test]
 fn three_that_were_switched_off_stand_by_what_they_said() {
     let flight = paper(3);
@@ -53,7 +53,7 @@ fn three_that_were_switched_off_stand_by_what_they_said() {
     }
 }
 
-/// Of three, one is missing: the two others are a quorum of the chain that was loaded, and none of a view that neither of them is in.
+/// Checks two of three drones, a quorum of the loaded chain, but not of a stored view without them.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly_it() {
     let flight = paper(3);
@@ -67,7 +67,7 @@ fn two_that_remember_a_view_without_them_do_not_fly_it() {
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
     drop(fleet);
-    // The same two without their flash.
+    // The same two drones with an empty flash.
     let mut fleet = Fleet::start(Image::Radio, &blocks, Faults::default(), 1);
     fleet.wait("places for two", |lines| {
         [1, 2].iter().all(|drone| {

@@ -1,4 +1,4 @@
-//! The watchdog's registers, as QEMU's trace shows that the image writes them. QEMU has no watchdog: that one restarts the chip was tried nowhere.
+//! Watchdog registers written by the image, from QEMU's trace; QEMU has no watchdog to reset the chip.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -8,10 +8,10 @@ use uav_relay_tools::provision::config;
 use crate::chain::paper;
 use crate::fleet::{Image, PATIENCE, image};
 
-/// QEMU's name for what is at the watchdog's address.
+/// Trace prefix of QEMU's device at the watchdog's address.
 const DEVICE: &str = "I2S2ext: unimplemented device write (size 4, ";
 
-/// Started, unlocked, set to 6 s, and fed.
+/// Writes that start, unlock and set the watchdog to 6 s, and feed it.
 const BEGINS: [&str; 5] = [
     "offset 0x000, value 0x0000cccc)",
     "offset 0x000, value 0x00005555)",
@@ -46,7 +46,7 @@ fn the_watchdog_is_started_and_fed_for_as_long_as_the_relay_runs() {
     while begun.elapsed() < PATIENCE && written.len() < 40 {
         std::thread::sleep(Duration::from_millis(200));
         let text = std::fs::read_to_string(&trace).unwrap_or_default();
-        // The last line may not be whole yet.
+        // The last line may be incomplete.
         let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
         let lines = whole.lines().filter_map(|line| line.strip_prefix(DEVICE));
         written = lines.map(str::to_owned).collect();

@@ -1,4 +1,4 @@
-//! Numbers, missions and settings from the whole of their stated ranges, their ends as often as all between.
+//! Random numbers, missions and settings from their whole ranges, with frequent limits.
 
 use rand::{Rng, RngExt};
 use uav_relay::GuardConfig;
@@ -8,7 +8,7 @@ use uav_relay::{
     Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,
 };
 
-/// The usual number, an end of its range, or one between the ends that are above 0, even in its logarithm.
+/// Draws the usual number, a limit, or a log-uniform number between positive limits.
 pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f32 {
     match rng.random_range(0..8) {
         0..4 => usual.clamp(least, most),
@@ -21,7 +21,7 @@ pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f
     }
 }
 
-/// The usual number, an end of its range, or one between, of either sign.
+/// Draws the usual number, a limit, or a number between, of either sign.
 pub(crate) fn signed(rng: &mut impl Rng, usual: f32, most: f32) -> f32 {
     let size = scaled(rng, usual.abs(), 1e-3, most);
     match rng.random_range(0..8) {
@@ -35,7 +35,6 @@ const fn point(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Fields at the ends of their ranges.
 const FIELDS: [Field; 6] = [
     Field::new(&[
         point(0.0, 4.2e5),
@@ -53,7 +52,7 @@ const FIELDS: [Field; 6] = [
     ]),
 ];
 
-/// A mission of at most `most` relays; `None` where its numbers do not go together, which is refused by name.
+/// Draws a mission of at most `most` relays; `None` where the numbers contradict each other.
 pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
     let distance_m = scaled(rng, 1_000.0, 1.0, 1e6);
     let relays = rng.random_range(1..=most);
@@ -123,7 +122,7 @@ fn channel(rng: &mut impl Rng) -> Option<Channel> {
     Channel::new(carrier_hz, one.min(other), one.max(other), air_ground).ok()
 }
 
-/// What all relays of a chain of `mission` have in common.
+/// Draws the common settings of a chain of `mission`.
 pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let sourced = mission.field().is_none();
     let method = match rng.random_range(0..3) {
@@ -185,7 +184,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// The same for one relay: what it holds of its own.
+/// Draws the settings of one relay.
 pub(crate) fn own(
     rng: &mut impl Rng,
     mission: &Mission,

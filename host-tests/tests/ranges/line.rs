@@ -1,4 +1,4 @@
-//! A chain on links that lose nothing, and what must hold of it whatever it is told.
+//! Chain on lossless links, with checks that must hold for any inputs.
 
 use std::collections::VecDeque;
 
@@ -8,22 +8,20 @@ use uav_relay::{
     Duration, Event, Identity, Instant, Mission, Phase, Placement, Port, Relay, Settings, Wiring,
 };
 
-/// Turns of the loop after which a chain is taken to be stuck at one time: far beyond what the longest computation needs.
+/// Turns of the loop at one time after which a chain counts as stuck.
 const MOST_TURNS: u32 = 400_000;
 
-/// A chain of relays.
 pub(crate) struct Line {
     pub(crate) relays: Vec<Relay>,
     under_way: VecDeque<(usize, Port, Vec<u8>)>,
     pub(crate) now: Instant,
-    /// What each was told by its relay.
     pub(crate) events: Vec<(u16, Event)>,
     turns: u32,
     wiring: Wiring,
 }
 
 impl Line {
-    /// All relays of `mission`, switched on at `now`; `settings` of each, by index from 1. `None` where they are refused.
+    /// Starts all relays of `mission` with the settings of each index from 1; `None` where they are refused.
     pub(crate) fn new(
         mission: Mission,
         now: Instant,
@@ -47,7 +45,6 @@ impl Line {
         Some(line)
     }
 
-    /// Runs until `until`.
     pub(crate) fn run(&mut self, until: Instant) {
         self.turns = 0;
         loop {
@@ -62,12 +59,11 @@ impl Line {
         self.settle();
     }
 
-    /// Runs for `span`.
     pub(crate) fn run_for(&mut self, span: Duration) {
         self.run(self.now + span);
     }
 
-    /// Whether all hold places, or the leader knows that there are none.
+    /// Returns true if all relays hold positions, or the leader has reported infeasibility.
     pub(crate) fn has_agreed(&self) -> bool {
         let mut leaders = self
             .relays
@@ -80,14 +76,14 @@ impl Line {
                 .all(|relay| relay.phase() == Phase::Holding)
     }
 
-    /// Whether the leader has said that no places meet any target.
+    /// Returns true if the leader has reported infeasibility.
     pub(crate) fn is_infeasible(&self) -> bool {
         self.events
             .iter()
             .any(|(_, event)| *event == Event::Infeasible)
     }
 
-    /// Handles what is due, and delivers all that is sent, until nothing is.
+    /// Handles all due timers and delivers all frames until there are none.
     pub(crate) fn settle(&mut self) {
         loop {
             for at in 0..self.relays.len() {
@@ -137,7 +133,7 @@ impl Line {
         self.under_way.retain(|(to, ..)| *to < count);
     }
 
-    /// What must hold at all times: every number that a relay tells is finite, and nobody says what the others refuse.
+    /// Checks that every reported number is finite, and no relay sends messages that others refuse.
     pub(crate) fn check(&self) {
         for relay in &self.relays {
             for place in [relay.setpoint(), relay.final_setpoint()]

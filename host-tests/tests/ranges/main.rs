@@ -1,6 +1,4 @@
-//! Every input of the public API over its whole stated range: the chain agrees, every number is finite, nothing panics.
-//!
-//! `COUNT=10000` draws as many chains a test, `SEED` begins elsewhere.
+//! Every input of the public API over its whole range; `COUNT` chains from seed `SEED`.
 
 use std::panic::catch_unwind;
 
@@ -12,14 +10,14 @@ mod measured;
 mod missions;
 mod positions;
 
-/// The seeds of a test: `COUNT` of them, or `usual`, from `SEED` on.
+/// Returns the seeds of a test: `COUNT` of them, or `usual`, from `SEED` on.
 fn seeds(usual: u64) -> std::ops::Range<u64> {
     let of = |name: &str| std::env::var(name).ok()?.parse().ok();
     let (first, count) = (of("SEED").unwrap_or(0), of("COUNT").unwrap_or(usual));
     first..first + count
 }
 
-/// What `fly` makes of every seed. Those that panic are told of, the first of them with what they said.
+/// Returns the result of `fly` for every seed, and reports seeds that panic.
 fn each<T: Send>(usual: u64, fly: impl Fn(u64) -> T + Sync + std::panic::RefUnwindSafe) -> Vec<T> {
     let came: Vec<Result<T, u64>> = seeds(usual)
         .into_par_iter()

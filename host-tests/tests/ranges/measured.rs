@@ -1,4 +1,4 @@
-//! Measured powers and places of drones: whatever is handed in, the chain agrees, and goes on agreeing once the sensors are in order.
+//! Measured powers at drones' positions: for any inputs the chain agrees, also after the sensors recover.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use crate::draw::{mission, scaled, settings, signed};
 use crate::each;
 use crate::line::Line;
 
-/// What relay `index` is handed: any float there is, from the range that is accepted more often than not.
+/// Draws a power: any float, more often within the accepted range.
 fn power_w(rng: &mut ChaCha8Rng) -> f32 {
     match rng.random_range(0..8) {
         0 => f32::from_bits(rng.random()),
@@ -30,7 +30,7 @@ fn power_w(rng: &mut ChaCha8Rng) -> f32 {
     }
 }
 
-/// A drone of a line of that length, anywhere that `handle_sample` has a range for.
+/// Draws a position over the range of `handle_sample`.
 fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     let far = [distance_m, 1e7, 1e9][rng.random_range(0..3)].max(2e-3);
     Placement {
@@ -40,7 +40,7 @@ fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     }
 }
 
-/// Measures for a minute, every relay and both ends, one kind of number a relay; then what a relay of 1 W hears at 300 m.
+/// Measures random powers for a minute at all nodes, and then those of a 1 W source at 300 m.
 fn fly(seed: u64, mission: Mission, settings: Settings) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some(mut line) = Line::new(mission, Instant::ZERO, |_| settings) else {
@@ -82,7 +82,7 @@ fn fly(seed: u64, mission: Mission, settings: Settings) {
         line.run_for(Duration::from_millis(1_000));
         line.check();
     }
-    // A new belief may be on its way just then.
+    // A new estimate may be in transit just then.
     for _ in 0..80 {
         line.run_for(Duration::from_millis(370));
         line.check();
@@ -142,7 +142,7 @@ fn every_measured_power_and_place_in_every_mission() {
     });
 }
 
-/// All relays hear one power, at their places: the case, whose square is no finite number.
+/// Checks one power at all relays, over a range in which its square is not finite.
 #[test]
 fn one_power_everywhere_over_the_accepted_range() {
     let decades: Vec<i32> = (-300..=60).collect();

@@ -1,4 +1,4 @@
-//! Missions and settings: one to four relays at random corners of all ranges.
+//! Missions and settings: one to four relays at random limits of all ranges.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,10 +8,10 @@ use crate::draw::{mission, own, settings};
 use crate::each;
 use crate::line::Line;
 
-/// How long a chain may take to agree, hop times and probing periods of its own aside.
+/// Time limit for an agreement, in addition to the chain's hop times and probing periods.
 const PATIENCE: Duration = Duration::from_millis(600_000);
 
-/// What came of a chain.
+/// Result of a chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Came {
     Refused,
@@ -29,7 +29,7 @@ fn fly(seed: u64) -> Came {
     let each: Vec<_> = (0..mission.relays())
         .map(|_| own(&mut rng, &mission, common, guarded))
         .collect();
-    // A clock may begin anywhere.
+    // A clock may start at any time.
     let begin = Instant::from_micros([0, 1, 1 << 32, 1 << 62][rng.random_range(0..4)]);
     let Some(mut line) = Line::new(mission, begin, |index| each[usize::from(index) - 1]) else {
         return Came::Refused;

@@ -1,4 +1,4 @@
-//! Places of drones, control and clocks: whatever a guarded relay is told, every number stays finite; once it is told the truth, the chain agrees.
+//! Positions, control and clocks of guarded relays: numbers stay finite, and with true inputs the chain agrees.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,7 +9,7 @@ use crate::draw::signed;
 use crate::each;
 use crate::line::Line;
 
-/// Anywhere, near the line more often than not.
+/// Draws a position anywhere, more often near the line.
 fn anywhere(rng: &mut ChaCha8Rng) -> Placement {
     let mut metres = || match rng.random_range(0..6) {
         0 => f32::from_bits(rng.random()),
@@ -40,7 +40,7 @@ fn fly(seed: u64) {
     for _ in 0..60 {
         let now = line.now;
         for relay in &mut line.relays {
-            // A measurement of any time, before and after now.
+            // Times of measurement are before, at and after the present.
             let at = match rng.random_range(0..4) {
                 0 => Instant::from_micros(rng.random()),
                 1 => Instant::ZERO,

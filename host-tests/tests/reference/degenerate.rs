@@ -1,4 +1,4 @@
-//! Reaches where formulas divide by zero or lose a root, each with an answer worked out by hand.
+//! Reaches where formulas divide by zero or lose a root, with answers worked out by hand.
 
 use uav_relay_oracle::reference::{Link, Station};
 
@@ -7,7 +7,7 @@ use super::close;
 #[test]
 fn degenerate_reaches_are_right() {
     let base = Link::paper(2);
-    // Interferer at Tx: hop 1 has the SIR 1 everywhere.
+    // Interferer at Tx: hop 1 has SIR 1 everywhere.
     let at_tx = Link {
         x_i: 0.0,
         y_i: 0.0,
@@ -15,7 +15,7 @@ fn degenerate_reaches_are_right() {
     };
     assert_eq!(at_tx.farthest(1, 0.0, 1.0), Some(1000.0));
     assert_eq!(at_tx.farthest(1, 0.0, 1.0 + 1e-12), None);
-    // Target equal to the SIR's limit far away.
+    // Target equal to the SIR's limit at large distances.
     close(
         base.farthest(1, 0.0, 1.0).unwrap(),
         410.0,
@@ -39,7 +39,7 @@ fn degenerate_reaches_are_right() {
     // Sender abreast of the interferer: (H + d^2) / 80 d^2 = 5 at d^2 = H / 399.
     let abreast = base.farthest(2, 500.0, 5.0).unwrap() - 500.0;
     close(abreast, (160_400.0_f64 / 399.0).sqrt(), 1e-12, "X = from_x");
-    // A hill: both ends of the way miss the target, its middle meets it.
+    // A maximum in the middle: both ends of the hop miss the target.
     let behind = Link {
         x_i: -10.0,
         y_i: 0.0,
@@ -67,14 +67,14 @@ fn degenerate_reaches_are_right() {
     );
     assert!(behind.sir_relay(1, 0.0, reach + 1e-6).unwrap() < 1.1);
     assert_eq!(behind.farthest(1, 0.0, 1.25), None);
-    // Interferer on Rx: nothing gets through.
+    // Interferer on Rx: no target is met.
     let on_rx = Link {
         x_i: 1000.0,
         y_i: 0.0,
         ..base.clone()
     };
     assert_eq!((on_rx.optimum(), on_rx.rx_reach(1e-9)), (None, None));
-    // Questions without an answer.
+    // Queries without an answer.
     assert_eq!(
         (base.farthest(0, 0.0, 1.0), base.farthest(3, 0.0, 1.0)),
         (None, None)
@@ -94,7 +94,7 @@ fn degenerate_reaches_are_right() {
     assert_eq!(base.chain_sir(&[1.0]), 0.0);
 }
 
-/// The farthest place of relay 1 is so near the interferer that relay 2 cannot change altitude there; above Tx it can.
+/// Checks that the farthest position of relay 1 may be too close to the interferer for relay 2's altitude.
 #[test]
 fn going_farthest_is_not_best_at_different_altitudes() {
     let link = Link {
@@ -120,7 +120,7 @@ fn going_farthest_is_not_best_at_different_altitudes() {
     assert!(link.chain_sir(&link.placement(best).unwrap()) >= best * (1.0 - 1e-14));
 }
 
-/// With the interferer behind Tx, hop 1 is better away from Tx than above it: the fixed step has to start higher up.
+/// Checks an interferer behind Tx, where the fixed step has to start at a higher target.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Station {

@@ -1,5 +1,4 @@
-//! The f64 reference judged on its own, before it may judge anything: against values of a separate program, against brute
-//! force over the places, and against itself where two of its methods must agree.
+//! f64 reference, compared with a separate program, with brute force, and between its methods.
 
 use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::reference::{Link, Station};
@@ -22,7 +21,7 @@ fn close_all(got: &[f64], want: &[f64], rtol: f64, what: &str) {
     }
 }
 
-/// The cases of one function; there must be some, lest a test passes by testing nothing.
+/// Returns the cases of one function, of which there must be some.
 fn of(function: &str) -> Vec<Case> {
     let found = cases::of(function).unwrap();
     assert!(!found.is_empty(), "no case of {function}");
@@ -44,19 +43,19 @@ fn every_case_of_the_file_is_used() {
         "algorithm1_schedule",
         "psi",
         "feasibility_bound_printed",
-        // By tests/theorems.rs and tests/plan.rs.
+        // Cases used by the tests `theorems` and `plan`.
         "locus",
         "quartic_coeffs",
         "quartic_roots_in_0_D",
         "theorem1",
         "theorem2",
         "theorem3",
-        // By tests/fleet.rs and tests/plan.rs.
+        // Cases used by the tests `fleet` and `plan`.
         "min_uavs",
         "problem1",
-        // By tests/several.rs.
+        // Cases used by the tests `multi_interferer` and `plan`.
         "hyp_msi",
-        // By tests/baseline.rs and tests/figures.rs.
+        // Cases used by the tests `baseline` and `figures`.
         "baseline_single",
         "baseline_multi",
         "algorithm4",
@@ -113,7 +112,7 @@ fn single_hops_match_the_file() {
     }
 }
 
-/// Every case of the file has eta = `mu_los`; here each factor has its own value, and the SIRs are worked out by hand.
+/// Checks different values of eta and `mu_los`, which are equal in the file, with SIRs worked out by hand.
 #[test]
 fn each_hop_uses_its_own_path_loss() {
     let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Station {
@@ -260,7 +259,7 @@ fn the_fixed_step_needs_the_known_number_of_targets() {
         assert_eq!(Link::paper(n).fixed_step(0.1).unwrap().0, want, "N = {n}");
     }
     assert_eq!(Link::paper(2).fixed_step(0.0), None);
-    // 1026, then 2, then nothing above zero: the step jumps over every feasible target.
+    // The targets are 1026, 2, and then none above zero: the step skips every feasible target.
     assert_eq!(Link::paper(1).fixed_step(1024.0), None);
 }
 
@@ -275,7 +274,7 @@ fn the_printed_bound_and_the_turning_points_match_the_file() {
             case.rtol,
             &case.id,
         );
-        // Hop 2 at the least separation is at its worst abreast of the interferer.
+        // Hop 2 at the least separation is worst abreast of the interferer.
         close(
             link.sir_relay(2, x - d, x).unwrap(),
             terms[1],
@@ -317,7 +316,7 @@ fn the_printed_bound_and_the_turning_points_match_the_file() {
                 "{}",
                 case.id
             );
-            // Tx and the interferer are equally far from there, at any altitude.
+            // Tx and the interferer are equally far away, at any altitude.
             close(
                 sir(level),
                 case.params.p_t / case.params.p_msi,
@@ -347,7 +346,7 @@ fn the_slack_at_rx_and_its_derivative_match_the_file() {
             case.rtol,
             &case.id,
         );
-        // Richardson: the error of the wide difference is four times that of the narrow one.
+        // Richardson extrapolation: the wide difference has four times the error of the narrow one.
         let narrow = (4.0 * slope(0.005) - slope(0.01)) / 3.0;
         close(
             narrow,

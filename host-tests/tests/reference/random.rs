@@ -1,11 +1,11 @@
-//! The reference on random links: against scans and brute force, and where two of its methods must agree.
+//! Reference on random links, compared with scans, brute force, and between methods.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-/// Runs `check` on `count` random links with the generator that drew them.
+/// Runs `check` on `count` random links with their random generator.
 fn for_links(
     default_seed: u64,
     count: u32,
@@ -19,7 +19,7 @@ fn for_links(
     }
 }
 
-/// The reach against a plain scan that takes the last sample meeting the target.
+/// Compares reaches with a scan for the last sample that meets the target.
 #[test]
 fn reaches_agree_with_a_scan() {
     let (mut hills, mut blocked, mut inside) = (0, 0, 0);
@@ -38,7 +38,7 @@ fn reaches_agree_with_a_scan() {
                 link.distance_m * rng.random::<f64>()
             };
             let span = link.distance_m - start;
-            // A third of the interferers stand behind the sender, where the SIR forms a hill.
+            // A third of the interferers are behind the sender, where the SIR has a maximum.
             let mut link = link.clone();
             let behind = rng.random_bool(0.33);
             if behind {
@@ -62,7 +62,7 @@ fn reaches_agree_with_a_scan() {
                     "{x} {seen} {link:?}"
                 );
                 assert!(sir(x) >= target * (1.0 - 1e-15));
-                // Beyond the reach nothing may meet the target, and the next sample is a scan away at most.
+                // Beyond the reach no position meets the target.
                 for i in 1..=50 {
                     let beyond = x + (link.distance_m - x) * f64::from(i) / 50.0;
                     assert!(
@@ -82,9 +82,7 @@ fn reaches_agree_with_a_scan() {
     assert!(inside > 500 && hills > 100 && blocked > 100);
 }
 
-/// Brute force over the places knows nothing of targets or of going as far as possible.
-///
-/// Returns in how many links the greedy chain falls short of the optimum.
+/// Compares with brute force. Returns the number of links whose farthest chain is below the optimum.
 fn search_agrees(seed: u64, count: u32, n: u32, chain: Chain, points: u32) -> u32 {
     let (mut mixed_gains, mut dead) = (0, 0);
     for_links(
@@ -131,7 +129,7 @@ fn two_relays_agree_with_brute_force() {
     search_agrees(22, 200, 2, Chain::Any, 32);
 }
 
-/// Here going as far as possible is not always best, and the optimum has to come from the sets of places.
+/// Checks different altitudes, where the optimum needs sets of positions.
 #[test]
 fn two_relays_at_different_altitudes_agree_with_brute_force() {
     assert!(search_agrees(23, 300, 2, Chain::Own, 32) > 0);
@@ -162,7 +160,7 @@ fn greedy_and_exact_agree_at_a_common_altitude() {
     );
 }
 
-/// The sets of places must not hold a place that no chain reaches: the chain traced back through them meets its target.
+/// Checks that the sets hold only reachable positions: the chain traced back through them meets its target.
 #[test]
 fn placements_meet_their_target() {
     let style = Style {
@@ -181,7 +179,7 @@ fn placements_meet_their_target() {
                 link.chain_sir(&x) >= target * (1.0 - 1e-14),
                 "{target:e} {link:?}"
             );
-            // A target that the greedy chain meets cannot be out of the exact one's reach.
+            // A target that the farthest chain meets is within the exact optimum.
             assert!(
                 link.farthest_optimum()
                     .is_none_or(|greedy| greedy <= optimum * (1.0 + 1e-12))
@@ -222,7 +220,6 @@ fn no_perturbation_beats_the_optimum() {
     assert!(compared > 10_000);
 }
 
-/// Which scenarios the generator must bring up, so that nobody trims a class unseen.
 #[test]
 fn the_generator_draws_every_class() {
     let mut seen = [0_u32; 10];

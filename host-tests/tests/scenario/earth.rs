@@ -1,4 +1,4 @@
-//! Interferers on earth.
+//! Interferers given by earth coordinates.
 
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use uav_relay_scenario::Interference;
@@ -8,7 +8,7 @@ use super::*;
 const TX: [f64; 2] = [47.40, 8.54];
 const RX: [f64; 2] = [47.41, 8.55];
 
-/// A file with a line on earth, level at 420 m, and the interferer of `lines`.
+/// Returns a file with a line on earth, level at 420 m, and the interferer of `lines`.
 fn sited(lines: &str) -> String {
     let end =
         |[lat, lon]: [f64; 2]| format!("{{ lat_deg = {lat}, lon_deg = {lon}, amsl_m = 420 }}");
@@ -26,7 +26,7 @@ fn place(lines: &str) -> (f64, f64) {
     }
 }
 
-/// Against a library of geodesics: within a unit of the places, 1.1 cm.
+/// Compares with a library of geodesics, within a unit of the coordinates, 1.1 cm.
 #[test]
 fn an_interferer_on_earth_is_where_geodesics_have_it() {
     let earth = Geodesic::wgs84();
@@ -103,7 +103,7 @@ fn what_is_no_place_on_the_line_is_refused() {
     refused(&nowhere, Problem::NoSite, &parts);
 }
 
-/// By how much interference a tower changes it: (d^2 + h^2) / (d^2 + (h - t)^2) in decibels.
+/// Checks towers by the change of interference, (d^2 + h^2) / (d^2 + (h - t)^2) in decibels.
 #[test]
 fn an_interferer_on_a_tower_is_refused_where_that_matters() {
     let azimuth = "lat_deg = 47.404\nlon_deg = 8.548";
@@ -113,7 +113,7 @@ fn an_interferer_on_a_tower_is_refused_where_that_matters() {
             .log10()
             .abs()
     };
-    // At Rx, on the ground, the tower only makes the interference less.
+    // At Rx, on the ground, a tower only reduces the interference.
     let mut seen = [false; 2];
     for tower in [0.0, 10.0, 30.0, 60.0, 120.0, 400.0] {
         let text = sited(&format!("{azimuth}\namsl_m = {}", 420.0 + tower));

@@ -1,11 +1,11 @@
-//! `examples/scenario.toml` has every key, and none that there is not.
+//! `examples/scenario.toml` has exactly the existing keys.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::*;
 
-/// Every key that `text` has, behind a `#` or not, as `table.key`.
+/// Returns the keys in `text`, also in comments, as `table.key`.
 fn shown(text: &str) -> BTreeSet<String> {
     let mut keys = BTreeSet::new();
     let (mut table, mut list) = (String::new(), String::new());

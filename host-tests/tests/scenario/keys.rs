@@ -1,9 +1,8 @@
-//! Every key: its range, its type, and what is said of another.
+//! Keys of scenario files: ranges, types, and error messages.
 
 use super::*;
 
-/// Every scalar key: where it is, the file around it (`@` stands for its value), a value just below the range, one
-/// just above it, both ends that are allowed, and how a message tells the range.
+/// Scalar key: path, file with `@` for the value, a value below, both limits, one above, the stated range.
 struct Row {
     key: &'static str,
     file: String,
@@ -187,7 +186,7 @@ fn rows() -> Vec<Row> {
 
 #[test]
 fn every_key_has_a_row() {
-    // The tables tell their own keys when asked for one they do not have.
+    // An unknown key makes each table list its own keys.
     let field = format!("{GEOMETRY}{POWER}[field]\n");
     let beta = format!("{field}i_max_w = 1\nbeta = [{{ nil = 1 }}]\n");
     let mut keys = Vec::new();
@@ -207,7 +206,7 @@ fn every_key_has_a_row() {
         let names = error.allowed.strip_prefix("the keys ").unwrap();
         keys.extend(names.split(", ").map(|name| format!("{table}{name}")));
     }
-    // Not a scalar, and what needs a [site]: `earth`.
+    // `beta` is no scalar, and `earth` tests the keys of a [site].
     keys.retain(|key| {
         let name = key.rsplit('.').next().unwrap();
         !["beta", "lat_deg", "lon_deg", "amsl_m"].contains(&name) || key == "field.beta[0].beta"
@@ -232,7 +231,7 @@ fn every_key_refuses_what_is_out_of_its_range() {
     for row in rows() {
         for value in [row.below, row.above, "nan", "inf", "-inf"] {
             let problem = match value {
-                // A relay's number is a whole one: these are not even of its type.
+                // A relay's number is an integer, so these have the wrong type.
                 "nan" | "inf" | "-inf" if row.key.ends_with("index") => Problem::WrongType,
                 _ => Problem::OutOfRange,
             };
@@ -257,7 +256,7 @@ fn every_key_refuses_another_type() {
             "[]",
             "\"\"\"two\nlines\"\"\"",
         ] {
-            // A line break in a value is told as an escape.
+            // A line break in a value is shown as an escape.
             let first = value.lines().next().unwrap().trim_start_matches("\"\"\"");
             let parts = [&format!("{} = ", row.key), first, row.range];
             refused(&row.file.replace('@', value), Problem::WrongType, &parts);

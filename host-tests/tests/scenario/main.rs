@@ -1,4 +1,4 @@
-//! Scenario files: what a good one means, and that every mistake in one is told in one line that helps.
+//! Scenario files: meaning of valid ones, and one helpful line for every mistake.
 
 mod earth;
 mod example;
@@ -10,7 +10,7 @@ mod power;
 
 use uav_relay_scenario::{Problem, Scenario, ScenarioError};
 
-/// Smallest files that parse: one with an interferer, one with a field.
+/// Smallest valid files: one with an interferer, one with a field.
 const GEOMETRY: &str = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n";
 const POWER: &str = "[power]\ntx_w = 80\nuav_w = 1\n";
 const INTERFERER: &str = "[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";

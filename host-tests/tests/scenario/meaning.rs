@@ -1,4 +1,4 @@
-//! What a good file means.
+//! Meaning of a valid file.
 
 use std::collections::BTreeMap;
 
@@ -166,7 +166,7 @@ fn the_obstructed_loss_is_the_larger() {
             "9 (excess_loss_los_db) to 200 dB",
         ],
     );
-    // The only key given gets the blame, not the default that it collides with.
+    // The given key is reported, not the default that it contradicts.
     let los = small("[channel]\nexcess_loss_los_db = 22\n");
     refused(
         &los,

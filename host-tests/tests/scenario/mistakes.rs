@@ -1,4 +1,4 @@
-//! What is missing, unknown, contradicts itself, or cannot be read.
+//! Missing, unknown, contradictory and unreadable contents.
 
 use std::path::{Path, PathBuf};
 
@@ -206,7 +206,7 @@ fn the_band_holds_the_common_altitude() {
     assert_eq!((wide.altitude_min_m, wide.altitude_max_m), (5.0, 90.0));
     let half = parse(&band("altitude_max_m = 90\n")).unwrap();
     assert_eq!((half.altitude_min_m, half.altitude_max_m), (20.0, 90.0));
-    // One relay's own altitude is no business of the band.
+    // A relay's own altitude may be outside the band.
     let own = parse(&small("[[relay]]\nindex = 1\naltitude_m = 300\n")).unwrap();
     assert_eq!(own.relays[&1].altitude_m, Some(300.0));
 }
@@ -241,13 +241,13 @@ fn broken_toml_is_placed_by_line_and_column() {
         Problem::Syntax,
         &["line 2, column 9: y = \"é\" é"],
     );
-    // Depth is bounded by the reader, not by the stack.
+    // The parser limits the depth.
     refused(
         &format!("a = {}", "[".repeat(100_000)),
         Problem::Syntax,
         &["line 1, column"],
     );
-    // A number too large for its notation is a mistake like any other, whichever pass sees it.
+    // A number too large for its notation is reported by whichever pass finds it.
     let huge = small("").replace("distance_m = 1000", "distance_m = 99999999999999999999");
     one_line(
         &parse(&huge).unwrap_err(),
@@ -284,7 +284,7 @@ fn names_with_line_breaks_stay_on_one_line() {
     refused(&long, Problem::UnknownKey, &["kkk... = \"vvv"]);
 }
 
-/// A file that is gone when the test is.
+/// Temporary file, removed on drop.
 struct Temporary(PathBuf);
 
 impl Temporary {
@@ -377,7 +377,7 @@ fn noise_out_of_range_is_refused_with_its_range() {
     }
 }
 
-/// Tools that fly nothing check the address, too: it is found before the flight.
+/// Checks that every program validates the address, before the flight.
 #[test]
 fn an_autopilot_at_no_udp_port_is_refused() {
     let file = |autopilot: &str| small(&format!("[companion]\nautopilot = {autopilot}\n"));

@@ -1,4 +1,4 @@
-//! A plan that a scenario carries on.
+//! Plan in a scenario file.
 
 use uav_relay_scenario::{PlannedMethod, PlannedPlace};
 

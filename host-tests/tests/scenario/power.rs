@@ -1,4 +1,4 @@
-//! Powers, gains and noise in field units: what a link budget in decibels says, the chain does.
+//! Powers, gains and noise in decibel units: the chain reproduces the link budget.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -98,10 +98,10 @@ fn an_eirp_that_no_mission_takes_is_refused() {
     refused(&relay, Problem::OutOfRange, &parts);
 }
 
-/// One end of a link: where it is, m, and the gain of its antenna, dBi.
+/// End of a link: position, m, and antenna gain, dBi.
 type End = ([f64; 3], f64);
 
-/// What an end receives of `dbm` from another, by the textbook: free space, the excess loss, both antennas. In dBm.
+/// Returns the received power of `dbm`, in dBm: free space, excess loss, both antennas.
 fn received_dbm(
     dbm: f64,
     (from, sends_dbi): End,
@@ -119,8 +119,7 @@ fn milliwatts(dbm: f64) -> f64 {
     10_f64.powf(dbm / 10.0)
 }
 
-/// Random links, two relays: with one gain of all that hear the SINRs are those of the link budget; with two, the relays' or the receiver's
-/// are, and the others are at least what is told.
+/// Compares SINRs with the link budget: equal, or for unequal receiving gains lower bounds.
 #[test]
 fn the_chain_has_the_sinrs_of_a_link_budget() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -179,7 +178,7 @@ fn the_chain_has_the_sinrs_of_a_link_budget() {
         }
         uneven += usize::from(scenario.noise.is_uneven());
 
-        // What relays are told, in f32, is the same.
+        // The relays' f32 values give the same.
         let (mission, _) = mission(&scenario, 2, 1e-4).unwrap();
         let profile = mission.config().common;
         let held = places.map(|(x, h)| {

@@ -1,4 +1,4 @@
-//! What the transmitter and the receiver measure, told on the air: `Ground::measured`.
+//! Measurements of the transmitter and the receiver, sent over the air: `Ground::measured`.
 
 use rayon::prelude::*;
 use uav_relay::sensing::belief::Belief;
@@ -15,11 +15,10 @@ use crate::count;
 
 const RELAYS: u16 = 5;
 
-/// How much more the way over the ground takes than the mission says: the receiver stands behind a hill.
+/// Additional loss of the ground path, which the mission does not know: the receiver is behind a hill.
 const HILL: f64 = 8.0;
 
-/// Runs as `change` says, in which both ends have a key and a radio: by how much is off what the first relay believes of the receiver, and
-/// the share of the optimum. `None` of the former where it believes nothing of it.
+/// Returns the error of the first relay's estimate at the receiver, if any, and the fraction of the optimum.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
         let wild = Wild::new(seed, RELAYS, 1);
@@ -42,7 +41,7 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     (0..count(20)).into_par_iter().map(one).collect()
 }
 
-/// What the first relay believes that the receiver hears, W.
+/// Returns the first relay's estimate of the power at the receiver, W.
 fn heard_at_rx(outcome: &Outcome) -> Option<f64> {
     match outcome.relays.first()?.believed.belief {
         Belief::Source { receiver_w, .. } if receiver_w > 0.0 => Some(f64::from(receiver_w)),
@@ -77,8 +76,7 @@ fn what_the_receiver_says_on_the_air_is_believed_by_all() {
     }
 }
 
-/// Where nobody tells what the receiver hears, the last hop goes by what the mission says of the way over the ground, which the hill makes
-/// wrong.
+/// Checks that measurements help: without them the last hop uses the mission's wrong ground path.
 #[test]
 fn it_is_worth_something() {
     let told = flown(|_| {});

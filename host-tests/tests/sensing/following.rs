@@ -1,4 +1,4 @@
-//! An interferer that moves, against the chain that stays where it was best.
+//! Moving interferer, compared with a chain that stays in its first optimum.
 
 use uav_relay_tools::listening::followed::{mean, shares};
 use uav_relay_tools::listening::found::quantile;

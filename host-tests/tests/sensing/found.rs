@@ -1,4 +1,4 @@
-//! Still sources: how much of the optimum after how many agreements.
+//! Static sources: fraction of the optimum by number of agreements.
 
 use uav_relay::{Interference, Interferer};
 use uav_relay_sim::simulator::setup::Setup;
@@ -10,7 +10,6 @@ use uav_relay_tools::listening::wild::Wild;
 
 use crate::count;
 
-/// Shares in as many scenes as are asked for.
 fn shares(
     relays: u16,
     sources: usize,
@@ -76,7 +75,7 @@ fn two_sources_are_met_by_the_one_that_comes_nearest() {
 fn a_wrong_guess_is_unlearned() {
     for relays in [3, 8] {
         let mut shares = shares(relays, 1, |wild| {
-            // Mirrored about the middle, a hundred times as strong, and nearer.
+            // The guess is mirrored, a hundred times as strong, and nearer.
             let source = wild.scene()?.sources[0].clone();
             wild.setup(Interference::Source(Interferer {
                 power_w: (100.0 * source.power_w) as f32,

@@ -1,6 +1,4 @@
-//! Chains that find an interferer that nobody told them of, in random scenes, against the chain that was told.
-//!
-//! `COUNT=1000` flies as many scenes a row, `SEED` begins elsewhere.
+//! Search for an unknown interferer in random scenes; `COUNT` sets the scenes of each row, `SEED` the first.
 
 mod ends;
 mod following;
@@ -8,7 +6,6 @@ mod found;
 mod steady;
 mod wrong;
 
-/// How many scenes a row: `COUNT`, or `usual`.
 fn count(usual: u64) -> u64 {
     let count = std::env::var("COUNT").ok();
     count.and_then(|count| count.parse().ok()).unwrap_or(usual)

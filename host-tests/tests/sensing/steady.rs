@@ -1,4 +1,4 @@
-//! What must not happen: a still world that is not left in peace, relays that believe different things, a broken sensor that is believed.
+//! Stability: no activity in a static world, equal estimates at all relays, and no use of a broken sensor.
 
 use rayon::prelude::*;
 use uav_relay::{Duration, Instant, Interference};
@@ -12,7 +12,7 @@ use uav_relay_tools::listening::wild::Wild;
 
 use crate::count;
 
-/// An hour of a still world, measured every second.
+/// Checks an hour of a static world, measured every second.
 #[test]
 fn a_still_world_becomes_silent() {
     let seeds: Vec<u64> = (0..count(12)).collect();
@@ -27,7 +27,7 @@ fn a_still_world_becomes_silent() {
             sky.until = Instant::from_millis(3_600_000);
             setup.deadline = Instant::from_millis(3_700_000);
             let outcome = run(setup).unwrap();
-            // The first agreement is that of relays which know nothing.
+            // The first agreement is made without an estimate.
             let found = outcome.stands.last().unwrap().agreements - 1;
             let last = outcome
                 .stands
@@ -54,7 +54,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
             assert!(outcome.injected.lost > 0 && outcome.injected.corrupted > 0);
             let told: Vec<_> = outcome.relays.iter().map(|relay| relay.believed).collect();
             assert!(told.iter().all(|one| one.number > 0));
-            // Who holds a place holds it for what is believed; the last belief may still be on its way.
+            // A held position belongs to the current estimate; the last estimate may still be in transit.
             let last = outcome.stands.last().unwrap();
             let bits = |one: &uav_relay::sensing::belief::Told| format!("{one:?}");
             let alike = told.iter().all(|one| {
@@ -72,7 +72,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
     assert!(quantile(&mut shares, 0.5) >= 0.98, "{shares:?}");
 }
 
-/// One relay of eight measures something else than it should from the beginning, while nothing is believed, or from later on.
+/// Checks one wrong sensor of eight, from the start, before an estimate, or from later on.
 #[test]
 fn a_broken_sensor_is_named_and_left_out() {
     for (off_db, since_s) in [

@@ -1,4 +1,4 @@
-//! One wrong sensor of any kind, at a relay or at an end: what it costs, and who is named; and nobody where all are right.
+//! Wrong sensor at a relay or an end: its cost and its detection, without false alarms.
 
 use rayon::prelude::*;
 use uav_relay::{Instant, Interference, Wiring};
@@ -12,7 +12,7 @@ use uav_relay_tools::listening::wild::Wild;
 
 use crate::count;
 
-/// What a sensor says, and what that is called: about what is heard 500 m from an interferer of 10 W, the noise of a receiver, nothing.
+/// Faults of a sensor, with constant values of a 10 W interferer at 500 m, a receiver's noise, and zero.
 const KINDS: [(&str, Says); 7] = [
     ("0.1 times", Says::Times(0.1)),
     ("0.5 times", Says::Times(0.5)),
@@ -23,7 +23,7 @@ const KINDS: [(&str, Says); 7] = [
     ("0 W always", Says::Always(0.0)),
 ];
 
-/// A chain of which both ends measure, and say it on the air.
+/// Returns a chain whose ends measure and send their measurements.
 fn setup(wild: &Wild) -> Setup {
     let mut setup = wild.setup(Interference::Unknown).unwrap();
     setup.settings.wiring = Wiring::Shared;
@@ -31,7 +31,7 @@ fn setup(wild: &Wild) -> Setup {
     setup
 }
 
-/// The share of the optimum in the end.
+/// Returns the final fraction of the optimum.
 fn share(wild: &Wild, outcome: &Outcome) -> f64 {
     let goals = outcome.stands.last().unwrap().goals.as_ref();
     goals.map_or(0.0, |goals| {
@@ -39,7 +39,7 @@ fn share(wild: &Wild, outcome: &Outcome) -> f64 {
     })
 }
 
-/// Who was named, each once.
+/// Returns the nodes reported as wrong, each once.
 fn named(outcome: &Outcome) -> Vec<u16> {
     let off = outcome.moments.iter().filter(|it| it.what == Turning::Off);
     let mut named: Vec<u16> = off.filter_map(|it| it.other).collect();
@@ -48,7 +48,7 @@ fn named(outcome: &Outcome) -> Vec<u16> {
     named
 }
 
-/// The shares of chains of which nothing is wrong: what loss is measured against, scene by scene.
+/// Returns the fractions of the optimum without faults, by scene, as a reference.
 fn sound(relays: u16) -> Vec<f64> {
     let one = |seed| {
         let wild = Wild::new(seed, relays, 1);
@@ -57,7 +57,7 @@ fn sound(relays: u16) -> Vec<f64> {
     (0..count(24)).into_par_iter().map(one).collect()
 }
 
-/// What one wrong sensor of every kind costs, and whether it and others are named.
+/// Checks the cost of each kind of wrong sensor, and the nodes reported.
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {
         let one = |seed: usize| {
@@ -136,7 +136,7 @@ fn sensors_that_are_right_are_not_named() {
     assert_eq!(all, 0);
 }
 
-/// The ends are silent at first, and begin late; or stop early: behind a hill, of which only they know.
+/// Checks ends behind a hill whose measurements start late or stop early.
 #[test]
 fn measurements_of_an_end_may_come_late_or_stop() {
     let [begin, late, end] = [0, 60_000, 10_000_000].map(Instant::from_millis);

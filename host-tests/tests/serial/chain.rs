@@ -1,4 +1,4 @@
-//! A chain of relays on mock ports, run on a virtual clock; and the same chain without any ports, to compare with.
+//! Chain of relays on mock ports with a virtual clock, and the same chain without ports.
 
 use host_tests::fixtures;
 use uav_relay::MAX_FRAME;
@@ -14,7 +14,7 @@ pub(crate) const BAUD: u32 = 115_200;
 /// Time of a byte at [`BAUD`].
 pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
-/// Relay `index` of `relays` in the paper's scenario.
+/// Creates relay `index` of `relays` in the paper's scenario.
 pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     let mission = Mission::try_new(fixtures::paper(relays)).unwrap();
     let settings = Settings {
@@ -24,10 +24,10 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// A driver of either wiring over ports of either kind.
+/// Driver of either wiring over ports of either kind.
 pub(crate) trait Driver {
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
-    /// Upstream or shared, then downstream.
+    /// Returns the counters of the upstream or shared port, then the downstream port.
     fn stats(&self) -> Vec<SerialStats>;
 }
 
@@ -57,7 +57,6 @@ pub(crate) enum Kind {
     Io,
 }
 
-/// A relay with its ports.
 pub(crate) struct Node {
     pub(crate) relay: Relay,
     pub(crate) driver: Box<dyn Driver>,
@@ -93,7 +92,7 @@ impl Node {
     }
 }
 
-/// A chain with wires, or a channel, that hold `capacity` bytes. The far ends of the first and last wire come with it.
+/// Creates a chain with wires, or a channel, of `capacity` bytes. Returns the outer ends of the wires too.
 pub(crate) fn chain(
     kind: Kind,
     wiring: Wiring,
@@ -124,7 +123,7 @@ pub(crate) fn chain(
     (nodes, far)
 }
 
-/// Polls all nodes whenever one of them wants to be polled or has bytes to read, and checks what `poll` promises.
+/// Polls nodes when they are due or have bytes to read, and checks the guarantees of `poll`.
 pub(crate) fn run(nodes: &mut [Node], from: Instant, until: Instant) -> Instant {
     let mut now = from;
     while now < until {
@@ -155,7 +154,7 @@ pub(crate) fn setpoints(nodes: &[Node]) -> Vec<Option<Placement>> {
     nodes.iter().map(|node| node.relay.setpoint()).collect()
 }
 
-/// Where the same relays go when frames are handed from one to the next by the test.
+/// Returns the positions of the relays when frames are passed directly, without ports.
 pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
     let mut chain: Vec<Relay> = (1..=relays)
         .map(|index| relay(relays, index, Wiring::Pair))
@@ -182,7 +181,6 @@ pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
     chain.iter().map(Relay::setpoint).collect()
 }
 
-/// Whether a neighbour has been lost so far.
 pub(crate) fn has_lost(node: &Node, side: Side) -> bool {
     node.events
         .iter()

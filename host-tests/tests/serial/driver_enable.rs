@@ -1,4 +1,4 @@
-//! The driver-enable pin: high while a byte is on its way, low otherwise.
+//! Driver-enable pin: high while bytes leave, low otherwise.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -9,7 +9,7 @@ use uav_relay::{Instant, Wiring};
 use crate::chain::{BAUD, BYTE_TIME, relay};
 use crate::uart::{Bench, IoUart, Pin, Uart};
 
-/// A relay that calls for a neighbour who is not there, for `millis` by the real clock; returns what was counted for the pin.
+/// Runs a relay that calls a missing neighbour for `millis` of real time. Returns the pin's error count.
 fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     let pin = Pin(Rc::clone(bench));
     let mut driver = Shared::new(SerialLink::half_duplex(port, BAUD, pin));
@@ -25,7 +25,7 @@ fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     driver.channel.stats().pin
 }
 
-/// Checks every byte against the edges; `late` is how long the pin may stay high after the last byte of a burst.
+/// Checks every byte against the edges; the pin may stay high for `late` after the last byte of a burst.
 fn check(bench: &Bench, late: u64, name: &str) {
     let mut edges = bench.edges.iter();
     assert_eq!(
@@ -87,7 +87,7 @@ fn the_driver_is_enabled_while_bytes_leave_and_no_longer() {
 
             let bench = Rc::new(RefCell::new(Bench::default()));
             call(Io(IoUart(uart(&bench))), &bench, 20_000);
-            // The bytes of one poll count from the next one on.
+            // The bytes of a poll are only counted at the next one.
             check(
                 &bench.borrow(),
                 3 * byte_time + 4 * lag,

@@ -1,4 +1,4 @@
-//! The facade over serial ports, on ports that hold a byte or three, fail, or are never read.
+//! Facade over serial ports that hold few bytes, fail, or are never read.
 
 mod chain;
 mod driver_enable;
@@ -37,7 +37,7 @@ fn a_chain_on_ports_of_any_size_settles_where_the_bare_relays_do() {
 #[test]
 fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
     for kind in KINDS {
-        // Relay 2 of 3, whose wire toward relay 1 ends at nobody; relay 3 is well.
+        // Relay 2 of 3; its wire toward relay 1 is never read, relay 3 works.
         let [nobody, deaf] = End::wire(3);
         let [up, down] = End::wire(16);
         let [last, _rx] = End::wire(16);
@@ -57,17 +57,17 @@ fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
             "{kind:?}: what cannot be sent is counted"
         );
         assert_eq!(stats[1], SerialStats::default(), "{kind:?}");
-        // 128 byte times between attempts at the deaf end, and a little for the other one.
+        // Attempts at the blocked end are 128 byte times apart, plus a few polls for the other end.
         assert!(
             nodes[0].polls < 35_000,
             "{kind:?}: {} polls",
             nodes[0].polls
         );
-        // Nothing is lost in between: sent is what was dropped, and what is in the wire and the link.
+        // Frames are sent, dropped, in the wire or in the link, but none is lost.
         let sent = nodes[0].relay.stats().sent;
         assert!(sent > stats[0].dropped + 2, "{kind:?}: {sent}");
 
-        // Somebody begins to read: whole frames come out, the next one included.
+        // Once the end is read, whole frames arrive, the next one included.
         let mut heard = Vec::new();
         let mut now = now;
         for _ in 0..400 {
@@ -105,7 +105,7 @@ fn on_a_shared_channel_frames_wait_in_the_relay_and_none_is_dropped() {
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(60_000));
         assert_eq!(nobody.waiting(), 3);
         assert_eq!(nodes[0].driver.stats()[0], SerialStats::default());
-        // Two frames in the link at most, and a repetition cannot be sent before there is room.
+        // At most two frames are in the link, and a retransmission waits for room.
         assert!(nodes[0].relay.stats().sent <= 3, "{kind:?}");
 
         let mut now = now;
@@ -126,12 +126,12 @@ fn read_errors_are_counted_by_kind_and_survived() {
             let (mut nodes, _far) = chain(kind, wiring, 3, 16, &Trouble::times(10, 40));
             run(&mut nodes, Instant::ZERO, Instant::from_millis(30_000));
             assert_eq!(setpoints(&nodes), expected, "{kind:?} {wiring:?}");
-            // The second relay hears both of its neighbours.
+            // The second relay receives both neighbours.
             let stats = nodes[1].driver.stats()[0];
             let counted = [stats.overrun, stats.framing, stats.parity, stats.noise];
             match kind {
                 Kind::Nb => assert!(counted.iter().all(|&count| count >= 1), "{stats:?}"),
-                // These ports do not say what it was, and may hand over what came before instead.
+                // These ports do not tell the kind of error, and may return earlier bytes instead.
                 Kind::Io => assert!(counted == [0; 4] && stats.other >= 1, "{stats:?}"),
             }
             let rejected: u32 = nodes.iter().map(|node| node.relay.stats().rejected()).sum();
@@ -174,7 +174,7 @@ fn a_poll_reads_no_more_than_its_limit_and_asks_to_be_called_soon() {
             assert_eq!(wake, soon, "{kind:?}");
             now = now + BYTE_TIME;
         }
-        // Nothing to read and nothing to write: the relay's own time is all that is left.
+        // With idle ports only the relay's own timer is left.
         let wake = node.driver.poll(now, &mut node.relay);
         assert_eq!(wake, node.relay.poll_timeout(), "{kind:?}");
     }
@@ -183,7 +183,7 @@ fn a_poll_reads_no_more_than_its_limit_and_asks_to_be_called_soon() {
 #[test]
 fn an_idle_facade_asks_for_nothing_but_what_the_relay_asks_for() {
     for kind in KINDS {
-        // A chain of one has nothing to do once it is settled but to renew its lease, which nobody else hears of.
+        // A single settled relay only renews its lease, without frames.
         let (mut nodes, far) = chain(kind, Wiring::Pair, 1, 16, &Trouble::default());
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
         assert!(nodes[0].relay.setpoint().is_some());
@@ -196,7 +196,7 @@ fn an_idle_facade_asks_for_nothing_but_what_the_relay_asks_for() {
         );
         assert!(far.iter().all(|end| end.carried() == 0));
 
-        // A settled chain of three wakes up for heartbeats only: a handful of polls a second, not one a byte time.
+        // A settled chain of three wakes up for heartbeats only: a few polls a second.
         let (mut nodes, _far) = chain(kind, Wiring::Pair, 3, 1000, &Trouble::default());
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
         for node in &mut nodes {

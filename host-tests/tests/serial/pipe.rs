@@ -1,4 +1,4 @@
-//! Ports over queues of a few bytes: a wire between two ends, or a channel that everybody hears.
+//! Ports over short queues: a wire between two ends, or a shared channel.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -6,18 +6,17 @@ use std::rc::Rc;
 
 use embedded_hal_nb::serial::ErrorKind;
 
-/// What carries bytes from one end to all others.
+/// Medium that carries bytes from one end to all others.
 struct Medium {
-    /// What has arrived at each end and has not been read.
+    /// Bytes that have arrived at each end and are unread.
     inboxes: Vec<VecDeque<u8>>,
     capacity: usize,
-    /// Whether one end speaks at a time, a frame long, as a modem with carrier sense sees to it.
+    /// True if one end at a time sends a frame, as with carrier sense.
     turns: bool,
     talker: Option<usize>,
     carried: usize,
 }
 
-/// One end of a medium.
 #[derive(Clone)]
 pub(crate) struct End {
     medium: Rc<RefCell<Medium>>,
@@ -41,27 +40,27 @@ impl End {
             .collect()
     }
 
-    /// The two ends of a full-duplex wire with `capacity` bytes in it each way.
+    /// Creates a full-duplex wire with `capacity` bytes in each direction.
     pub(crate) fn wire(capacity: usize) -> [Self; 2] {
         Self::medium(2, capacity, false).try_into().ok().unwrap()
     }
 
-    /// The ends of a channel that everybody hears.
+    /// Creates a shared channel.
     pub(crate) fn channel(ends: usize, capacity: usize) -> Vec<Self> {
         Self::medium(ends, capacity, true)
     }
 
-    /// Bytes that wait to be read here.
+    /// Returns the number of unread bytes.
     pub(crate) fn waiting(&self) -> usize {
         self.medium.borrow().inboxes[self.number].len()
     }
 
-    /// Bytes that any end has sent.
+    /// Returns the number of bytes sent by all ends.
     pub(crate) fn carried(&self) -> usize {
         self.medium.borrow().carried
     }
 
-    /// Puts bytes here as if they had come in.
+    /// Adds received bytes.
     pub(crate) fn stuff(&self, bytes: &[u8]) {
         self.medium.borrow_mut().inboxes[self.number].extend(bytes);
     }
@@ -89,7 +88,7 @@ impl End {
     }
 }
 
-/// Read errors in turn, one every so many bytes, each of which loses its byte.
+/// Read errors at regular intervals, each of which loses its byte.
 #[derive(Clone, Default)]
 pub(crate) struct Trouble {
     pub(crate) every: usize,
@@ -126,7 +125,7 @@ impl Trouble {
     }
 }
 
-/// An end behind `embedded_hal_nb`.
+/// End behind `embedded_hal_nb`.
 pub(crate) struct NbEnd {
     pub(crate) end: End,
     pub(crate) trouble: Trouble,
@@ -166,7 +165,7 @@ mod as_nb {
     }
 }
 
-/// An end behind `embedded_io`, which panics where a real one would block.
+/// End behind `embedded_io`, which panics where a real one would block.
 pub(crate) struct IoEnd {
     pub(crate) end: End,
     pub(crate) trouble: Trouble,
@@ -190,7 +189,7 @@ mod as_io {
         fn read(&mut self, into: &mut [u8]) -> Result<usize, ErrorKind> {
             assert!(self.end.waiting() > 0, "this read would block");
             let mut count = 0;
-            // Never more than 5 at once, though more may be there: the trait allows that.
+            // The trait permits reads of fewer bytes than available: here at most 5.
             for place in into.iter_mut().take(5) {
                 let Some(byte) = self.end.get() else { break };
                 if self.trouble.strike().is_some() {

@@ -1,4 +1,4 @@
-//! A half-duplex UART that takes its time, and the driver-enable pin next to it: every byte and every edge is recorded.
+//! Half-duplex UART with transmission times, and its driver-enable pin: every byte and edge is recorded.
 
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -6,16 +6,15 @@ use std::rc::Rc;
 
 use embedded_hal::digital::{ErrorKind, ErrorType, OutputPin};
 
-/// Times are in microseconds.
+/// Recorded bytes and edges; times are in microseconds.
 #[derive(Default)]
 pub(crate) struct Bench {
-    /// The real time, which runs on while a poll computes.
+    /// Real time, which advances during a poll.
     pub(crate) clock: u64,
-    /// When each byte begins to leave and when it has left.
+    /// Start and end of each byte.
     pub(crate) bytes: Vec<(u64, u64)>,
-    /// Every change of the pin.
     pub(crate) edges: Vec<(u64, bool)>,
-    /// How often the pin still refuses to be set low, and high.
+    /// Remaining failures to set the pin low, and high.
     pub(crate) refusals: [u32; 2],
 }
 
@@ -32,9 +31,9 @@ impl Bench {
 pub(crate) struct Uart {
     pub(crate) bench: Rc<RefCell<Bench>>,
     pub(crate) byte_time: u64,
-    /// Bytes it holds beside the one that is leaving.
+    /// Size of the FIFO, without the byte that is leaving.
     pub(crate) fifo: u64,
-    /// How long the computing between two reads of the clock takes.
+    /// Computing time between two reads of the clock.
     pub(crate) lag: u64,
 }
 
@@ -52,13 +51,12 @@ impl Uart {
         bench.bytes.push((start, start + self.byte_time));
     }
 
-    /// There is never anything to read, but looking for it takes time.
+    /// Reads take time, but there are never bytes to read.
     fn look(&self) {
         self.bench.borrow_mut().clock += self.lag;
     }
 }
 
-/// The same, behind `embedded_io`.
 pub(crate) struct IoUart(pub Uart);
 
 mod as_nb {

@@ -1,4 +1,4 @@
-//! The view from above: where there is room beside the line, and nowhere else.
+//! View from above, present only if there is lateral room.
 
 use roxmltree::{Document, Node};
 use uav_relay_scenario::{Scenario, mission};
@@ -6,10 +6,10 @@ use uav_relay_sim::svg::{Picture, Room, draw, room};
 
 use super::{all, chain, extent, has_text, level, number, tip};
 
-/// The view from the side ends here, the legend's height less.
+/// Bottom of the view from the side, without the legend.
 const SIDE: f64 = 282.0;
 
-/// A chain that swings out to the left of an interferer on its right, over `edge` of the room's half.
+/// Returns a chain that bends to the left of its interferer, over `edge` of half the room.
 fn swung(relays: usize, edge: f64) -> Picture {
     let picture = chain(relays, 1000.0, |share| 20.0 + 800.0 * share * (1.0 - share));
     let share = |number: usize| number as f64 / (relays as f64 + 1.0);
@@ -54,7 +54,7 @@ fn gallery() -> Vec<Picture> {
     pictures
 }
 
-/// Height of the picture, and where the shapes of this class are in it: from the side, and from above.
+/// Returns the picture's height, and the coordinates of a class's shapes, from the side and from above.
 fn parts<'a>(
     document: &'a Document<'a>,
     tag: &'a str,
@@ -75,7 +75,7 @@ fn without_room_beside_the_line_there_is_one_view() {
     assert!(all(&document, "line", "edge").is_empty());
 }
 
-/// Relays that stay on the line, and an interferer beside it: from the side alone it would seem to be below the chain.
+/// Checks an interferer beside a straight chain, which seems to be below it in a side view.
 #[test]
 fn an_interferer_beside_the_line_is_seen_beside_it() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
@@ -104,7 +104,7 @@ fn an_interferer_beside_the_line_is_seen_beside_it() {
     }
 }
 
-/// y of the top corner of a marker that has a tip.
+/// Returns y of the top corner of a marker with a tooltip.
 fn top(mark: &Node) -> Option<f64> {
     mark.children().find(|child| child.has_tag_name("title"))?;
     let start = mark.attribute("d")?[1..].split('L').next()?;
@@ -143,7 +143,7 @@ fn both_views_have_every_relay_and_every_hop_inside_the_frame() {
     }
 }
 
-/// y grows downward: it is to the right of x. The places of relays, interferer and edges are to one scale.
+/// Checks the common scale of relays, interferer and edges; y grows downward, to the right of x.
 #[test]
 fn the_view_from_above_is_to_scale() {
     let picture = swung(8, 0.9);
@@ -178,7 +178,7 @@ fn the_view_from_above_is_to_scale() {
             (x.parse().unwrap(), y.parse().unwrap())
         })
         .collect();
-    // From the side it is on the ground, from above at its place: the top corner is 6 above.
+    // The interferer is on the ground from the side, and at its position from above: the top corner is 6 above.
     let [side, above] = tops[..] else {
         panic!("{tops:?}")
     };

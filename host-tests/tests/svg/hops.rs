@@ -1,4 +1,4 @@
-//! Relays and hops: as many as there are, joined, told apart by colour and by numbers that never cover each other.
+//! Relays and hops: complete, connected, coloured, with numbers that never overlap.
 
 use super::*;
 
@@ -51,7 +51,7 @@ fn hops_join_the_nodes_from_tx_to_rx() {
             (number(relay, "cx"), number(relay, "cy"))
         );
     }
-    // Relays rise along the chain, and both ends stand on the ground.
+    // Relays rise along the chain, and both ends are on the ground.
     assert!(
         relays
             .windows(2)
@@ -101,7 +101,7 @@ fn short_chains_have_every_number_and_long_ones_a_few() {
         let document = Document::parse(&svg).unwrap();
         let sirs = all(&document, "text", "sir");
         assert!((6..=21).contains(&sirs.len()), "{} numbers", sirs.len());
-        // Whatever is left out, the worst hop's is not.
+        // The worst hop's number is always shown.
         assert!(sirs.iter().any(|text| words(text) == "0.0"), "{relays}");
         let mut row: Vec<[f64; 4]> = sirs.iter().map(|text| extent(text, 10.0)).collect();
         row.retain(|extent| extent[3] == row_of_most(&sirs));
@@ -114,7 +114,7 @@ fn short_chains_have_every_number_and_long_ones_a_few() {
     }
 }
 
-/// The height at which most of some texts stand.
+/// Returns the height of most of the texts.
 fn row_of_most(texts: &[Node]) -> f64 {
     let heights: Vec<f64> = texts.iter().map(|text| number(text, "y")).collect();
     let count = |height: f64| heights.iter().filter(|other| **other == height).count();

@@ -1,4 +1,4 @@
-//! Chains that have lost relays, and the strip of what happened to them.
+//! Chains that have lost relays, and the strip of events.
 
 use roxmltree::Document;
 use uav_relay_sim::svg::{Picture, draw};
@@ -28,7 +28,7 @@ fn hops_pass_by_relays_that_are_not_in_the_chain_any_more() {
         hops.iter()
             .all(|hop| !hop.attribute("style").unwrap().contains("dasharray"))
     );
-    // Nobody is left: then there is no chain to draw.
+    // Without relays there is no chain to draw.
     picture.left_out = (1..=8).collect();
     picture.hop_sir.clear();
     let svg = draw(&picture);

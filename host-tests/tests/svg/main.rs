@@ -1,4 +1,4 @@
-//! Pictures of chains: well-formed, complete, and readable at every size, as far as a program can tell.
+//! Pictures of chains: well-formed, complete and readable at every size.
 
 mod above;
 mod hops;
@@ -9,10 +9,10 @@ mod plot;
 use roxmltree::{Document, Node};
 use uav_relay_sim::svg::{Picture, draw};
 
-/// The picture's size, from its view box.
+/// Size of the picture's view box.
 const SIZE: (f64, f64) = (480.0, 330.0);
 
-/// A chain of equally spaced relays with made-up SIRs, the worst (0 dB) in the middle.
+/// Returns a chain of equally spaced relays with artificial SIRs, the worst (0 dB) in the middle.
 fn chain(relays: usize, distance_m: f64, altitude: impl Fn(f64) -> f64) -> Picture {
     let hops = relays as f64 + 1.0;
     let share = |number: usize| number as f64 / hops;
@@ -35,7 +35,7 @@ fn level(relays: usize) -> Picture {
     chain(relays, 1000.0, |_| 20.0)
 }
 
-/// Pictures that between them hold everything a picture can hold.
+/// Returns pictures with all possible contents.
 fn gallery() -> Vec<Picture> {
     let mut pictures: Vec<Picture> = [1, 2, 8, 20, 21, 50, 100, 1000].map(level).into();
     pictures.push(chain(5, 10.0, |_| 20.0));
@@ -95,7 +95,7 @@ fn number(node: &Node, name: &str) -> f64 {
     node.attribute(name).unwrap().parse().unwrap()
 }
 
-/// What a reader sees of a text: all of it, parts included, in one go.
+/// Returns the visible text of a node and its parts.
 fn words(node: &Node) -> String {
     node.descendants()
         .filter(Node::is_text)
@@ -118,7 +118,7 @@ fn tip(node: &Node) -> String {
     )
 }
 
-/// The rectangle a number beside a hop or a relay covers, with letters of ordinary width.
+/// Returns the rectangle that a number covers, with letters of ordinary width.
 fn extent(node: &Node, size: f64) -> [f64; 4] {
     let (x, y) = (number(node, "x"), number(node, "y"));
     let half = 0.5 * 0.556 * size * words(node).chars().count() as f64;

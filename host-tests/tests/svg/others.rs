@@ -1,4 +1,4 @@
-//! Interferers that are not there: of a mission that was replaced in flight, and one that is only believed in.
+//! Interferers of a replaced mission, and estimated interferers.
 
 use roxmltree::{Document, Node};
 use uav_relay_sim::svg::{Others, Picture, draw};
@@ -19,11 +19,11 @@ fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
     );
     let [words] = all(&document, "text", "faint").try_into().unwrap();
     assert_eq!(words.text(), Some("before"));
-    // Between the relays that stand at the same share of the line.
+    // The text is between the relays at the same fraction of the line.
     let relays = all(&document, "circle", "relay");
     let (left, right) = (number(&relays[0], "cx"), number(&relays[1], "cx"));
     assert!((left..right).contains(&number(&words, "x")));
-    // Nothing else in the picture is another one.
+    // The rest of the picture is the same.
     let plain = Document::parse(&without).unwrap();
     for (name, class) in [("line", "hop"), ("circle", "relay"), ("path", "source")] {
         let shapes = |document: &Document| -> Vec<Vec<String>> {
@@ -37,7 +37,7 @@ fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
     }
 }
 
-/// Where the present one's marker is, far off the chain, or nowhere.
+/// Checks positions at the present interferer, far off the chain, and undefined.
 #[test]
 fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
     let same = level(8).interferers;
@@ -55,7 +55,7 @@ fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
     }
 }
 
-/// Next to the true one, too: that is what the picture is looked at for.
+/// Checks that the estimate is drawn even next to the true position.
 #[test]
 fn what_is_believed_is_drawn_beside_what_is_true() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {

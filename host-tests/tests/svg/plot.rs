@@ -1,4 +1,4 @@
-//! What they are drawn on: axes, interferers inside and beyond the plot, and who is silent.
+//! Axes, interferers inside and outside the plot, and silent relays.
 
 use super::*;
 
@@ -73,7 +73,7 @@ fn interferers_beyond_the_plot_are_pointed_to() {
         &document,
         "interferer 40 W, x = 5000 m, |y| = 400 m"
     ));
-    // The nearer ones are on the axis, which is longer for their sake, and are told of beside their markers.
+    // Nearer ones are on the axis, which is extended for them, with text beside their markers.
     for wanted in ["30 W", "|y| = 77 m", "20 W", "|y| = 88 m"] {
         assert!(has_text(&document, wanted), "{wanted}\n{svg}");
     }
@@ -90,7 +90,7 @@ fn interferers_beyond_the_plot_are_pointed_to() {
         })
         .collect();
     assert_eq!(shapes.len(), 4);
-    // Arrows first: the left one's tip is left of its marker on the axis, the right one's right.
+    // The left arrow's tip is left of its marker on the axis, the right one's right.
     assert!(shapes[0] < shapes[3] && shapes[1] > shapes[2], "{shapes:?}");
     let rx = all(&document, "text", "bold")
         .iter()
@@ -151,7 +151,7 @@ fn silent_relays_are_crossed_out() {
         lost: vec![3, 8],
         ..level(8)
     });
-    // Two strokes each, and two in the legend.
+    // Each cross has two strokes, and the legend has two.
     assert_eq!((crosses, dashed, legend), (6, 4, true));
     assert_eq!(lost.len(), 2);
     assert!(

@@ -1,4 +1,4 @@
-//! One relay with room beside the line, against searches in f64 that know of no theorem.
+//! Single relay with lateral room, compared with searches in f64 without theorems.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +14,20 @@ use super::ALLOWED;
 use super::roomy::Roomy;
 use super::scene::Scene;
 
-/// The scenes of this file's tests: those of the theorems' own are cheaper to search.
+/// Returns the number of scenes, fewer than in the theorems' tests because the search is expensive.
 fn count() -> u64 {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(10_000)
 }
 
-/// What a scene showed.
+/// Result of a scene.
 struct Seen {
     case: String,
     short: f64,
     told: f64,
 }
 
-/// Holds what `best` finds over `band` of each scene against brute force, and counts the cases.
+/// Compares the result of `best` over `band` of each scene with brute force, and counts the cases.
 fn no_worse_than_brute_force(
     seed: u64,
     count: u64,
@@ -192,7 +192,7 @@ fn the_judge_of_three_dimensions_agrees() {
     );
 }
 
-/// Without room it is Theorem 1, and Theorem 3; with room it is never worse.
+/// Checks Theorems 1 and 3 without lateral room, and that room is never worse.
 #[test]
 fn without_room_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));

@@ -1,10 +1,9 @@
-//! The best place by brute force, which knows of no theorem.
+//! Best position by brute force, without theorems.
 
 use super::scene::Scene;
 
 impl Scene {
-    /// The best SIR over the box `x` by `h`: a dense search along lines of both directions, the box's edges among them, and
-    /// from the best three places a search of the plane about them. It knows of no theorem.
+    /// Returns the best SIR over the box `x` by `h`, by searches along lines and around the best points.
     pub(crate) fn brute(&mut self, x: (f64, f64), h: (f64, f64)) -> f64 {
         let lines = |(low, high): (f64, f64)| {
             if low < high {
@@ -45,7 +44,7 @@ impl Scene {
         }
     }
 
-    /// The best SIR of a search of the plane that closes in from `place`.
+    /// Returns the best SIR of a search of the plane around `place`.
     fn about(&mut self, place: (f64, f64), x: (f64, f64), h: (f64, f64)) -> f64 {
         let (mut at, mut up) = place;
         let mut half = ((x.1 - x.0) / 8.0, (h.1 - h.0) / 8.0);
@@ -68,8 +67,7 @@ impl Scene {
     }
 }
 
-/// The best value of `f` over `range` and where: sampled evenly and ever closer to its ends and to `near`, then refined by
-/// golden section around the best three samples.
+/// Returns the maximum of `f` over `range` and its position, by samples, denser at `near`, and golden section.
 fn along(range: (f64, f64), near: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     let (low, high) = range;
     let mut at = vec![low, high];

@@ -1,4 +1,4 @@
-//! Values of an independent program, the printed theorems' counterexamples, and interferers in degenerate places.
+//! Values of an independent program, counterexamples to the printed theorems, and degenerate interferers.
 
 use uav_relay::planning::single::{free, given_altitude, given_x, guide, locus};
 use uav_relay_oracle::cases;
@@ -100,7 +100,7 @@ fn the_reference_cases_hold() {
     }
 }
 
-/// What the printed Theorem 3 gets wrong, and the degenerate places of the interferer, by name.
+/// Checks errors of the printed Theorem 3, and degenerate positions of the interferer.
 #[test]
 fn counterexamples_and_degenerate_places() {
     let link = |d: f64, x_i: f64, y_i: f64, tx_w: f64, power_w: f64, kappa: f64| Link {
@@ -135,26 +135,26 @@ fn counterexamples_and_degenerate_places() {
         (sir - 0.7650).abs() < 1e-4 && (place.x_m - 53.127).abs() < 1e-2,
         "{sir} {place:?}"
     );
-    // The interferer on Tx: SIR_1 is the same everywhere, so it is SIR_2 that counts.
+    // Interferer on Tx: SIR_1 is constant, so SIR_2 decides.
     let (place, sir, case) = best(&link(100.0, 0.0, 0.0, 1.0, 2.0, 2.0), (5.0, 200.0));
     assert!(
         case == free::FreeCase::Lowest(given_altitude::PlaceCase::Level),
         "{case:?}"
     );
     assert!((sir - 1.0).abs() < 1e-12 && place.x_m > 99.9 && place.altitude_m < 5.1);
-    // On Rx: nothing helps.
+    // Interferer on Rx: no position helps.
     let (_, sir, case) = best(&link(100.0, 100.0, 0.0, 1.0, 2.0, 2.0), (5.0, 200.0));
     assert!(
         case == free::FreeCase::Lowest(given_altitude::PlaceCase::Drowned) && sir <= 0.0,
         "{case:?}"
     );
-    // Right beside Tx: SIR_1 only falls.
+    // Interferer right beside Tx: SIR_1 only falls.
     let mut scene = Scene::new(&link(100.0, 0.0, 30.0, 1.0, 2.0, 2.0), (5.0, 5.0));
     let (found, case) = given_altitude::best_place(&scene.mission, scene.profile(5.0)).unwrap();
     assert!(case == given_altitude::PlaceCase::Crossing, "{case:?}");
     let most = scene.brute((0.0, 100.0), (5.0, 5.0));
     assert!(scene.sir_of(&found) >= most * (1.0 - 1e-6));
-    // Outside [0, D] there is no place to be given.
+    // Outside [0, D] there is no position.
     for x_m in [-1.0, 100.1, f32::NAN] {
         assert!(given_x::best_place(&scene.mission, x_m, 1.0).is_none());
     }

@@ -1,4 +1,4 @@
-//! Where the hops are equal, where SIR_1 turns, and at which powers the cases change.
+//! Equal hops, extrema of SIR_1, and power ratios at which the cases change.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,14 +30,14 @@ fn the_locus_is_where_the_hops_are_equal() {
             let here = difference(&mut scene, f64::from(h));
             let beside = difference(&mut scene, f64::from(h) * (1.0 + 3e-7))
                 - difference(&mut scene, f64::from(h) * (1.0 - 3e-7));
-            // A double root is where the difference touches zero, and f64 has half its digits there.
+            // At a double root the difference touches zero, and f64 has half its digits there.
             assert!(
                 here.abs() <= beside.abs() + 1e-6,
                 "{x} {h}: {here:e} in {:?}",
                 scene.link
             );
         }
-        // None is missed: the difference changes its sign nowhere else.
+        // The difference changes its sign at no other position.
         let found: Vec<f64> = found.into_iter().flatten().map(f64::from).collect();
         roots[found.len()] += 1;
         let mut before: Option<(f64, f64)> = None;
@@ -75,14 +75,14 @@ fn turns_agree_with_a_scan() {
         };
         let (link, h) = (&scene.link, scene.band.0);
         let sir = |x: f64| link.sir_relay(1, 0.0, x).unwrap();
-        // By more than f64's own rounding: next to Tx an interferer leaves SIR_1 all but level.
+        // The tolerance is f64 rounding: next to Tx an interferer leaves SIR_1 almost constant.
         let rises = |x: f64, by: f64| sir(x * (1.0 + by)) > sir(x * (1.0 - by)) * (1.0 + 1e-14);
         match first_hop_turn(
             &scene.mission,
             scene.mission.interferer().unwrap(),
             h as f32,
         ) {
-            // So far away that f64 cannot tell the bottom from its surroundings.
+            // The minimum is too far away for f64 to resolve it.
             Extremum::Valley(x) if f64::from(x) > 100.0 * link.distance_m => {
                 for part in [0.01, 0.3, 1.0, 3.0] {
                     assert!(!rises(link.distance_m * part, 1e-3), "{link:?}");
@@ -100,7 +100,7 @@ fn turns_agree_with_a_scan() {
             }
             Extremum::Hill(x) => {
                 let x = f64::from(x);
-                // Where the interferer is all but beside Tx the hill is flatter than f64 can tell.
+                // With the interferer almost beside Tx the maximum is flatter than f64 resolves.
                 let top = sir(x) * (1.0 + 1e-14);
                 assert!(top >= sir(x * 0.999) && top >= sir(x * 1.001), "{link:?}");
                 seen[1] += 1;
@@ -139,7 +139,7 @@ fn turns_agree_with_a_scan() {
     assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");
 }
 
-/// p_t / p_u against C_1 to C_3 says which case of Corollary 1 applies, for X in [0, D].
+/// Checks the case of Corollary 1 given by p_t / p_u and C_1 to C_3, for X in [0, D].
 #[test]
 fn the_guide_agrees_with_the_cases() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(506));
@@ -153,7 +153,7 @@ fn the_guide_agrees_with_the_cases() {
         let (low, d) = (scene.band.0, link.distance_m);
         let guide = guide::ratios(&scene.mission, low as f32).unwrap();
         let (x, y2, h2) = (link.x_i, link.y_i * link.y_i, low * low);
-        // As the paper prints them.
+        // Formulas as printed in the paper.
         let kappa = link.mu_nlos / link.eta;
         let at_rx = y2 + (d - x) * (d - x);
         let c1 = kappa * at_rx * h2 / ((x * x + y2 + h2) * (d * d + h2));
@@ -171,7 +171,7 @@ fn the_guide_agrees_with_the_cases() {
             );
         }
         let ratio = link.tx_w / link.relays[0].power_w;
-        // On the border of two cases an f32 may take either; their places are the same there.
+        // On the border of two cases f32 may choose either; their positions are equal there.
         let border = [psi / d, ratio / c1, ratio / c2, ratio / c3];
         if border.iter().any(|at| (at - 1.0).abs() < 1e-4) {
             continue;

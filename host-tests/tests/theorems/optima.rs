@@ -1,4 +1,4 @@
-//! Theorems 1 to 3, and the limit of noise alone, against brute force.
+//! Theorems 1 to 3, and the noise-limited case, compared with brute force.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,7 +8,7 @@ use uav_relay_oracle::random::{self, log_uniform};
 use super::scene::Scene;
 use super::{ALLOWED, count};
 
-/// Holds the places that `best` finds against brute force over the box that `over` says, and counts the cases.
+/// Compares the positions of `best` with brute force over the box of `over`, and counts the cases.
 fn no_worse_than_brute_force(
     seed: u64,
     draw: impl Fn(&mut ChaCha8Rng) -> Scene,
@@ -126,7 +126,7 @@ fn theorem_1_in_noise_is_no_worse_than_brute_force() {
             (found, format!("{case:?}"))
         },
     );
-    // All but that SIR_1 is level, and the one more.
+    // Every case occurs but a constant SIR_1, and the one that noise adds.
     assert_eq!(seen.len(), 10, "every case: {seen:?}");
     assert!(!seen.contains_key("Level") && seen.contains_key("SecondHill"));
 }
@@ -193,7 +193,7 @@ fn noise_is_no_worse_than_brute_force() {
             let power_w = link.relays[0].power_w;
             first.min(power_w / (link.eta * (gap * gap + h2) * f64::from(noise.receiver_w)))
         };
-        // The one falls and the other rises: the worse of them has a single top, which a search of thirds finds.
+        // One SNR falls and the other rises: their minimum has a single maximum, which ternary search finds.
         let (mut low, mut high) = (0.0, link.distance_m);
         for _ in 0..120 {
             let third = (high - low) / 3.0;

@@ -1,4 +1,4 @@
-//! A scene with room above and to the sides, and its optimum by brute force.
+//! Scene with room above and to the sides, and its optimum by brute force.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +10,6 @@ use uav_relay_oracle::reference::joint::{Place, sir};
 
 use super::scene::Scene;
 
-/// A scene with room beside the line.
 pub(crate) struct Roomy {
     pub(crate) scene: Scene,
     pub(crate) lateral: (f64, f64),
@@ -33,14 +32,14 @@ impl Roomy {
         }
     }
 
-    /// The same with noise.
+    /// Draws a scene with noise.
     pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
         let silent = Self::random(rng);
         let link = random::in_noise(rng, &silent.scene.link);
         Self::new(Scene::new(&link, silent.scene.band), silent.lateral)
     }
 
-    /// As [`Scene::random`], some on the line or next to Tx or Rx; room to both sides, to one, or none.
+    /// Draws a scene, some with the interferer on the line or at an end; room on both sides, one, or none.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let mut scene = Scene::random(rng);
         let d = scene.link.distance_m;
@@ -97,8 +96,7 @@ impl Roomy {
         [(0.0, self.scene.link.distance_m), self.lateral, band]
     }
 
-    /// The best SIR over the box: a grid over all of it, even and ever closer to where a hop begins or ends, and from each of
-    /// its best places that are well apart a search with random steps.
+    /// Returns the best SIR over the box, by a grid and random searches from its best separated points.
     pub(crate) fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
         let of = [
@@ -132,8 +130,7 @@ impl Roomy {
             .fold(0.0, f64::max)
     }
 
-    /// The best SIR of a search from `at`: steps in random directions, each axis with its own length, shorter and shorter ones
-    /// where none is better. Steps along the axes alone would stay on the ridges on which the best places lie.
+    /// Returns the best SIR of a random search from `at`. Axis-parallel steps would stick to ridges.
     pub(crate) fn about(&self, mut at: [f64; 3], ranges: [(f64, f64); 3]) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut most = self.sir(at);
@@ -160,7 +157,7 @@ impl Roomy {
     }
 }
 
-/// Places over a range: its ends, evenly, and about each of `near` ever closer.
+/// Returns samples of a range: its ends, even ones, and denser ones around each of `near`.
 pub(crate) fn marks((low, high): (f64, f64), near: &[f64]) -> Vec<f64> {
     let mut at = vec![low, high];
     for step in 1..12 {

@@ -1,4 +1,4 @@
-//! One relay, one interferer, and a judge of places that shares no formula with the crate.
+//! Single relay and interferer, with SIRs that share no formula with the crate.
 
 use rand::{Rng, RngExt};
 use uav_relay::planning::single::Found;
@@ -8,7 +8,7 @@ use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-/// One relay, its link as the relay's own f32 numbers, and the band it may choose from.
+/// Single relay, its link in the relay's f32 precision, and its band.
 pub(crate) struct Scene {
     pub(crate) link: Link,
     pub(crate) band: (f64, f64),
@@ -36,7 +36,7 @@ impl Scene {
         }
     }
 
-    /// 10 m to 100 km, the interferer before, between, beyond, on Tx, on Rx, on the line; the lowest altitude 0.002 to 0.5 of D.
+    /// Draws a scene of 10 m to 100 km with the interferer anywhere; lowest altitude 0.002 to 0.5 of D.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let style = Style {
             relays: 1..=1,
@@ -52,7 +52,7 @@ impl Scene {
         Self::new(&link, (low, high))
     }
 
-    /// The same with noise, from all but none to some that drowns the interferer.
+    /// Draws a scene with noise, from almost none to far above the interference.
     pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
         let scene = Self::random(rng);
         let link = random::in_noise(rng, &scene.link);
@@ -63,7 +63,7 @@ impl Scene {
         Self::new(&case.link(1), (case.params.h_min, case.params.h_max))
     }
 
-    /// The worse SIR of the two hops, in f64, with received powers instead of the crate's formulas.
+    /// Returns the worse SIR of both hops, in f64 from received powers.
     pub(crate) fn sir(&mut self, x: f64, h: f64) -> f64 {
         self.link.relays[0].altitude_m = h;
         let first = self.link.sir_relay(1, 0.0, x).unwrap();

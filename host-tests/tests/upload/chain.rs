@@ -4,10 +4,9 @@ use uav_relay::{Adjust, Band, Local, Method, Profile, Schedule};
 
 use super::*;
 
-/// When the upload begins.
 const AT: Instant = seconds(20);
 
-/// Runs `setup` with an upload of `config`; how long after its beginning the last relay took its place, ms, and bytes.
+/// Runs `setup` with an upload of `config`. Returns the time until all have positions, ms, and the bytes.
 fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     let mut calm = setup.clone();
     calm.partitions.clear();
@@ -21,7 +20,7 @@ fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
         let relays = outcome.relays.iter();
         relays.map(|relay| relay.stats.rejected()).sum()
     };
-    // A pulse that is under way when the proposal comes, and what is said again of it, is stale to each relay once at most.
+    // A renewal in transit at the time of the proposal, and its retransmission, are stale at each relay at most once.
     let most = refused(&before) + u32::from(setup.mission.relays());
     assert!(refused(&outcome) <= most, "{}", refused(&outcome));
     let settled = |moment: &&Moment| moment.what == Turning::Converged;
@@ -39,7 +38,7 @@ fn a_new_place_of_the_interferer_is_flown_by_all_wherever_it_is_uploaded() {
                 let config = moved(&base, 700.0, -300.0);
                 let (took, bytes) = fly(signed(base, shared), end, config);
                 println!("{relays} relays, shared {shared}, {end:?}: {took} ms, {bytes} bytes");
-                // An offer, a hello, a proposal, a count, a sweep and a verdict a hop, each within two of the links' hop times.
+                // An offer, a hello, a proposal, a decision, a sweep and a verdict per hop, each within two hop times.
                 assert!(took < 200 * u64::from(relays) + 300, "{took} ms");
             }
         }
@@ -77,7 +76,7 @@ fn a_new_band_of_altitudes_is_climbed_into_from_where_the_relays_are() {
     ] {
         let mut setup = signed(base, true);
         setup.settings.method = method;
-        // One of them keeps its own altitude and power, whatever the mission.
+        // One relay keeps its own altitude and power, whatever the mission.
         setup.profiles = vec![(
             2,
             Profile {
@@ -123,7 +122,7 @@ fn every_parameter_but_the_number_of_relays_may_change() {
 fn a_newer_version_overtakes_an_older_one() {
     let base = mission(8);
     let (one, two) = (moved(&base, 700.0, -300.0), moved(&base, 100.0, 500.0));
-    // From the same end and from the other, at every stage of the first upload.
+    // The newer version comes from the same or the other end, at every stage of the first upload.
     for ms in (0..600).step_by(20) {
         for other in [Side::Upstream, Side::Downstream] {
             let mut setup = signed(base, true);
@@ -153,7 +152,7 @@ fn an_older_version_changes_nothing_and_of_one_version_all_fly_the_same() {
     setup.deadline = seconds(200);
     let outcome = run(setup.clone()).unwrap();
     judge(&setup, &outcome, 7, one).unwrap();
-    // Two operators who do not know of each other.
+    // Two operators upload at the same time.
     for ms in (0..400).step_by(40) {
         let at = Instant::from_millis(20_000 + ms);
         setup.uploads = vec![
@@ -174,7 +173,7 @@ fn an_older_version_changes_nothing_and_of_one_version_all_fly_the_same() {
 #[test]
 fn an_infeasible_mission_is_followed_by_a_feasible_one() {
     let base = mission(3);
-    // With fixed steps there is no place for a target below the first one.
+    // With fixed steps there is no position for a target below the first one.
     let mut setup = signed(base, true);
     setup.settings.schedule = Schedule::FixedStep { step: 0.2 };
     let mut hopeless = moved(&base, 500.0, 0.0);

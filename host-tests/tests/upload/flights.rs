@@ -1,4 +1,4 @@
-//! Drones that fly through an upload, guarded.
+//! Guarded flights with an upload.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,10 +8,10 @@ use super::*;
 
 const SEPARATION_M: f32 = 5.0;
 
-/// What a place may be off by rounding, m: places are f32 of up to 1 km.
+/// Rounding error of a position, m: positions are f32 of up to 1 km.
 const ROUNDING_M: f64 = 2e-3;
 
-/// Eight drones that take off close to each other, and a new mission while they are under way or hover.
+/// Returns eight drones that take off close together, and a mission uploaded in flight or at hover.
 fn flight(seed: u64) -> (Setup, MissionConfig) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let base = eight_apart(SEPARATION_M);
@@ -48,11 +48,11 @@ fn no_two_come_close_on_their_way_from_one_mission_to_the_next() {
             outcome.nearest_m()
         );
         let mut ends = setup.clone();
-        // Where they are told to be in the end is what one without a guard is told.
+        // Final setpoints equal those without a guard.
         ends.settings.guard = None;
         judge(&ends, &outcome, 1, config).unwrap_or_else(|what| panic!("SEED={seed}: {what}"));
     }
-    // Without a guard some do: the test can fail.
+    // Without a guard some drones come too close, so the test is able to fail.
     let close = (1..=40).any(|seed| {
         let (mut setup, _) = flight(seed);
         setup.settings.guard = None;

@@ -1,4 +1,4 @@
-//! What a single relay does with an upload, and the ground with its answers.
+//! Single relay with an upload, and the ground station with its answers.
 
 use uav_relay::MAX_FRAME;
 use uav_relay::UploadError;
@@ -48,7 +48,7 @@ fn new_place(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, moved(base, 700.0, -300.0)).unwrap()
 }
 
-/// The ground and one relay talk for two seconds; what the relay told its firmware.
+/// Runs the ground station and one relay for two seconds. Returns the relay's events.
 fn talk(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec<Event> {
     let mut events = Vec::new();
     let mut frame = [0; MAX_FRAME];
@@ -126,7 +126,7 @@ fn a_relay_takes_over_from_its_firmware_what_is_newer() {
     assert_eq!(relay.handle_upload(now, &four), Err(UploadError::Old));
     assert_eq!(relay.handle_upload(now, &five), Err(UploadError::Old));
     assert_eq!(relay.poll_event(), None);
-    // It holds it, and does not fly it before the others hold it, too.
+    // The relay holds the mission, but does not fly it before the others hold it.
     assert_eq!((relay.version(), relay.upload()), (0, Some(&five)));
     let unsigned = Settings::default();
     let mut relay = Relay::new(base, IDENTITY, unsigned, 1, now).unwrap();
@@ -146,7 +146,7 @@ fn a_relay_resumes_what_was_made_for_its_mission() {
     let mut relay = alone(other, Wiring::Pair);
     assert_eq!(relay.resume(&five), Err(UploadError::Base));
     assert_eq!((relay.version(), relay.upload()), (0, None));
-    // Nor once it has begun.
+    // A relay that has started cannot resume.
     let mut relay = alone(base, Wiring::Pair);
     relay.handle_timeout(seconds(1));
     assert_eq!(relay.resume(&five), Err(UploadError::Begun));
@@ -186,7 +186,7 @@ fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
         );
         assert_eq!(ground.poll_timeout(), None);
         assert_eq!(relay.version(), 2);
-        // An older one is refused, and the ground is told why.
+        // An older version is refused, and the ground station learns the reason.
         ground
             .upload(Instant::from_millis(4_000), new_place(&base, 1))
             .unwrap();
@@ -197,7 +197,6 @@ fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
     }
 }
 
-/// One counter of a relay.
 type Counter = fn(&Relay) -> u32;
 
 #[test]
@@ -248,7 +247,7 @@ fn the_ground_goes_on_to_the_next_relay_when_the_nearest_is_silent() {
     for second in 0..20 {
         ground.handle_timeout(seconds(second));
         while let Some(len) = ground.poll_transmit(&mut frame) {
-            // COBS puts one byte before the header, whose second word is the destination.
+            // COBS adds one byte before the header, whose second word is the destination.
             assert!(len > 5);
             asked.push(frame[3]);
         }

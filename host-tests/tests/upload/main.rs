@@ -1,6 +1,4 @@
-//! A new mission in flight: from the ground at either end to all relays, or to none.
-//!
-//! `COUNT` and `SEED` in the environment take other schedules.
+//! Upload of a mission in flight to all relays or none; `COUNT` and `SEED` select other schedules.
 
 mod chain;
 mod flights;
@@ -20,7 +18,7 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, Turning};
 use uav_relay_sim::simulator::setup::{Setup, UploadSpec};
 
-/// `base` with the interferer somewhere else.
+/// Returns `base` with another interferer position.
 fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     MissionConfig {
         interference: Interference::Source(Interferer {
@@ -32,7 +30,7 @@ fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     }
 }
 
-/// A chain of `base` whose frames are signed, on one radio or on wires.
+/// Returns a chain of `base` with signed frames, on one radio or on wires.
 fn signed(base: Mission, shared: bool) -> Setup {
     let mut setup = if shared {
         Setup::on_shared_channel(base)
@@ -43,7 +41,6 @@ fn signed(base: Mission, shared: bool) -> Setup {
     setup
 }
 
-/// Version `version` from the ground at `end` at `at`.
 fn upload(
     base: &Mission,
     end: Side,
@@ -58,9 +55,10 @@ fn upload(
     }
 }
 
-/// Holds a run to what must be true of any: who agrees to a view flies the mission that all others in it fly, and only once as many
-/// as it has have held it; no setpoint is outside its limits, and a chain that has settled flies `version` in the places of a chain of the relays left that was given
-/// `config` before flight. What is wrong with it, if anything is.
+/// Checks a run. Returns the first fault as an error.
+///
+/// Members of a view fly the same mission, which a quorum has held; setpoints are within limits; a settled chain flies `version`
+/// in the positions of an undisturbed chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,

@@ -1,10 +1,10 @@
-//! Relays that are switched off and on again: what they fly then.
+//! Missions flown after reboots.
 
 use uav_relay::Wiring;
 
 use super::*;
 
-/// Eight relays that were uploaded a mission, all switched off and on again at once; `forgetful` ones lose it then.
+/// Runs eight relays that all reboot after an upload; `forgetful` ones lose it.
 fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     let base = mission(8);
     let mut setup = signed(base, wiring == Wiring::Shared);
@@ -20,7 +20,7 @@ fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     (setup, outcome)
 }
 
-/// Views that were agreed to after the power cut.
+/// Returns the number of views accepted after the power cut.
 fn views(outcome: &Outcome) -> usize {
     let moments = outcome
         .moments
@@ -37,7 +37,7 @@ fn a_chain_that_stores_what_was_uploaded_flies_it_at_once_when_it_is_switched_on
         let (setup, outcome) = power_cut(wiring, &[]);
         let config = *setup.uploads[0].upload.config();
         judge(&setup, &outcome, 3, config).unwrap();
-        // As a chain that was given it before flight does; but what they had said in votes they remember, so they agree on one view anew.
+        // The chain acts like one with this mission before flight, but its stored votes require one more view.
         assert_eq!(views(&outcome), 8);
         assert!(outcome.ended < seconds(43), "{:?}", outcome.ended);
     }
@@ -52,7 +52,7 @@ fn one_relay_that_has_stored_it_is_enough() {
             let config = *setup.uploads[0].upload.config();
             judge(&setup, &outcome, 3, config)
                 .unwrap_or_else(|what| panic!("{wiring:?}, kept by {keeper}: {what}"));
-            // It says so as soon as a neighbour says something that it cannot take part in.
+            // The relay reports its mission as soon as a neighbour sends messages of another one.
             assert!(outcome.ended < seconds(42), "{:?}", outcome.ended);
         }
     }

@@ -1,4 +1,4 @@
-//! Random schedules of uploads, faults, losses and reboots at eight relays.
+//! Random schedules of uploads, faults, losses and reboots for eight relays.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -7,10 +7,10 @@ use uav_relay_oracle::random::seed;
 
 use super::*;
 
-/// After the last upload, loss or start, while frames go on being lost, the chain has settled within this time.
+/// Time limit from the last upload, loss or start to a settled chain, while frames are lost.
 const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// A mission with another interferer, and at times another altitude and separation.
+/// Draws a mission with another interferer, sometimes also another altitude and separation.
 fn drawn(base: &Mission, rng: &mut ChaCha8Rng) -> MissionConfig {
     let x_m = rng.random_range(-200.0..1_200.0);
     let y_m = rng.random_range(50.0..600.0);
@@ -24,8 +24,7 @@ fn drawn(base: &Mission, rng: &mut ChaCha8Rng) -> MissionConfig {
     config
 }
 
-/// Loss up to 50 %, corruption, duplicates and reordering up to 20 %; one to three uploads in the first minute, from either end; up
-/// to three relays lost, on a radio for good or not, on wires for a while; what was uploaded is kept by all, some or none of them.
+/// Draws one to three uploads, up to three losses, frame loss up to 50 %, and relays that forget the upload.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let shared = rng.random_bool(0.8);
     let base = mission(8);
@@ -53,7 +52,7 @@ fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut relays: Vec<u16> = (1..=8).collect();
     for _ in 0..rng.random_range(0..=3) {
         let relay = relays.swap_remove(rng.random_range(0..relays.len()));
-        // In the midst of an upload, or any time.
+        // Loss during an upload, or at any time.
         let at = if rng.random() {
             let spec = setup.uploads[rng.random_range(0..setup.uploads.len())];
             spec.at.as_micros() / 1_000 + rng.random_range(0..3_000)

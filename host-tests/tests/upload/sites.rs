@@ -1,4 +1,4 @@
-//! Uploads that move the receiver: flown by all relays or by none, whatever is lost and whoever is rebooted meanwhile.
+//! Uploads that move the receiver: adopted by all relays or none, in spite of losses and reboots.
 
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Placement, Sites, Wiring};
@@ -6,7 +6,7 @@ use uav_relay_sim::simulator::fleet::spec::somewhere;
 
 use super::*;
 
-/// The ends of the line of `base`, with the receiver so far on and to the right.
+/// Returns the sites of `base` with the receiver moved forward and to the right.
 fn ends(base: &Mission, on_m: f32, right_m: f32) -> Sites {
     let distance_m = base.config().distance_m;
     let axis = somewhere(f64::from(distance_m)).unwrap();
@@ -24,7 +24,7 @@ fn ends(base: &Mission, on_m: f32, right_m: f32) -> Sites {
     }
 }
 
-/// A mission of that version to the receiver at another place.
+/// Returns an upload of `version` with another receiver site.
 fn to_another_place(base: &Mission, at: Instant, version: u16, end: Side) -> UploadSpec {
     let sites = ends(base, 150.0, 200.0);
     let mut config = moved(base, 700.0, -300.0);
@@ -44,7 +44,7 @@ fn sited(relays: u16, shared: bool) -> (Mission, Setup) {
     (base, setup)
 }
 
-/// As [`judge`]; and all relays fly between the sites of that mission, `None` for those they were loaded with.
+/// Checks a run like [`judge`], and that all relays use the mission's sites, `None` for the loaded ones.
 fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), String> {
     let spec = setup
         .uploads
@@ -67,7 +67,7 @@ fn a_receiver_that_moves_is_flown_to_by_all_and_back_again() {
             setup.uploads = vec![to_another_place(&base, seconds(20), 1, end)];
             let outcome = run(setup.clone()).unwrap();
             judge_between(&setup, &outcome, 1).unwrap();
-            // The next one has no sites: it is flown between those that were loaded.
+            // The next mission has no sites, so the loaded ones apply.
             let back = moved(&base, 300.0, 250.0);
             setup.uploads.push(upload(&base, end, seconds(40), 2, back));
             let outcome = run(setup.clone()).unwrap();
@@ -126,7 +126,7 @@ fn a_chain_that_is_rebooted_as_a_whole_flies_to_the_receiver_where_it_was_last()
         }
         let outcome = run(setup.clone()).unwrap();
         judge_between(&setup, &outcome, 1).unwrap();
-        // Those that have forgotten it have forgotten the sites with it.
+        // Relays that forgot the mission forgot its sites too.
         setup.forgetful = (1..=8).collect();
         let outcome = run(setup.clone()).unwrap();
         judge_between(&setup, &outcome, 0).unwrap();

@@ -1,4 +1,4 @@
-//! What the ground is told of an upload: how many relays fly it, that a relay refuses it, and what two ground stations do to each other.
+//! Reports to the ground station: number of relays with a mission, refusals, competing stations.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +20,7 @@ fn seed() -> u64 {
     std::env::var("SEED").map_or(1, |seed| seed.parse().unwrap())
 }
 
-/// Eight relays, a ground at either end, frames lost: the ground says that all fly it only once all do, and it says so in the end.
+/// Checks with losses and two ground stations that completion is reported once all fly, and not before.
 #[test]
 fn the_ground_says_flown_only_once_every_relay_flies_it() {
     let told: Vec<bool> = (0..count())
@@ -50,7 +50,7 @@ fn the_ground_says_flown_only_once_every_relay_flies_it() {
                             "round {round}: {:?}",
                             it.versions()
                         );
-                        // Losses may have had a relay left out of the view that was counted.
+                        // Losses may have excluded a relay from the counted view.
                         assert!(told <= relays && told >= 1, "round {round}: {told}");
                         true
                     }
@@ -85,7 +85,6 @@ fn the_ground_says_flown_only_once_every_relay_flies_it() {
     assert!(partial > 0, "the model has to see it");
 }
 
-/// What relays have that fly with a guard.
 fn guarded(base: &Mission) -> Settings {
     Settings {
         guard: Some(GuardConfig::of(base, base.config().common)),
@@ -107,7 +106,7 @@ fn at(base: &Mission, altitude_m: f32) -> MissionConfig {
     }
 }
 
-/// A chain at 120 m; `band` is what it may choose from.
+/// Returns a chain at 120 m with a choice of altitudes within `band`.
 fn at_120(relays: u16, band: Band) -> Mission {
     let config = *mission(relays).config();
     Mission::try_new(MissionConfig {
@@ -121,7 +120,7 @@ fn at_120(relays: u16, band: Band) -> Mission {
     .unwrap()
 }
 
-/// Guarded relays at their places: a relay holds its own place until it knows where it is.
+/// Places guarded relays, which need a known position.
 fn tell_places(wires: &mut Wires, base: &Mission) {
     let distance = base.config().distance_m;
     let step = distance / f32::from(base.relays() + 1);
@@ -182,14 +181,14 @@ fn an_upload_outside_the_geofence_is_refused_by_every_relay_and_the_ground_is_to
                 assert!(told.contains(&Event::UploadRefused { why }), "{told:?}");
                 wires.until(10, |_| false);
                 assert_eq!(wires.versions(), [0; 3], "{config:?}");
-                // A newer one that fits is flown, whatever was refused before.
+                // A newer valid mission is flown after the refusal.
                 let fits = moved(&base, 700.0, -300.0);
                 wires.upload(&base, end, Upload::new(&base, 6, fits).unwrap());
                 assert!(wires.until(20, over), "{:?}", wires.progress(end));
                 assert_eq!(wires.versions(), [6; 3]);
             } else {
                 assert_eq!(wires.versions(), [5; 3]);
-                // And it is flown to.
+                // The drones fly to the new positions.
                 let there = |it: &Wires| {
                     (1..=3).all(|index| {
                         it.relay(index)
@@ -203,7 +202,7 @@ fn an_upload_outside_the_geofence_is_refused_by_every_relay_and_the_ground_is_to
     }
 }
 
-/// A relay that holds an altitude of its own decides as the others do: its box is wider for that altitude alone.
+/// Checks a relay with its own altitude, whose geofence is wider only for that: it decides like the others.
 #[test]
 fn a_relay_with_an_altitude_of_its_own_refuses_what_the_others_refuse() {
     let base = at_120(3, Band::at(120.0));
@@ -232,7 +231,7 @@ fn a_relay_with_an_altitude_of_its_own_refuses_what_the_others_refuse() {
     }
 }
 
-/// Relays whose firmwares set other boxes: the ground is told though the nearest relay takes it, and a newer upload ends it.
+/// Checks different geofences: a far relay's refusal reaches the ground station, until a newer upload.
 #[test]
 fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
     let base = at_120(5, Band::at(120.0));
@@ -268,7 +267,7 @@ fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
     }
 }
 
-/// The same over wires that lose frames, from any relay of any chain.
+/// Checks a refusal by any relay over lossy wires.
 #[test]
 fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
     (0..count()).into_par_iter().for_each(|round| {
@@ -309,8 +308,7 @@ fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
     });
 }
 
-/// Two ground stations at once, one at either end: of the same version, or of two. All relays fly the newer one in the end, by its version or
-/// by its digest; whoever offered the other one is told that it is outdated. Nobody is stuck.
+/// Checks two ground stations at once: all fly the newer upload, and the other station learns of it.
 #[test]
 fn of_two_ground_stations_at_once_the_newer_upload_is_flown_by_all() {
     let settled: Vec<u64> = (0..count())
@@ -370,8 +368,7 @@ fn of_two_ground_stations_at_once_the_newer_upload_is_flown_by_all() {
     );
 }
 
-/// A ground that knows only what the relays were loaded with asks which mission is flown: from either end, with frames lost, whether the relays were
-/// given an upload or not.
+/// Checks that a ground station learns the mission in flight, from either end, with losses and uploads.
 #[test]
 fn the_ground_learns_which_mission_is_flown() {
     for round in 0..40 {
@@ -387,7 +384,7 @@ fn the_ground_learns_which_mission_is_flown() {
         let near = if end == Side::Upstream { 1 } else { relays };
         let flown = known(&wires).unwrap();
         assert_eq!((flown.by, flown.version, flown.upload), (near, 0, None));
-        // Another ground uploads from the other end.
+        // Another ground station uploads from the other end.
         let sent = Upload::new(&base, 4, moved(&base, 700.0, -300.0)).unwrap();
         wires.upload(&base, ENDS[1 - end as usize], sent);
         assert!(wires.until(300, |it| it.versions().iter().all(|it| *it == 4)));
@@ -397,7 +394,7 @@ fn the_ground_learns_which_mission_is_flown() {
         assert_eq!((flown.by, flown.version), (near, 4));
         assert_eq!(flown.upload, Some(sent), "round {round}");
         assert!(flown.flies || wires.loss > 0.0, "round {round}");
-        // It goes on from there with the next version.
+        // The first ground station continues with the next version.
         let next = Upload::new(&base, 5, moved(&base, 200.0, 100.0)).unwrap();
         wires.upload(&base, end, next);
         assert!(wires.until(300, |it| {

@@ -1,4 +1,4 @@
-//! Relays in a line, each on a wire to the next one, with a ground station at either end or at both.
+//! Relays in a row on wires, with ground stations at one end or both.
 
 use std::collections::VecDeque;
 
@@ -14,10 +14,10 @@ use super::*;
 
 const NETWORK: u16 = 7;
 
-/// From one turn of everybody's loop to the next, ms. What is sent in one turn arrives in the next.
+/// Interval of all main loops, ms; frames arrive one interval after they are sent.
 const TURN_MS: u64 = 5;
 
-/// How far a drone flies in a turn, m along each axis.
+/// Distance that a drone flies in an interval, m along each axis.
 const MOST_M: f32 = 0.05;
 
 fn auth() -> Auth {
@@ -27,30 +27,29 @@ fn auth() -> Auth {
     }
 }
 
-/// A frame on its way: to which node, and at which of its ports.
+/// Frame in transit: receiver, port and bytes.
 struct Letter {
     to: usize,
     port: Port,
     bytes: Vec<u8>,
 }
 
-/// A chain on wires that lose frames.
+/// Chain on lossy wires.
 pub(crate) struct Wires {
     relays: Vec<Relay>,
-    /// At the transmitter and at the receiver.
+    /// Ground stations at the transmitter and the receiver.
     pub(crate) grounds: [Option<Ground>; 2],
     letters: VecDeque<Letter>,
     rng: ChaCha8Rng,
     pub(crate) loss: f64,
     pub(crate) now: Instant,
-    /// Where the drones are, of relays with a guard.
+    /// Positions of guarded relays' drones.
     places: Vec<Placement>,
-    /// What each relay has told its firmware.
     pub(crate) events: Vec<Vec<Event>>,
 }
 
 impl Wires {
-    /// Relays that were loaded with `base`, each with its own `settings`.
+    /// Creates relays loaded with `base`, each with its own `settings`.
     pub(crate) fn new(base: Mission, seed: u64, settings: impl Fn(u16) -> Settings) -> Self {
         let relays: Vec<Relay> = (1..=base.relays())
             .map(|index| {
@@ -79,7 +78,7 @@ impl Wires {
         }
     }
 
-    /// Uploads `upload` from the ground at `end`, which was told that the relays were loaded with `base`.
+    /// Uploads `upload` from the ground station at `end`, which knows `base`.
     pub(crate) fn upload(&mut self, base: &Mission, end: Side, upload: Upload) {
         let now = self.now;
         let ground = self.grounds[end as usize]
@@ -87,7 +86,7 @@ impl Wires {
         ground.upload(now, upload).unwrap();
     }
 
-    /// The ground at `end`, which was told that the relays were loaded with `base`, asks which mission is flown.
+    /// Requests the mission in flight from the ground station at `end`, which knows `base`.
     pub(crate) fn ask_flown(&mut self, base: &Mission, end: Side) {
         let now = self.now;
         let ground = self.grounds[end as usize]
@@ -104,7 +103,6 @@ impl Wires {
         ground.map_or(Progress::Idle, Ground::progress)
     }
 
-    /// The versions that are flown.
     pub(crate) fn versions(&self) -> Vec<u16> {
         self.relays.iter().map(Relay::version).collect()
     }
@@ -113,7 +111,7 @@ impl Wires {
         &self.relays[index - 1]
     }
 
-    /// Drones that fly to their setpoints at once, and begin there.
+    /// Places drones that follow their setpoints from then on.
     pub(crate) fn stand(&mut self, place: impl Fn(u16) -> Placement) {
         self.places = (1..)
             .zip(&self.relays)
@@ -121,7 +119,7 @@ impl Wires {
             .collect();
     }
 
-    /// One turn of all loops.
+    /// Runs all main loops once.
     pub(crate) fn turn(&mut self) {
         self.now = Instant::from_micros(self.now.as_micros() + 1_000 * TURN_MS);
         let (now, last) = (self.now, self.relays.len() + 1);
@@ -176,7 +174,7 @@ impl Wires {
         }
     }
 
-    /// Turns until `over`, for `most_s` seconds at most; returns true if it came about.
+    /// Runs until `over`, for at most `most_s` seconds. Returns true if it holds.
     pub(crate) fn until(&mut self, most_s: u64, mut over: impl FnMut(&Self) -> bool) -> bool {
         for _ in 0..most_s * 1_000 / TURN_MS {
             self.turn();

@@ -1,5 +1,4 @@
-//! A medium of relays on the public interface alone: a clock that jumps from one event to the next, links that can be cut one way, and
-//! relays that are switched on, off and on again with the record of their votes.
+//! Event-driven medium on the public interface of `Relay`, with one-way links and reboots with stored votes.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -14,38 +13,38 @@ use uav_relay::{
 };
 use uav_relay_sim::simulator::flying::{Seen, groups};
 
-/// Bits per second of a link, and of each relay's share of the channel.
+/// Bit rate of a link, and of each relay's share of the channel.
 const BAUD: u64 = 115_200;
 
 /// Time from the last bit sent to the last bit received, µs.
 const LATENCY_US: u64 = 2_000;
 
-/// Settings of every relay, and what it stands for.
+/// Settings of the relays, and the scheduled peculiarities.
 #[derive(Clone, Debug)]
 pub(crate) struct Kind {
     pub(crate) mission: Mission,
     pub(crate) wiring: Wiring,
     pub(crate) signed: bool,
     pub(crate) seed: u64,
-    /// Distance at which a relay is received on a shared channel, in places.
+    /// Reception range on a shared channel, in positions along the chain.
     pub(crate) reach: usize,
-    /// A relay that was loaded with another mission.
+    /// Relay that is loaded with another mission.
     pub(crate) stranger: Option<(usize, Mission)>,
-    /// A relay whose epoch goes back at its second start.
+    /// Relay whose epoch goes back at its second start.
     pub(crate) goes_back: Option<usize>,
-    /// A relay of which there is a second drone with the same number and key, counted after all relays.
+    /// Relay of which a second drone exists; the copy's index follows those of all relays.
     pub(crate) copied: Option<usize>,
 }
 
-/// What happens at a time, to one relay or one link. Relays are counted from 0.
+/// Scheduled event at one relay or link. Relays are counted from 0.
 #[derive(Clone, Debug)]
 pub(crate) enum Deed {
-    /// A relay is switched on, with its record of votes and its upload where it was on before.
+    /// The relay is switched on; after a reboot with its stored votes and upload.
     On(usize),
     Off(usize),
-    /// A relay is told that the other one with its number is gone.
+    /// The relay is informed that the other drone with its number is gone.
     Clear(usize),
-    /// Frames of `from` to `to` are all lost from now on, for one more reason, or for one less.
+    /// Cuts (`Mend`: mends) the link from `from` to `to`; overlapping cuts are counted.
     Cut {
         from: usize,
         to: usize,
@@ -54,11 +53,11 @@ pub(crate) enum Deed {
         from: usize,
         to: usize,
     },
-    /// The share of frames that are lost on all links.
+    /// Fraction of frames lost on every link.
     Loss(f64),
-    /// A mission is handed to a relay.
+    /// A mission is uploaded to the relay.
     Upload(usize, Box<Upload>),
-    /// The clock of a relay steps by so many µs, not below 0.
+    /// The relay's clock steps by so many µs, but not below 0.
     Step(usize, i64),
 }
 
@@ -104,13 +103,13 @@ struct Drone {
     starts: u32,
     stored: Option<(ViewRecord, Option<Upload>)>,
     wake_us: Option<u64>,
-    /// What its clock is ahead of the time, µs.
+    /// Offset of the drone's clock from the simulated time, µs.
     ahead_us: i64,
-    /// When its transmitter is free again, by port, µs.
+    /// Time when the transmitter is free again, by port, µs.
     free_us: [u64; 2],
 }
 
-/// A chain in flight.
+/// Chain in flight.
 #[derive(Debug)]
 pub(crate) struct Air {
     kind: Kind,
@@ -122,12 +121,12 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<Seen>,
-    /// The most separate groups that flew an agreement of their own at once, and when that was.
+    /// Largest number of groups that flew different agreements at once, and the time of that.
     pub(crate) groups: usize,
     pub(crate) groups_us: u64,
-    /// Since when it has been whole, if it is.
+    /// Time since which the chain has been whole; `None` while it is not.
     pub(crate) whole_since_us: Option<u64>,
-    /// Time in which all relays but `spare` have flown one agreement, and the longest without that since the first, µs.
+    /// Time in which all relays but `spare` flew one agreement, and the longest interruption, µs.
     pub(crate) spare: usize,
     pub(crate) flown_us: u64,
     pub(crate) first_us: Option<u64>,
@@ -136,8 +135,7 @@ pub(crate) struct Air {
     changed_us: u64,
     /// Frames sent, and events by relay and name.
     pub(crate) frames: u64,
-    /// When the relay and its copy received each other last, since when both have a setpoint all the same without a loss, and the longest of
-    /// these times, µs.
+    /// Last reception between a relay and its copy, start of two setpoints, and longest duration, µs.
     received_us: [Option<u64>; 2],
     both_us: Option<u64>,
     pub(crate) longest_both_us: u64,
@@ -146,14 +144,14 @@ pub(crate) struct Air {
 }
 
 impl Drone {
-    /// What its clock shows at `us`.
+    /// Returns the drone's clock reading at simulated time `us`.
     fn clock(&self, us: u64) -> Instant {
         Instant::from_micros(us.saturating_add_signed(self.ahead_us))
     }
 }
 
 impl Air {
-    /// All relays are switched off, and all links whole.
+    /// Creates a chain with all relays switched off and all links intact.
     pub(crate) fn new(kind: Kind) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(kind.seed);
         let all = usize::from(kind.mission.relays()) + usize::from(kind.copied.is_some());
@@ -206,12 +204,10 @@ impl Air {
         self.order += 1;
     }
 
-    /// Has `deed` happen at `at_us`.
     pub(crate) fn plan(&mut self, at_us: u64, deed: Deed) {
         self.put(at_us, Happening::Deed(deed));
     }
 
-    /// Runs until `until_us`.
     pub(crate) fn run(&mut self, until_us: u64) {
         while let Some(Reverse(Entry(at_us, ..))) = self.queue.peek()
             && *at_us <= until_us
@@ -302,7 +298,7 @@ impl Air {
                 let drone = &mut self.drones[at];
                 if drone.is_on {
                     let now = drone.clock(self.now_us);
-                    // One that is refused is as old as the one held.
+                    // A refused upload is as old as the stored one.
                     let _ = drone.relay.handle_upload(now, &upload);
                     return Some(at);
                 }
@@ -317,14 +313,14 @@ impl Air {
         None
     }
 
-    /// Sends what relay `at` has to say, and takes in what is to be seen of it.
+    /// Sends the pending frames of relay `at` and updates its observed state.
     fn drain(&mut self, at: usize) {
         let now = self.drones[at].clock(self.now_us);
         let mut frame = [0; MAX_FRAME];
         if self.drones[at].is_on {
             let drone = &mut self.drones[at];
             if drone.relay.poll_timeout().is_some_and(|due| due <= now) {
-                // It came due in the same microsecond.
+                // The timer has expired in the same microsecond.
                 drone.relay.handle_timeout(now);
             }
             let upload = drone.relay.upload().copied();
@@ -417,19 +413,19 @@ impl Air {
         }
     }
 
-    /// The place of drone `at` in the whole chain, from 0.
+    /// Returns the index in the chain of drone `at`, where a copy has the index of its original.
     fn place(&self, at: usize) -> usize {
         let all = usize::from(self.kind.mission.relays());
         self.kind.copied.filter(|_| at == all).unwrap_or(at)
     }
 
-    /// State of the relays without the copied one and its copy.
+    /// Returns the state of the relays without the copied one and its copy.
     fn uncopied(&self) -> Vec<Seen> {
         let drones = (0..self.drones.len()).filter(|at| Some(self.place(*at)) != self.kind.copied);
         drones.map(|at| self.seen[at]).collect()
     }
 
-    /// Takes in for how long a relay and its copy have setpoints although both have received the other within five seconds.
+    /// Measures how long a relay and its copy both have setpoints although they receive each other.
     fn compare_copies(&mut self) {
         let Some(copied) = self.kind.copied else {
             return;
@@ -451,7 +447,7 @@ impl Air {
         }
     }
 
-    /// Takes in for how long the relays have flown, or have not.
+    /// Adds the time since the last change to the flight or to its interruption.
     pub(crate) fn measure(&mut self) {
         let span_us = self.now_us - self.changed_us;
         if self.flies {
@@ -469,7 +465,7 @@ impl Air {
         self.flies = flies;
     }
 
-    /// How many relays fly the largest agreement that all of its view fly.
+    /// Returns the size of the largest group of relays that fly one agreement and are all members of its view.
     fn flying(&self) -> usize {
         let holds = |seen: &&Seen| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding
@@ -483,7 +479,7 @@ impl Air {
         holding.iter().filter_map(of).max().unwrap_or(0)
     }
 
-    /// Whether all relays are on, in one view of them all, and have a setpoint in it.
+    /// Returns true if all relays are on, in one complete view, with setpoints.
     fn is_whole(&self) -> bool {
         let all = usize::from(self.kind.mission.relays());
         let is_on = |at: &usize| self.seen[*at].is_on;
@@ -502,7 +498,7 @@ impl Air {
             })
     }
 
-    /// What is to be seen of each relay, for a person.
+    /// Returns the state of all relays as text.
     pub(crate) fn described(&self) -> String {
         let each = self.drones.iter().map(|drone| {
             let relay = &drone.relay;

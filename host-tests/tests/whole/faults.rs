@@ -1,4 +1,4 @@
-//! Single faults: a link that is one-way from the start, one that flaps, a relay of another mission, an epoch that goes back.
+//! Single faults: a one-way link, a flapping link, a relay with another mission, an epoch that goes back.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,13 +10,13 @@ use super::number;
 use super::schedule::{SECOND, Schedule};
 use host_tests::fixtures::mission;
 
-/// How often relays raised `name`, in all.
+/// Returns how often all relays together raised the event `name`.
 fn told(air: &Air, name: &str) -> u32 {
     let of = |((_, event), times): (&(usize, String), &u32)| (event == name).then_some(*times);
     air.events.iter().filter_map(of).sum()
 }
 
-/// Relay 2 of four is deaf to relay 3 from the start: three of them fly, without a pause, and nobody is found again and again.
+/// Checks that relays fly without pauses although relay 2 of four never receives relay 3.
 #[test]
 fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
     let mut late = Vec::new();
@@ -47,8 +47,10 @@ fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Returns eight relays of which the link of relays `link + 1` and `link + 2` is up and down in turn, after two hours, and the share of the
-/// time since the first agreement in which all of them, or all but one, have flown it.
+/// Returns eight relays after two hours with a flapping link, and the fraction of time flown.
+///
+/// The link is between relays `link + 1` and `link + 2`. The time counts from the first agreement, while at least seven relays
+/// fly it.
 fn flown_with_flaps(link: usize, (up_us, down_us): (u64, u64), seed: u64) -> (Air, f64) {
     let mut schedule = Schedule::of(8, seed);
     schedule.kind.reach = 3;
@@ -94,7 +96,7 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
     assert!(worst.is_empty(), "{worst:?}");
 }
 
-/// Any link, with times up and down that add up to 5 s to 300 s. The limits in RESULTS.md name the seeds below 90 %, the first of which is 206.
+/// Checks any flapping link with a period of 5 s to 300 s; RESULTS.md lists the seeds below 90 %.
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));
@@ -122,7 +124,7 @@ fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     assert!(below == 0 && median > 0.99, "{all:?}");
 }
 
-/// Relay 2 of four was loaded with another mission.
+/// Checks four relays of which relay 2 is loaded with another mission.
 #[test]
 fn a_relay_of_another_mission_is_told_of_once_a_minute() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -146,7 +148,7 @@ fn a_relay_of_another_mission_is_told_of_once_a_minute() {
     }
 }
 
-/// The epoch of relay 2 goes back.
+/// Checks four relays of which the epoch of relay 2 goes back.
 #[test]
 fn an_epoch_that_goes_back_on_wires_is_told_and_costs_few_frames() {
     for wiring in [Wiring::Pair, Wiring::Shared] {

@@ -1,6 +1,6 @@
-//! The chain is whole again soon after the last fault, whatever the faults were, and never two chains fly.
+//! Recovery of the whole chain after any faults, with never two chains in flight at once.
 //!
-//! `COUNT` and `SEED` in the environment take other schedules, `STORY=1` prints what happens in each.
+//! `COUNT` and `SEED` select other schedules; `STORY=1` prints their events.
 
 mod air;
 mod faults;
@@ -13,23 +13,23 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
-/// The time after the last fault within which the chain is whole, s.
+/// Time limit from the last fault to the whole chain, s.
 const WHOLE_S: u64 = 120;
 
-/// The environment variable `name` as a number, or `usual`.
+/// Returns the environment variable `name` as a number, or `usual`.
 fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// What came of a schedule.
+/// Result of one schedule.
 #[derive(Clone, Debug)]
 struct Found {
     seed: u64,
-    /// Time from the end of the last fault until the chain was whole for good, s; `None` where that took longer than 15 minutes.
+    /// Time from the end of the last fault until the chain was whole for good, s; `None` beyond 15 minutes.
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
-    /// Longest time that a relay and its copy had setpoints although they received each other, s.
+    /// Longest time in which a relay and its copy had setpoints although they received each other, s.
     both_s: f64,
     text: String,
 }
@@ -38,7 +38,7 @@ fn flown(seed: u64, schedule: &Schedule) -> Found {
     let mut air = schedule.begun();
     let end = schedule.faults_end_us;
     air.run(end);
-    // It has to stay whole for a minute.
+    // The chain has to stay whole for a minute.
     let mut at = end + (WHOLE_S + 60) * SECOND;
     air.run(at);
     let most = end + number("WAIT", 900) * SECOND;
@@ -64,7 +64,7 @@ fn flown(seed: u64, schedule: &Schedule) -> Found {
     }
 }
 
-/// Flies `count` schedules on all cores, in the order of their seeds.
+/// Flies `count` schedules on all cores; the results are in the order of their seeds.
 fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found> {
     let next = AtomicU64::new(first);
     let all = Mutex::new(Vec::new());
@@ -123,8 +123,9 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// One of a relay and its copy has a setpoint within two seconds, and once one of the two is gone the chain is whole with the other one. Only
-/// where a copy is on either side of a cut can two chains fly: each has its vote.
+/// Checks a relay and its copy: one loses its setpoint within 2 s; the chain is whole once one is removed.
+///
+/// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
 #[test]
 fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
@@ -152,8 +153,10 @@ fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// Schedules that were found stuck for good, each for one reason: numbers that ran away; a neighbour that was switched on elsewhere and
-/// has nothing to say; two interleaved chains; two candidates for one place that were heard in turn.
+/// Checks schedules that once never recovered.
+///
+/// The reasons were view numbers that ran away, an idle neighbour switched on elsewhere, two interleaved chains, and two
+/// candidates for one position received in turn.
 #[test]
 fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
@@ -166,7 +169,7 @@ fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
     }
 }
 
-/// A schedule of one relay that neither hears nor is heard for so long.
+/// Returns a schedule in which one relay neither receives nor is received for so long.
 fn one_alone(relays: u16, alone: usize, minutes: u64) -> Schedule {
     let mut schedule = Schedule::of(relays, 1);
     schedule.cut(|at| at == alone, 60 * SECOND, (60 + 60 * minutes) * SECOND);
@@ -218,8 +221,9 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Flies chains in which the clocks of some relays step by up to ten hours, half of them with one relay that is alone for three minutes and
-/// is woken by nothing but its own timers. Returns how many there were, those that were late, and those with two chains at once.
+/// Flies chains with clock steps of up to ten hours, half of them with a relay isolated for three minutes.
+///
+/// Returns the number of schedules, those that recovered late, and those with two chains at once.
 fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
@@ -258,7 +262,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// A clock that steps forward ends the wait for the leases of others early: two chains may fly until these have expired.
+/// Checks forward clock steps, which end waits for leases early: two chains may fly until these expire.
 #[test]
 fn clocks_that_step_forward_leave_a_whole_chain_and_seldom_two_for_a_while() {
     let (count, late, two) = with_steps(true);

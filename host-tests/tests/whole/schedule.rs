@@ -7,10 +7,9 @@ use uav_relay::{Interference, Interferer, Upload, Wiring};
 use super::air::{Air, Deed, Kind};
 use host_tests::fixtures::mission;
 
-/// One second, µs.
 pub(crate) const SECOND: u64 = 1_000_000;
 
-/// A schedule, and when its last fault has ended.
+/// Schedule of faults, and the end of the last fault.
 #[derive(Clone, Debug)]
 pub(crate) struct Schedule {
     pub(crate) kind: Kind,
@@ -19,7 +18,7 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// Relays of one chain, all switched on at time 0.
+    /// Returns one chain of relays that are all switched on at time 0.
     pub(crate) fn of(relays: u16, seed: u64) -> Self {
         let kind = Kind {
             mission: mission(relays),
@@ -52,32 +51,32 @@ impl Schedule {
         self.faults_end_us = self.faults_end_us.max(at_us);
     }
 
-    /// Relay `at` is switched off at a time, and on again.
+    /// Switches relay `at` off, and on again.
     pub(crate) fn reboot(&mut self, at: usize, off_us: u64, on_us: u64) {
         self.put(off_us, Deed::Off(at));
         self.put(on_us, Deed::On(at));
     }
 
-    /// The clock of relay `at` steps by a millisecond to ten hours, forward or back.
+    /// Steps the clock of relay `at` by a millisecond to ten hours, forward or back.
     pub(crate) fn step(&mut self, at: usize, at_us: u64, forward: bool, rng: &mut ChaCha8Rng) {
         let by_us = 1e3 * f64::powf(3.6e7, rng.random_range(0.0..1.0));
         let by_us = if forward { by_us as i64 } else { -by_us as i64 };
         self.put(at_us, Deed::Step(at, by_us));
     }
 
-    /// Frames of `from` do not reach `to` for a time.
+    /// Loses frames from `from` to `to` for a time.
     pub(crate) fn deafen(&mut self, from: usize, to: usize, from_us: u64, until_us: u64) {
         self.put(from_us, Deed::Cut { from, to });
         self.put(until_us, Deed::Mend { from, to });
     }
 
-    /// Neither hears the other for a time.
+    /// Cuts the link of two relays in both directions for a time.
     pub(crate) fn part(&mut self, one: usize, other: usize, from_us: u64, until_us: u64) {
         self.deafen(one, other, from_us, until_us);
         self.deafen(other, one, from_us, until_us);
     }
 
-    /// The relays of `part` and all others do not hear each other for a time.
+    /// Separates the relays for which `is_in` is true from all others for a time.
     pub(crate) fn cut(&mut self, is_in: impl Fn(usize) -> bool, from_us: u64, until_us: u64) {
         let all = usize::from(self.kind.mission.relays());
         for one in 0..all {
@@ -87,7 +86,7 @@ impl Schedule {
         }
     }
 
-    /// The link of two relays comes and goes until a time.
+    /// Lets the link of two relays flap until a time.
     pub(crate) fn flap(
         &mut self,
         (one, other): (usize, usize),
@@ -103,7 +102,7 @@ impl Schedule {
     }
 }
 
-/// Relays of a random chain: two to fifty, mostly few.
+/// Draws the number of relays: 2 to 50, mostly few.
 fn relays(rng: &mut ChaCha8Rng) -> u16 {
     match rng.random_range(0..40) {
         0 => rng.random_range(13..=50),
@@ -112,17 +111,16 @@ fn relays(rng: &mut ChaCha8Rng) -> u16 {
     }
 }
 
-/// A span of a fault, µs: from two seconds to four minutes, its logarithm uniform.
+/// Draws the duration of a fault, µs: log-uniform from 2 s to 4 minutes.
 fn span(rng: &mut ChaCha8Rng) -> u64 {
     let seconds = 2.0 * f64::powf(120.0, rng.random_range(0.0..1.0));
     (seconds * 1e6) as u64
 }
 
-/// A random schedule: cuts of seconds to minutes, in one of twenty of hours; one-way links; flapping links; losses; reboots; early and
-/// late starts; uploads; in one of six, clocks that step back.
+/// Draws a schedule of all faults, in one of six schedules with clocks that step back.
 pub(crate) fn random(seed: u64) -> Schedule {
     let mut schedule = without_steps(seed);
-    // Of their own random numbers, so that the rest of a schedule does not depend on them.
+    // A separate random generator leaves the rest of the schedule unchanged.
     let rng = &mut ChaCha8Rng::seed_from_u64(!seed);
     if rng.random_range(0..6) == 0 {
         for _ in 0..rng.random_range(1..=4) {
@@ -134,7 +132,7 @@ pub(crate) fn random(seed: u64) -> Schedule {
     schedule
 }
 
-/// The same without clocks that step.
+/// Draws a schedule of all faults but clock steps.
 pub(crate) fn without_steps(seed: u64) -> Schedule {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let count = relays(rng);
@@ -145,7 +143,7 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
         schedule.kind.wiring = Wiring::Pair;
     }
     if rng.random_bool(0.3) {
-        // Early and late starts: within seconds or minutes, in one of ten within an hour.
+        // Early and late starts: within seconds or minutes, in one of ten schedules within an hour.
         let most = match rng.random_range(0..10) {
             0 => 3_600 * SECOND,
             1..5 => 10 * SECOND,
@@ -189,7 +187,7 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
             rng.random_range(0..9)
         };
         match kind {
-            // The radio of one relay, the chain at one place, any two parts.
+            // Cut of one relay's radio, of the chain at one position, or between any two parts.
             0 => schedule.cut(|at| at == one, from_us, until_us),
             1 => schedule.cut(|at| at <= one, from_us, until_us),
             2 => {
@@ -199,7 +197,7 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
             3 => schedule.part(one, other, from_us, until_us),
             4 => schedule.deafen(one, other, from_us, until_us),
             5 => {
-                // One relay hears nobody, or is not heard.
+                // One relay receives no frames, or none of its frames is received.
                 let mute = rng.random_bool(0.5);
                 for other in (0..all).filter(|other| *other != one) {
                     let (from, to) = if mute { (one, other) } else { (other, one) };
@@ -225,7 +223,7 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
     schedule
 }
 
-/// A mission with the interferer at another place.
+/// Returns a mission with the interferer at another position.
 fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
     let base = &schedule.kind.mission;
     let mut config = *base.config();
@@ -239,8 +237,10 @@ fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
     Box::new(Upload::new(base, 1, config).unwrap())
 }
 
-/// A random schedule on a shared channel with a second drone of one relay's number, of which one is taken away once all other faults are
-/// over. In half of them the other one is told so. Two copies that do not receive each other, and a chain that is cut, are part of it.
+/// Draws a schedule with a copied relay, one of which is removed after all other faults.
+///
+/// In half of the schedules the other copy is informed of that. Copies that do not receive each other, and cut chains, are
+/// included.
 pub(crate) fn with_copy(seed: u64) -> Schedule {
     let mut schedule = without_steps(seed);
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0xC0B1);
@@ -250,7 +250,7 @@ pub(crate) fn with_copy(seed: u64) -> Schedule {
     let copied = rng.random_range(0..copy);
     schedule.kind.copied = Some(copied);
     if rng.random_bool(0.5) {
-        // Nothing but the copy.
+        // The copy is the only fault.
         schedule
             .deeds
             .retain(|(_, deed)| matches!(deed, Deed::On(_)));
@@ -264,7 +264,7 @@ pub(crate) fn with_copy(seed: u64) -> Schedule {
         schedule.part(copied, copy, 0, rng.random_range(0..most_us + 60 * SECOND));
     }
     let gone_us = schedule.faults_end_us + rng.random_range(0..120 * SECOND);
-    // With a key the neighbours refuse the one with the older epoch.
+    // With a key, the neighbours refuse the copy with the older epoch.
     let rebooted = schedule
         .deeds
         .iter()
@@ -282,7 +282,7 @@ pub(crate) fn with_copy(seed: u64) -> Schedule {
 }
 
 impl Schedule {
-    /// Returns true if no relay is ever cut off from another one.
+    /// Returns true if no relay is ever cut off from another.
     pub(crate) fn is_uncut(&self) -> bool {
         !self
             .deeds

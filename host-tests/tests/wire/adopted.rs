@@ -1,4 +1,4 @@
-//! A mission that was uploaded is adopted by a view, kept, and held after a reboot.
+//! Adoption of an uploaded mission by a view, and its use after a reboot.
 
 use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
@@ -15,7 +15,7 @@ use super::votes::{ASKS, FLIES, FORMS, FRESH, events, hearing, id, long, mark};
 
 use super::uploads::*;
 
-/// A relay that flies version 2 in view 1 of all eight, which its neighbours have handed it.
+/// Returns a relay that received version 2 from its neighbours and flies it in view 1 of all eight.
 fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
     let (mut relay, mut peers, base) = relay_4();
     let newer = upload(2, base);
@@ -23,7 +23,7 @@ fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
     (relay, peers, base, newer)
 }
 
-/// Relay 4 takes `newer`, and flies it in view 1 of all eight.
+/// Makes relay 4 accept `newer` and fly it in view 1 of all eight.
 pub(crate) fn adopts(relay: &mut Relay, peers: &mut [Peer; 2], newer: &Offer) {
     let base = newer.base;
     peers[0].says(relay, NOW, &Said::Offer(*newer));
@@ -52,7 +52,7 @@ fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
     assert_eq!(relay.stats().rejected(), 0);
     let mark = mark(relay.view().bits());
     let own = newer.digest().wrapping_add(mark);
-    // From a pass of the same view, of another view of that mission, of the mission before, of no view of either.
+    // Digests of a pass: of the same view, of another view of that mission, of the earlier mission, of neither.
     for (digest, expected) in [
         (own, [0, 0]),
         (own.wrapping_add(5), [1, 0]),
@@ -69,7 +69,7 @@ fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
         });
         assert_eq!(greeted, expected != [0, 0], "{digest:04x}");
     }
-    // Signs of life are of the base for good.
+    // Heartbeats always carry the base's digest.
     for (mission, expected) in [(base, 0), (newer.digest(), 1), (own, 1)] {
         let mut after = relay.clone();
         let beat = Said::Heartbeat {
@@ -106,7 +106,7 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
             "{of:?}"
         );
         if view == 2 {
-            // It still holds a newer one than it flies.
+            // The relay still holds a newer mission than it flies.
             let [_, later] = both_at(&mut after, NOW + Duration::from_millis(1));
             let call = Greeting {
                 mission: base,
@@ -134,7 +134,7 @@ fn in_a_field_nothing_is_held() {
     let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
     let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
     said(&mut relay, NOW);
-    // By chance the base has the same digest.
+    // The mission and the base happen to have the same digest.
     let number = peer.clone().number(relay.clone(), NOW);
     let offer = Offer {
         answer: number,
@@ -178,8 +178,10 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
     }
 }
 
-/// Every hello bears a number, another one `dead_after` after the first with the one before. An offer counts while its number is one of
-/// the last two, and was said not more than twice `dead_after` ago; and a relay's own offer bears the number that it was told.
+/// Checks the numbers that link offers to hellos.
+///
+/// A number changes `dead_after` after its first use. An offer must have one of the last two, sent at most twice `dead_after`
+/// ago; a relay's offer repeats the number that it received.
 #[test]
 fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
     let (relay, peers, base) = relay_4();
@@ -191,7 +193,7 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
     assert_eq!(number(&relay, 14_999), first);
     let next = if first == u16::MAX { 1 } else { first + 1 };
     assert_eq!(number(&relay, 15_000), next);
-    // Of the second number the relay has said no hello yet.
+    // The relay has not sent a hello with the second number yet.
     for (answer, ms, counts) in [
         (first, 0, true),
         (first, 30_000, true),
@@ -208,12 +210,12 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
         let expected = counts.then_some(mission_id(&newer));
         assert_eq!(held(&after_it), expected, "{answer} at {ms}");
         assert_eq!(after_it.stats().stale, u32::from(!counts));
-        // It is told by a hello in either case, whose number the next offer bears.
+        // In either case the neighbour gets a hello, whose number the next offer repeats.
         let hellos = said(&mut after_it, after(ms));
         let told = |(to, said): &(u16, Said)| *to == 3 && matches!(said, Said::Hello(_));
         assert!(hellos.iter().any(told), "{answer} at {ms}: {hellos:?}");
     }
-    // A hello with the next number has been said, and another one with the one after that.
+    // A hello with the next number was sent, and another with the one after that.
     let mut later = relay.clone();
     let mut peer = peers[0].clone();
     for (ms, first_counts) in [(15_000, true), (30_000, false)] {

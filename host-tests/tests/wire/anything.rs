@@ -1,4 +1,4 @@
-//! Whatever neighbours say, in any order and from either side: a relay stays in bounds.
+//! Random messages from either side in any order: a relay stays within its bounds.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use super::receive::{FIELD, drain, relay_of};
 use super::strategies::messages;
 use super::votes::mark;
 
-/// A field as strong and as weak as one may be.
+/// Field of the strongest and the weakest interference.
 const WILD: Field = Field::new(&[
     FieldPoint {
         x_m: 0.0,
@@ -31,7 +31,7 @@ const WILD: Field = Field::new(&[
     },
 ]);
 
-/// Makes a message one that may well be of this mission.
+/// Changes a message so that it is plausible in this mission.
 fn tamed(said: Said) -> Said {
     let into = |reach: f32| reach % 1000.0;
     match said {
@@ -98,20 +98,19 @@ fn tamed(said: Said) -> Said {
     }
 }
 
-/// What neighbours may say in one step.
+/// Message of a neighbour in one step.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is drawn by itself")]
 struct Step {
     said: Said,
-    /// Whether it comes from the side that it should come from.
     right_side: bool,
     right_mission: bool,
-    /// How far its number is from that of the next pass, or of the last one that it answers.
+    /// Offset of its number from that of the next pass, or of the last one that it answers.
     off: i16,
     tame: bool,
-    /// For how long the relay is left alone afterwards.
+    /// Time until the next step, ms.
     wait_ms: u64,
-    /// Whether a pass is then answered as it might be.
+    /// True if a pass is then answered.
     answered: bool,
 }
 
@@ -141,9 +140,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     vec(step, 1..40)
 }
 
-/// Leads a relay of 8 by any messages, from a place or from none: it must be drained at any time, asleep until later, its
-/// setpoint between Tx and Rx and within the band, its place in the chain one of those that there are. `expected` names what
-/// must have happened at times: what moved the setpoint, and new views.
+/// Sends a relay of 8 any messages and checks its bounds; all causes in `expected` must occur.
 #[expect(clippy::too_many_lines, reason = "all that is looked at in one flight")]
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
@@ -162,7 +159,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
             let mut counts = seen.take();
             let mut place = relay.setpoint();
             let mut begun = place.is_some();
-            // The pass that is said, and the last one that the relay may have taken up.
+            // Number of the pass sent, and of the last one that the relay may have accepted.
             let mut pass = if begun { FIRST } else { 0 };
             let mut last = pass;
             let mut view = ViewId::LOADED;
@@ -174,7 +171,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                 let kind = step.said.body()[0];
                 let onward = [0, 4, 5, 6, 8, 11, 15, 17].contains(&kind);
                 let port = if onward == step.right_side { from } else { to };
-                // These relays do not listen: a hearing is no pass to them.
+                // These relays do not measure: collection passes do not count.
                 if onward && ![11, 15, 17].contains(&kind) {
                     pass = if begun {
                         last + 1

@@ -1,4 +1,4 @@
-//! Bodies with one thing changed, and what a receiver makes of them.
+//! Bodies with one change, and a receiver's verdict on them.
 
 use uav_relay::wire::frame::{self, FrameError, Header};
 use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
@@ -16,7 +16,6 @@ pub(crate) const HEADER: Header = Header {
 pub(crate) const ENCODING: Result<(), MessageError> = Err(MessageError::Encoding);
 pub(crate) const VALUE: Result<(), MessageError> = Err(MessageError::Value);
 
-/// Numbers that are none.
 pub(crate) const STRANGE: [f32; 5] = [
     f32::NAN,
     -f32::NAN,
@@ -25,7 +24,7 @@ pub(crate) const STRANGE: [f32; 5] = [
     f32::NEG_INFINITY,
 ];
 
-/// What a receiver makes of a body in an intact frame; whatever it takes it writes as it was.
+/// Returns a receiver's verdict on a body; an accepted body must be encoded to the same bytes.
 pub(crate) fn verdict_on(body: &[u8]) -> Result<(), MessageError> {
     match frame::decode(&plain(HEADER, body)) {
         Ok((_, message)) => {
@@ -37,14 +36,13 @@ pub(crate) fn verdict_on(body: &[u8]) -> Result<(), MessageError> {
     }
 }
 
-/// The body of a message.
 pub(crate) fn written(message: &Message) -> Vec<u8> {
     let mut body = [0; MAX_BODY];
     let len = message.encode(&mut body).unwrap();
     body[..len].to_vec()
 }
 
-/// What a sweep for a single target says.
+/// Returns a sweep for a single target.
 pub(crate) fn single(anchor: f32) -> Swept {
     Swept {
         number: 1,
@@ -58,14 +56,14 @@ pub(crate) fn single(anchor: f32) -> Swept {
     }
 }
 
-/// Puts `number` at `at` of a body.
+/// Writes `number` at offset `at` of a body.
 pub(crate) fn with(said: &Said, at: usize, number: f32) -> Vec<u8> {
     let mut body = said.body();
     body[at..at + 4].copy_from_slice(&number.to_le_bytes());
     body
 }
 
-/// Cuts a body off at its count, which is at `at`, and has so many zeros follow.
+/// Truncates a body at its count, which is at `at`, and appends `count` zeros.
 pub(crate) fn zeros(mut body: Vec<u8>, at: usize, count: u8) -> Vec<u8> {
     body.truncate(at);
     body.push(count);
@@ -73,8 +71,7 @@ pub(crate) fn zeros(mut body: Vec<u8>, at: usize, count: u8) -> Vec<u8> {
     body
 }
 
-/// A number is taken from the least to the most, and nothing beyond, whichever message it is in: the message, where the
-/// number stands in its body, the range, and what it is.
+/// Asserts that each message accepts a number's limits at an offset of its body, and nothing beyond.
 pub(crate) fn assert_ranges(ranges: &[(&Said, usize, f32, f32, &str)]) {
     for &(said, at, least, most, what) in ranges {
         for good in [least, most] {
@@ -92,7 +89,7 @@ pub(crate) fn assert_ranges(ranges: &[(&Said, usize, f32, f32, &str)]) {
     }
 }
 
-/// A body is refused when its tag, or its count where it `is_counted`, is a varint longer than need be.
+/// Asserts that a body with a padded varint as its tag, or as its count if it `is_counted`, is refused.
 pub(crate) fn assert_refused_padded(body: &[u8], is_counted: bool) {
     for tag in [true, false].into_iter().filter(|&tag| tag || is_counted) {
         for more in 0..9 {
@@ -104,7 +101,7 @@ pub(crate) fn assert_refused_padded(body: &[u8], is_counted: bool) {
     }
 }
 
-/// A body is taken as it is, and refused when it ends early or goes on for a byte.
+/// Asserts that a body is accepted as it is, and refused if it is shorter or longer by a byte.
 pub(crate) fn assert_refused_cut_and_longer(body: &[u8], what: &str) {
     assert_eq!(verdict_on(body), Ok(()), "{what}");
     for len in 0..body.len() {

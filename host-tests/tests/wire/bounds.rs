@@ -1,4 +1,4 @@
-//! What turns, views and pulses may say, and node numbers that fit.
+//! Valid values of turns, views and lease renewals, and node numbers that fit.
 
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::optimiser::{PerTarget, verdict::Verdict};
@@ -40,7 +40,7 @@ fn a_turn_is_written_in_one_way() {
     }
 }
 
-/// Which of 0 to 65535 a message takes at `at` of its body; the others are out of range and nothing else.
+/// Returns the values that a message accepts at offset `at` of its body; others must be out of range.
 fn taken(mut body: Vec<u8>, at: usize) -> Vec<u16> {
     let fits = |number: &u16| {
         body[at..at + 2].copy_from_slice(&number.to_le_bytes());
@@ -92,8 +92,7 @@ fn a_chain_has_up_to_a_thousand_relays() {
     }
 }
 
-/// What is proposed is named by a node of a chain and has a number above 0. Any view may have been heard of, and what was loaded be
-/// agreed on.
+/// Checks that a proposed view names a node of a chain and a number above 0, while other views may be any.
 #[test]
 fn a_view_is_named_by_a_relay_that_may_propose_it() {
     let fits = |said: &Said, at: usize, view: u32| {
@@ -109,7 +108,7 @@ fn a_view_is_named_by_a_relay_that_may_propose_it() {
             let proposed = number > 0 && (1..=1000).contains(&node);
             for (said, at, expected) in [
                 (Said::Hello(HELLO), 7, true),
-                // All that it tells of was proposed before, and a view not after what was decided by.
+                // The reported views were proposed earlier, and the accepted view is no later than the proposal that decided it.
                 (Said::Proposal(PROPOSAL), 5, proposed && view > VIEW.id),
                 (
                     Said::Proposal(PROPOSAL),
@@ -123,7 +122,7 @@ fn a_view_is_named_by_a_relay_that_may_propose_it() {
                 ),
                 (Said::Proposal(PROPOSAL), 29, proposed && view <= VIEW.id),
                 (Said::Decision(DECISION), 5, proposed && view > VIEW.id),
-                // What it follows may be the chain as it was loaded.
+                // The base may be the chain as loaded.
                 (
                     Said::Decision(DECISION),
                     11,
@@ -137,7 +136,7 @@ fn a_view_is_named_by_a_relay_that_may_propose_it() {
     }
 }
 
-/// A lease of no time would have run out before it is given.
+/// Checks that a lease of zero is refused.
 #[test]
 fn a_pulse_gives_a_lease() {
     let pulse = vec![15, 0, 0, 0, 0, 1, 0];

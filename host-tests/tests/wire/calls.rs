@@ -1,4 +1,4 @@
-//! Who calls for a view, and when it stops to.
+//! Requests for a view, and their end.
 
 use uav_relay::wire::digest::digest;
 use uav_relay::{Duration, Event, Instant, Phase, Port, ViewId, Wiring};
@@ -9,16 +9,16 @@ use super::receive::{counted, relay};
 
 use super::votes::*;
 
-/// The middle of a part that is too small to go on: it holds, hands that back, and asks for nothing any more.
+/// Checks the middle of a part without a quorum: it holds, returns the decision, and requests nothing more.
 #[test]
 fn a_part_that_is_cut_off_stops_calling() {
     let mut relay = relay(4, 8, Wiring::Pair);
     let mission = digest(relay.mission());
     let mut now = Instant::ZERO;
-    // It calls: it has missed a beginning.
+    // The relay requests a view because it has missed earlier passes.
     let sweep = &one_of_each(FIRST + 1, mission)[0];
     relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, sweep));
-    // Fresh: nothing hangs together from it on yet.
+    // The relay is fresh, so no others are connected behind it.
     let calls = a_hello(0, mission, 3, ASKS | FORMS | FRESH);
     let calls = long(1, hearing(1, calls));
     assert_eq!(soon(&mut relay, now), [(Port::Upstream, calls)]);
@@ -46,8 +46,7 @@ fn a_part_that_is_cut_off_stops_calling() {
     assert!(now > Instant::from_millis(60_000));
 }
 
-/// Somebody may be back who could not be heard: its leader proposes again after `probe_after` and up to an eighth more, which doubles with
-/// each refusal up to eight times as long.
+/// Checks a leader without a quorum: it proposes again after `probe_after`, doubled with each refusal.
 #[test]
 fn a_leader_whose_part_is_cut_off_holds_and_proposes_again_and_again() {
     let mut head = relay(1, 8, Wiring::Pair);
@@ -76,7 +75,7 @@ fn a_leader_whose_part_is_cut_off_holds_and_proposes_again_and_again() {
             now = head.poll_timeout().unwrap();
             head.handle_timeout(now);
             let out = sent(&mut head, now);
-            // Its neighbour is there: alone it would propose nothing.
+            // Its neighbour answers; alone the leader would propose nothing.
             for (port, said) in &out {
                 if let Said::Heartbeat { mission, ask, .. } = said {
                     let answer = Said::Heartbeat {
@@ -126,7 +125,7 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
     }
 }
 
-/// Toward a view far ahead of all that were heard of a relay goes step by step: it could be the last there can be.
+/// Checks that a view number far ahead is approached in steps, because it could be the last possible one.
 #[test]
 fn a_view_far_ahead_is_reached_step_by_step() {
     let now = Instant::ZERO;
@@ -146,7 +145,6 @@ fn a_view_far_ahead_is_reached_step_by_step() {
     }
 }
 
-/// No chain has more relays than its mission, and no relay says what none would read.
 #[test]
 fn more_relays_than_the_mission_has_are_stale() {
     let now = Instant::ZERO;

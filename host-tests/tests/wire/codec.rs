@@ -1,12 +1,11 @@
-//! A second codec, written from the rules in `FORMAT.md` and not from the crate's code. It holds no postcard, and takes CRC
-//! and COBS from other crates.
+//! Second codec, written from the rules in `FORMAT.md` without the crate's code or postcard; CRC and COBS are of other crates.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `codec.rs` | which message a body says |
-//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | what the longer ones say: bytes, message, ranges |
-//! | `bytes.rs`, `reader.rs`, `limits.rs` | the parts that bodies are written of, read of, and held within |
-//! | `frame.rs` | what stands around a body |
+//! | `codec.rs` | message kinds |
+//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | longer messages: bytes, conversion, ranges |
+//! | `bytes.rs`, `reader.rs`, `limits.rs` | encoding, decoding and ranges of parts |
+//! | `frame.rs` | frame around a body |
 
 mod bytes;
 mod frame;
@@ -37,7 +36,7 @@ use bytes::{pass, reals, words};
 use limits::is_beside;
 use reader::Reader;
 
-/// What a body says, field by field.
+/// Content of a body, by message.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) enum Said {
     Sweep(Swept),
@@ -47,7 +46,7 @@ pub(crate) enum Said {
     },
     Heartbeat {
         mission: u16,
-        /// The number of its own question, and that of the one it answers; 0 for none.
+        /// Number of the sender's question, and of the question that it answers; 0 for none.
         ask: u16,
         answer: u16,
     },
@@ -80,12 +79,12 @@ pub(crate) enum Said {
     },
     Sense(Heard),
     Sensed(Heard),
-    /// How strong the interference is where the sender stands, on the ground.
+    /// Interference at the sender, which is on the ground.
     Level {
         mission: u16,
         power_w: f32,
     },
-    /// A claim to a node number, or the echo of one.
+    /// Claim to a node number, or its echo.
     Claim {
         number: u32,
         heard: u32,
@@ -93,14 +92,14 @@ pub(crate) enum Said {
     },
 }
 
-/// How far a relay keeps off.
+/// Fence message of the guard.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Fenced {
     pub(crate) number: u16,
     pub(crate) mission: u16,
     pub(crate) echo: u16,
     pub(crate) fence: u16,
-    /// Where the fence is, where its sender is bound for, y and altitude, how far before the fence, m.
+    /// Fence x, final x, y and altitude of the sender, and its distance from the fence, m.
     pub(crate) places: [f32; 5],
     pub(crate) flags: u8,
 }
@@ -150,7 +149,6 @@ impl Fenced {
 }
 
 impl Said {
-    /// The bytes of the body.
     pub(crate) fn body(&self) -> Vec<u8> {
         match self {
             Self::Sweep(sweep) => sweep.body(0, &[]),
@@ -219,7 +217,7 @@ impl Said {
         }
     }
 
-    /// The message that says this.
+    /// Converts to the crate's message.
     pub(crate) fn message(&self) -> Message {
         match *self {
             Self::Sweep(ref sweep) => sweep.message(None, None),
@@ -282,7 +280,7 @@ impl Said {
         }
     }
 
-    /// What a body says, or why it is refused.
+    /// Decodes a body; the error is the reason for refusal.
     pub(crate) fn read(body: &[u8]) -> Result<Self, MessageError> {
         let mut rest = Reader(body);
         let said = Self::take(&mut rest).ok_or(MessageError::Encoding)?;
@@ -296,7 +294,7 @@ impl Said {
         }
     }
 
-    /// One that stands at the head of what is left.
+    /// Decodes a message at the start of the rest.
     fn take(rest: &mut Reader) -> Option<Self> {
         Some(match rest.byte()? {
             0 => {

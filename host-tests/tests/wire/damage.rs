@@ -1,4 +1,4 @@
-//! Damaged frames: flipped bits, cut and mangled ones, before COBS and on the wire. None may be accepted.
+//! Damaged frames, before COBS and on the wire: none may be accepted.
 
 use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use super::config;
 use super::golden::vectors;
 use super::strategies::{headers, messages};
 
-/// Frames that a receiver accepts from a stream.
+/// Returns the number of frames that a receiver accepts from a stream.
 fn accepted(stream: &[u8]) -> usize {
     let mut deframer = Deframer::new();
     stream
@@ -30,7 +30,7 @@ fn every_flipped_bit_is_noticed() {
             bad[bit / 8] ^= 1 << (bit % 8);
             assert_eq!(frame::decode(&bad), Err(FrameError::Crc), "{name}, {bit}");
         }
-        // On the wire a flip may also make, move or remove a delimiter: the frame itself is all but its last byte.
+        // On the wire a flip may create, move or remove a delimiter; the frame is all but its last byte.
         let good = vector.wire();
         assert_eq!(accepted(&good), 1, "{name}");
         for bit in 0..8 * good.len() {

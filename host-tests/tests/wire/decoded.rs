@@ -1,4 +1,4 @@
-//! `cargo decode` on frames of the crate's own encoders: every field that it names says what was said.
+//! `cargo decode` on encoded frames: every field has the encoded value.
 
 use std::collections::BTreeMap;
 
@@ -13,17 +13,15 @@ use super::config;
 use super::offer::Offer;
 use super::strategies::{headers, messages};
 
-/// Frames of each tag.
 const EACH: usize = 10_000;
 
-/// Tags there are.
 const TAGS: u8 = 21;
 
 fn digest(number: u16) -> Value {
     format!("{number:04x}").into()
 }
 
-/// With `more` before the reaches.
+/// Returns the fields of a sweep, with `more` before the reaches.
 fn sweep(said: &Swept, more: Option<(&str, f32)>) -> Value {
     let mut value = json!({
         "number": said.number, "view": digest(said.mission), "anchor": said.anchor, "gap": said.gap, "growth": said.growth,
@@ -97,7 +95,6 @@ fn hello(said: &Greeting) -> Value {
     })
 }
 
-/// What a claim is decoded to.
 fn claim(number: u32, heard: u32, flags: u8) -> Value {
     let names = [(1, "passive"), (2, "echo")];
     let set = names.iter().filter(|(bit, _)| flags & bit != 0);
@@ -105,7 +102,7 @@ fn claim(number: u32, heard: u32, flags: u8) -> Value {
     json!({"claim": number, "other_claim": heard, "flags": flags})
 }
 
-/// The name of a message, and what its fields say, by what was said and not by its bytes.
+/// Returns a message's name and expected fields, by its content and not its bytes.
 fn wanted(said: &Said) -> (&'static str, Value) {
     match said {
         Said::Sweep(said) => ("Sweep", sweep(said, None)),

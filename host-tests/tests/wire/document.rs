@@ -1,4 +1,4 @@
-//! `FORMAT.md` read as a test: its annotated examples, its ladders and every row of its rejection table.
+//! `FORMAT.md` as a test: annotated examples, ladders, and every row of the rejection table.
 
 use crc::{CRC_32_ISCSI, Crc};
 use uav_relay::wire::digest::digest;
@@ -10,13 +10,12 @@ use super::receive::{FIELD, counted, relay};
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
 
-/// The cells of a table's row, without the outer ones.
 fn cells(row: &str) -> Vec<&str> {
     let row = row.trim().trim_matches('|');
     row.split('|').map(str::trim).collect()
 }
 
-/// The rows of the first table in `text`, below its head.
+/// Returns the rows of the first table in `text`, without its head.
 fn rows(text: &str) -> impl Iterator<Item = Vec<&str>> {
     let table = text.lines().skip_while(|line| !line.starts_with('|'));
     table
@@ -25,7 +24,7 @@ fn rows(text: &str) -> impl Iterator<Item = Vec<&str>> {
         .map(cells)
 }
 
-/// What stands between two backticks.
+/// Returns the text between two backticks.
 fn code(cell: &str) -> &str {
     cell.strip_prefix('`').unwrap().strip_suffix('`').unwrap()
 }
@@ -93,7 +92,7 @@ fn every_row_of_the_rejection_table_is_counted_as_it_says() {
     assert!(found > 120, "{found}");
 }
 
-/// The digest of a mission whose interference is these f32, by the document.
+/// Returns the digest of a mission with the f32 numbers of its interference, by the document.
 fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
     let config = mission.config();
     let mut bytes = config.relays.to_le_bytes().to_vec();

@@ -1,4 +1,4 @@
-//! Claims to a node number: what a relay without a key makes of them, and what one with a key makes of frames under its number.
+//! Claims to a node number without a key, and frames with a relay's own number under a key.
 
 use uav_relay::MAX_FRAME;
 use uav_relay::wire::digest::digest;
@@ -13,7 +13,7 @@ const NOW: Instant = Instant::from_millis(1_000);
 
 const ECHO: u8 = 2;
 
-/// A claim by a node that has received claim `heard`.
+/// Returns a claim by a node that has received claim `heard`.
 const fn claim(number: u32, heard: u32, flags: u8) -> Said {
     Said::Claim {
         number,
@@ -22,7 +22,7 @@ const fn claim(number: u32, heard: u32, flags: u8) -> Said {
     }
 }
 
-/// Relay 4 of 8, and its claim number: it answers another frame under its number by that.
+/// Returns relay 4 of 8 and its claim number, with which it answers another frame with its number.
 fn relay_4(wiring: Wiring) -> (Relay, u32) {
     let mut relay = relay(4, 8, wiring);
     let sweep = &one_of_each(FIRST, digest(relay.mission()))[0];
@@ -55,8 +55,7 @@ fn a_claim_of_a_neighbour_is_repeated_to_its_number() {
     }
 }
 
-/// Received directly, for whichever destination, or as the echo of a neighbour. One that does not name the relay's own claim may be
-/// from before it was switched on: it is answered, and nothing else.
+/// Checks claims. One that does not name the relay's own may be from before its start: it is only answered.
 #[test]
 fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
     for (wiring, port) in [
@@ -97,7 +96,7 @@ fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
     }
 }
 
-/// The radio hands a relay what it has sent.
+/// Checks a radio that returns a relay's own frames.
 #[test]
 fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -122,7 +121,7 @@ fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
     }
 }
 
-/// Relay 4 of 8 with a key and its first two frames, handshakes.
+/// Returns relay 4 of 8 with a key, and its first two frames, which are handshakes.
 fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     let mission = *relay(4, 8, Wiring::Shared).mission();
     let settings = Settings {
@@ -147,8 +146,7 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     (relay, frames)
 }
 
-/// With a key a handshake with the right tag is the claim: of two relays the one that is given the other's becomes passive, or answers by
-/// one handshake. Its own, and those of another key, have no effect.
+/// Checks handshakes as claims: the relay becomes passive or answers once; its own have no effect.
 #[test]
 fn with_a_key_handshakes_are_the_claims() {
     let mut passive = 0;
@@ -175,7 +173,7 @@ fn with_a_key_handshakes_are_the_claims() {
             "{both:?}"
         );
         passive += u32::from(both[0].0);
-        // An altered one is none.
+        // An altered handshake has no effect.
         for at in 1..others[0].len() - 1 {
             let mut altered = others[0].clone();
             altered[at] ^= 1;

@@ -1,4 +1,4 @@
-//! The golden vectors hold every kind of message and every extreme of it.
+//! Coverage of the golden vectors: every kind of message with all extremes.
 
 use super::codec::{
     Call, Decided, Greeting, Handed, Heard, Judged, Proposed, Said, Shifted, SizedView, Swept,
@@ -258,7 +258,7 @@ fn the_vectors_hold_hearings_of_every_belief_and_extreme() {
     some(|heard| heard.kind == 4 && heard.source[3] == 0.0);
     some(|heard| heard.sums == [0.0; 18]);
     some(|heard| heard.sums.map(f32::abs) == [f32::MAX; 18] && heard.sums[2] < 0.0);
-    // Each in its place.
+    // The sums differ, each in its place.
     some(|heard| {
         let mut sums = heard.sums.map(f32::to_bits);
         sums.sort_unstable();

@@ -1,4 +1,4 @@
-//! How a chain forms anew, frame by frame: hellos, a proposal through three relays, the decision back, and what is refused.
+//! Formation of a chain frame by frame: hellos, proposal, decision, and refusals.
 
 use host_tests::fixtures::{NETWORK, paper};
 use uav_relay::wire::digest::digest;
@@ -19,7 +19,7 @@ fn a_proposal_goes_through_three_relays_and_the_decision_back() {
     };
     let mission = digest(head.mission());
     let now = Instant::ZERO;
-    // Somebody wants a view: the head, whom nobody is before, proposes the first one.
+    // A view is requested: the head, which has no predecessor, proposes the first one.
     let hello = a_hello(0, mission, 1, FORMS | READY);
     head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &hello));
     let view = id(1, 1);
@@ -29,7 +29,7 @@ fn a_proposal_goes_through_three_relays_and_the_decision_back() {
     middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
     assert_eq!(only(middle, now), (Port::Downstream, proposal(2)));
     assert_eq!(middle.view(), ViewId::LOADED, "not before it is decided");
-    // It comes again: what has become of it is not known yet.
+    // The proposal is repeated while its result is unknown.
     middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
     let busy = Said::Busy { number: mark(view) };
     assert_eq!(only(middle, now), (Port::Upstream, busy));
@@ -37,7 +37,7 @@ fn a_proposal_goes_through_three_relays_and_the_decision_back() {
     assert_eq!(only(tail, now), (Port::Upstream, decision(3)));
     middle.handle_bytes(now, Port::Downstream, &between(3, 2, &decision(3)));
     assert_eq!(only(middle, now), (Port::Upstream, decision(2)));
-    // The answer was lost: it is given again.
+    // The answer was lost and is repeated.
     middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
     assert_eq!(only(middle, now), (Port::Upstream, decision(2)));
     head.handle_bytes(now, Port::Downstream, &between(2, 1, &decision(2)));
@@ -65,7 +65,7 @@ fn a_decision_that_is_not_awaited_is_stale() {
         (id(1, 1), 5, 8),
         (id(3, 1), 5, 8),
         (id(2, 2), 5, 8),
-        // Fewer than it has come through so far.
+        // The decision has fewer relays than the proposal has passed.
         (view, 5, 4),
         (view, 5, 1),
     ] {
@@ -94,7 +94,6 @@ fn a_decision_that_is_not_awaited_is_stale() {
         (waiting.view().bits(), waiting.mission().relays()),
         (view, 5)
     );
-    // Once more.
     waiting.handle_bytes(
         now,
         Port::Downstream,
@@ -103,7 +102,6 @@ fn a_decision_that_is_not_awaited_is_stale() {
     assert_eq!(waiting.stats().stale, 1);
 }
 
-/// Relay 20 of 20, the last.
 fn last_of_20(quorum: bool) -> (Relay, u16) {
     let mission = Mission::try_new(paper(20)).unwrap();
     let identity = Identity {
@@ -119,7 +117,7 @@ fn last_of_20(quorum: bool) -> (Relay, u16) {
     (relay, mission)
 }
 
-/// What it decides on a proposal that says this.
+/// Returns the decision on a proposal.
 fn decided_by(last: &mut Relay, proposal: Proposed) -> Decided {
     let now = Instant::ZERO;
     let proposal = Said::Proposal(proposal);
@@ -130,8 +128,7 @@ fn decided_by(last: &mut Relay, proposal: Proposed) -> Decided {
     }
 }
 
-/// It takes more than half of the members of the view before, or half of them with the one that proposed it; who is there beside them
-/// does not matter.
+/// Checks the quorum: more than half of the earlier view's members, or half with its proposer.
 #[test]
 fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
     for quorum in [true, false] {
@@ -139,7 +136,7 @@ fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
         for relays in 1..=20 {
             for votes in 0..=relays {
                 for proposer in [false, true] {
-                    // A view that is newer than the one that the last relay knows itself, which is no member of it.
+                    // The view is newer than the last relay's own, which is no member of it.
                     let proposal = Proposed {
                         agreed: SizedView {
                             id: id(8, 3),
@@ -165,7 +162,7 @@ fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
                             relays: 12,
                         }),
                         there: 12,
-                        // Somebody who is not here may hold the view before for as long.
+                        // A missing member may hold the earlier view for as long.
                         lease_left: if all { 0 } else { 77 },
                     };
                     assert_eq!(decided, expected, "{votes} of {relays}, {proposer}");
@@ -182,7 +179,7 @@ fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
     }
 }
 
-/// A member of the view agreed on adds its voice, and the time for which it may be relied on where that is less.
+/// Checks that a member adds its vote, and its own lease if that is shorter.
 #[test]
 fn a_member_adds_its_voice() {
     let (last, mission) = last_of_20(true);
@@ -207,7 +204,7 @@ fn a_member_adds_its_voice() {
     }
 }
 
-/// What a member has accepted may have been agreed on: it is decided on again, and nobody is in another view before the next proposal.
+/// Checks that an accepted view, which may have been agreed on, is decided again.
 #[test]
 fn what_may_have_been_agreed_on_is_decided_on_again() {
     let (mut last, mission) = last_of_20(true);
@@ -223,7 +220,7 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
     let decided = decided_by(&mut last, proposal);
     assert_eq!(decided.view, Some(before));
     assert_eq!((last.view(), events(&mut last)), (ViewId::LOADED, vec![]));
-    // It has accepted that view, too, by this proposal, and says so from now on, if nobody says so of a later one.
+    // The relay has accepted that view by this proposal too, and reports it unless a later acceptance is reported.
     for (told, expected) in [
         (None, before),
         (
@@ -270,7 +267,7 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
         let decided = decided_by(&mut last.clone(), proposal);
         assert_eq!(decided.view, Some(expected), "{told:?}");
     }
-    // The leader proposes anew from there.
+    // The leader continues with the next proposal.
     let mut head = relay(1, 8, Wiring::Pair);
     let mission = digest(head.mission());
     let hello = a_hello(0, mission, 1, FORMS | READY);
@@ -298,8 +295,7 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
     );
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(counted(head.stats()), ["received"]);
-    // All have accepted it now, so it was agreed on: its members decide on the next one, and this relay is none of them, as it was
-    // not in the proposal of it.
+    // All have accepted the view, so its members decide on the next one; this relay does not vote.
     let next = Proposed {
         agreed: before,
         votes: 0,

@@ -1,4 +1,4 @@
-//! Gatherings at a relay: what goes onward, what comes back, and what is stale.
+//! Profile collection at a relay: forwarding, results, and stale messages.
 
 use host_tests::fixtures::{self, paper};
 use uav_relay::wire::digest::digest;
@@ -10,7 +10,7 @@ use super::codec::{Said, Seats};
 use super::kinds::{FIRST, SECOND, framed, one_of_each, sent, settle, source};
 use super::receive::{FIELD, counted, relay_of};
 
-/// What relay 4 of 8 counts of a message of the pass that is due, from this side.
+/// Returns the counters that a message of the due pass, received at `port`, increments at relay 4 of 8.
 fn counted_of(interference: Interference, port: Port, tag: usize) -> Vec<&'static str> {
     let mission = MissionConfig {
         interference,
@@ -42,7 +42,7 @@ fn hear(relay: &mut Relay, now: Instant, port: Port, said: &Said) {
     relay.handle_bytes(now, port, &framed(4, port, said));
 }
 
-/// Relay 4 of 8; one that `differs` keeps to 33 m.
+/// Returns relay 4 of 8; with `differs` it holds 33 m.
 fn fourth(differs: bool) -> Relay {
     let mission = Mission::try_new(source()).unwrap();
     let common = mission.config().common;
@@ -58,7 +58,7 @@ fn fourth(differs: bool) -> Relay {
     fixtures::relay(mission, 4, settings)
 }
 
-/// A gathering, or what came of one, of these relays.
+/// Returns a collection, or its result, with profiles of the relays `indices`.
 fn of(relay: &Relay, number: u16, after: u16, indices: &[u16]) -> Seats {
     Seats {
         number,
@@ -84,7 +84,7 @@ fn a_gathering_goes_onward_with_who_differs_and_what_came_of_it_back() {
             [(Port::Downstream, Said::Gather(own.clone()))]
         );
 
-        // The same again: it is under way.
+        // The collection is repeated while its result is pending.
         hear(&mut relay, now, Port::Upstream, &Said::Gather(told.clone()));
         let busy = Said::Busy { number: FIRST };
         assert_eq!(sent(&mut relay, now), [(Port::Upstream, busy)]);
@@ -99,17 +99,17 @@ fn a_gathering_goes_onward_with_who_differs_and_what_came_of_it_back() {
             &Said::Gathered(all.clone()),
         );
         assert_eq!(sent(&mut relay, now), back);
-        // Nobody moves by it.
+        // No relay moves.
         assert_eq!(relay.setpoint(), None);
 
-        // And the same again: what came of it is known.
+        // The collection is repeated after its result.
         hear(&mut relay, now, Port::Upstream, &Said::Gather(told));
         assert_eq!(sent(&mut relay, now), back);
         assert_eq!(counted(relay.stats()), ["received", "repeated"]);
     }
 }
 
-/// A full roster is taken as it is; the next pass asks who had no room in it, and no one before.
+/// Checks that a full roster is forwarded unchanged, and that the next pass continues behind it.
 #[test]
 fn who_finds_no_room_is_asked_by_the_next_pass() {
     let mission = MissionConfig {
@@ -136,12 +136,12 @@ fn who_finds_no_room_is_asked_by_the_next_pass() {
     assert_eq!(out, [(Port::Downstream, Said::Gather(full.clone()))]);
     let out = say(&mut relay, Port::Downstream, &Said::Gathered(full.clone()));
     assert_eq!(out, [(Port::Upstream, Said::Gathered(full))]);
-    // Not all have been asked: it is no time for a sweep.
+    // Some relays have not been asked, so a sweep is too early.
     let mut early = relay.clone();
     let aside = &one_of_each(SECOND, digest(relay.mission()))[5];
     assert_eq!(say(&mut early, Port::Upstream, aside), []);
     assert_eq!(counted(early.stats()), ["received", "stale"]);
-    // And not for those after others.
+    // A collection behind other relays is stale.
     let mut other = relay.clone();
     let later = Said::Gather(of(&relay, SECOND, 7, &[8]));
     assert_eq!(say(&mut other, Port::Upstream, &later), []);
@@ -152,7 +152,7 @@ fn who_finds_no_room_is_asked_by_the_next_pass() {
     assert_eq!(out, [(Port::Downstream, Said::Gather(own))]);
 }
 
-/// The number alone does not make it the same.
+/// Checks that the number alone does not identify a collection.
 #[test]
 fn a_gathering_of_others_does_not_repeat_and_asks_for_a_new_view() {
     let mut now = Instant::ZERO;
@@ -166,7 +166,7 @@ fn a_gathering_of_others_does_not_repeat_and_asks_for_a_new_view() {
     assert_asks_for_a_view(&mut relay, &mut now);
 }
 
-/// As one that was switched on again in the midst of it: what the others brought along it has not been told.
+/// Checks a relay that missed the others' profiles, as after a reboot.
 #[test]
 fn a_sweep_of_places_chosen_asks_a_relay_for_a_new_view_that_was_told_nothing() {
     let mut now = Instant::ZERO;
@@ -190,14 +190,14 @@ fn a_relay_that_missed_the_gatherings_before_asks_for_a_new_view() {
     assert_asks_for_a_view(&mut relay, &mut now);
 }
 
-/// All that it says before long are hellos that call for a view, the second flag of five.
+/// Asserts that the relay soon requests a view, by the second flag of a hello.
 fn assert_asks_for_a_view(relay: &mut Relay, now: &mut Instant) {
     let out = settle(relay, now);
     let calls = |said: &Said| matches!(said, Said::Hello(hello) if hello.flags & 2 > 0);
     assert!(out.iter().any(|(_, said)| calls(said)), "{out:?}");
 }
 
-/// Nobody before a relay speaks for it, or for who comes after it.
+/// Checks that earlier relays never report a relay's own profile or a later one.
 #[test]
 fn a_gathering_with_a_seat_of_its_receiver_is_stale() {
     for index in [4, 5] {
@@ -209,7 +209,7 @@ fn a_gathering_with_a_seat_of_its_receiver_is_stale() {
     }
 }
 
-/// Of another pass, after other relays, without what was handed on, beyond the chain, or twice.
+/// Checks rosters of another pass, after other relays, incomplete, beyond the chain, or with duplicates.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let now = Instant::ZERO;

@@ -1,5 +1,4 @@
-//! What the joint method says: sweeps from beside the line, and what relays bring along. Their ranges, number by number, their counts,
-//! what is refused, and what a relay does with them.
+//! Messages of the joint method (lateral sweeps, profile collections): ranges, counts and refusals.
 
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::Ladder;
@@ -19,7 +18,7 @@ pub(crate) fn aside() -> Said {
     }
 }
 
-/// What `count` relays bring along.
+/// Returns a collection with the profiles of `count` relays.
 pub(crate) fn seats(count: u16) -> Seats {
     Seats {
         number: 1,
@@ -43,7 +42,7 @@ fn numbers_are_accepted_up_to_their_bounds_and_no_farther() {
         (&gather, 24, 1e-6, 1e6, "power of a second seat"),
         (&gathered, 14, 1e-6, 1e6, "power of a seat"),
     ]);
-    // Zero is for relays that choose.
+    // Zero is the altitude of relays that choose one.
     for said in [gather, gathered] {
         for (altitude_m, expected) in [
             (0.0, Ok(())),
@@ -126,7 +125,7 @@ fn cut_longer_and_padded_ones_are_refused() {
     }
 }
 
-/// Whatever a relay has in memory, only what is in range is taken at the other end.
+/// Checks that the receiver refuses out-of-range values, whatever a sender encodes.
 #[test]
 fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
     let sweep = |y_m| {
@@ -172,8 +171,7 @@ fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
     }
 }
 
-/// A relay on the line that was given its place there, and one that is there by choice, are told apart; what is measured has no
-/// place in the latter.
+/// Checks that a chosen position on the line differs from a given one, and excludes measured values.
 #[test]
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {

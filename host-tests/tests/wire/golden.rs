@@ -1,6 +1,7 @@
-//! Golden vectors, both ways: `data/vectors.json`, made by a Python program of its own (bodies by the byte tables, those of
-//! the tags 0 and 2 again by the postcard implementation pohlednice 0.2.1, CRC bit by bit, COBS by its definition, ladders
-//! with each step rounded).
+//! Golden vectors in both directions: `data/vectors.json`, from an independent Python program.
+//!
+//! It encodes bodies by the byte tables (tags 0 and 2 also by the postcard implementation pohlednice 0.2.1), CRC bit by bit,
+//! COBS by definition, and ladders with each step rounded.
 
 use serde::Deserialize;
 use uav_relay::optimiser::ladder::Ladder;
@@ -67,14 +68,13 @@ impl Frame {
     }
 }
 
-/// The vectors of the file.
 pub(crate) fn vectors() -> Vectors {
     let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
     assert!(vectors.frames.len() >= 69 && vectors.ladders.len() >= 10);
     vectors
 }
 
-/// The bytes that pairs of hexadecimal digits stand for.
+/// Decodes hexadecimal digits.
 pub(crate) fn bytes(hex: &str) -> Vec<u8> {
     let digits: Vec<u32> = hex
         .chars()
@@ -88,7 +88,6 @@ pub(crate) fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// The one frame that the deframer finds in `wire`, at its last byte.
 pub(crate) fn only_frame(wire: &[u8]) -> Vec<u8> {
     let mut deframer = Deframer::new();
     let (end, before) = wire.split_last().unwrap();

@@ -1,4 +1,4 @@
-//! What Tx and Rx may say to a relay, and what they are told.
+//! Messages between the ground stations at Tx and Rx and a relay.
 
 use uav_relay::wire::digest::digest;
 use uav_relay::{Event, Port, Relay, Wiring};
@@ -10,7 +10,7 @@ use super::signed::{Peer, said, with_key};
 use super::uploads::{NOW, held, hello, mission_id, upload};
 use super::votes::{ASKS, FLIES, FORMS, FRESH, READY, between, events, long};
 
-/// What Tx is told by relay 1, or Rx by relay 8.
+/// Returns the messages of relay 1 to Tx, or of relay 8 to Rx.
 fn told(relay: &mut Relay, ground: u16) -> Vec<Said> {
     let told = said(relay, NOW);
     let told = told.into_iter().filter(|(to, _)| *to == ground);
@@ -34,10 +34,10 @@ fn tx_and_rx_offer_and_ask_and_are_told() {
         let mut relay = with_key(own, wiring);
         let base = digest(relay.mission());
         let mut ground_peer = Peer::meets(&mut relay, own, ground, port);
-        // On its other side all are silent yet; and a leader awaits no pass.
+        // Its other side is still silent; and a leader awaits no pass.
         let flags = if own == 1 { 0 } else { FRESH };
         assert_eq!(told(&mut relay, ground), [], "it has only become known");
-        // As many as hang together from it on away from the ground; itself alone while it is fresh.
+        // The hello counts the relays connected away from the ground station: only itself while it is fresh.
         let behind = if own == 1 { 8 } else { 1 };
         let first = long(behind, hello(base, 0, (base, 0), flags | FLIES));
         ground_peer.says(&mut relay, NOW, &hello(base, 0, (1, 1), READY));
@@ -73,7 +73,7 @@ fn what_tx_and_rx_may_not_say_is_misaddressed() {
             _ => "misaddressed",
         };
         assert_eq!(counted(after.stats()), [expected], "{one:?}");
-        // It does not listen.
+        // The relay does not listen.
         let refused = u32::from(matches!(one, Said::Level { .. }));
         assert_eq!(after.stats().samples_refused, refused, "{one:?}");
     }

@@ -1,4 +1,4 @@
-//! One message of each kind, and a relay that is told them.
+//! Messages of each kind, and a relay to receive them.
 
 use host_tests::fixtures::{NETWORK, paper};
 use uav_relay::wire::digest::digest;
@@ -16,17 +16,17 @@ use super::receive::{drain, relay_of};
 use super::stream::unstuffed;
 use super::votes::{granted, id, proposed};
 
-/// A field of next to no interference.
+/// Field with almost no interference.
 pub(crate) const WEAK: Field = Field::new(&[FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 1e32,
 }]);
 
-/// The number of the first pass of a leader's life, and of the one after it.
+/// Numbers of the first two passes of a leader's life.
 pub(crate) const FIRST: u16 = 64;
 pub(crate) const SECOND: u16 = 65;
 
-/// The paper's scenario with this interference, between 20 m and 300 m, with room to both sides.
+/// Returns the paper's scenario with another interference, a band of 20 m to 300 m, and lateral room.
 pub(crate) fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
         interference,
@@ -42,12 +42,12 @@ pub(crate) fn mission(interference: Interference) -> MissionConfig {
     }
 }
 
-/// The same with the paper's interferer.
+/// Returns the paper's scenario with its interferer, a band of 20 m to 300 m, and lateral room.
 pub(crate) fn source() -> MissionConfig {
     mission(paper(8).interference)
 }
 
-/// The stream of one frame to relay `own` from the side of `port`.
+/// Encodes a frame to relay `own` from the side of `port`.
 pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
     let header = Header {
         network: NETWORK,
@@ -62,14 +62,14 @@ pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// What `relay` sends at `now`, but for claims to its number: ports, and bodies as the rules read them.
+/// Returns the ports and messages that `relay` sends at `now`, without claims.
 pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = sent_with_claims(relay, now);
     out.retain(|(_, said)| !matches!(said, Said::Claim { .. }));
     out
 }
 
-/// What `relay` sends at `now`: ports, and bodies as the rules read them.
+/// Returns the ports and messages that `relay` sends at `now`.
 pub(crate) fn sent_with_claims(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
@@ -82,7 +82,7 @@ pub(crate) fn sent_with_claims(relay: &mut Relay, now: Instant) -> Vec<(Port, Sa
     out
 }
 
-/// Lets time pass until `relay` has no work to do, at most a second; what it sends on the way.
+/// Advances time until `relay` is idle, at most a second. Returns the messages sent.
 pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
     let mut out = sent(relay, *now);
     for _ in 0..1000 {
@@ -93,7 +93,7 @@ pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> 
     out
 }
 
-/// What relay `index` brings along.
+/// Returns a collection with the profile of relay `index`.
 pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
     Seats {
         number,
@@ -103,7 +103,7 @@ pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
     }
 }
 
-/// The echo of a claim to the receiver's number.
+/// Returns the echo of a claim to the receiver's number.
 const fn an_echo() -> Said {
     Said::Claim {
         number: 1,
@@ -112,7 +112,7 @@ const fn an_echo() -> Said {
     }
 }
 
-/// What two relays hear of a source that all believe in.
+/// Returns two relays' measurements of a source that all estimate alike.
 pub(crate) fn heard(number: u16, mission: u16) -> Heard {
     let mut sums = [0.0; 18];
     [sums[0], sums[14], sums[15], sums[16], sums[17]] = [2.0, 0.5, 2.0, 64.0, 3.0];
@@ -128,7 +128,7 @@ pub(crate) fn heard(number: u16, mission: u16) -> Heard {
     }
 }
 
-/// One message of each tag, of this pass.
+/// Returns a message of each tag for the pass `number`.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let x_m = 400.0;
     let altitude_m = 20.0;
@@ -231,7 +231,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     ]
 }
 
-/// Relay 4 of 8 and the ports that a pass comes from and goes to.
+/// Returns relay 4 of 8 and the ports from and to which passes go.
 pub(crate) fn relay_4(config: MissionConfig) -> (Relay, Port, Port) {
     let relay = relay_of(config, 4, Wiring::Pair);
     match config.interference {
@@ -242,7 +242,7 @@ pub(crate) fn relay_4(config: MissionConfig) -> (Relay, Port, Port) {
     }
 }
 
-/// Has `relay` take its place by pass `number`.
+/// Makes `relay` hold its position by pass `number`.
 pub(crate) fn placed(relay: &mut Relay, (from, to): (Port, Port), now: &mut Instant, number: u16) {
     let kinds = one_of_each(number, digest(relay.mission()));
     for (port, said) in [(from, &kinds[0]), (to, &kinds[1])] {

@@ -1,4 +1,4 @@
-//! Random ladders: the crate and the rules agree to the bit, on the targets and on which ladders are valid.
+//! Random ladders: targets and validity agree between the crate and the rules, to the bit.
 
 use proptest::prelude::*;
 use uav_relay::optimiser::ladder::Ladder;
@@ -11,7 +11,7 @@ fn bits(targets: &[f32]) -> Vec<u32> {
     targets.iter().map(|target| target.to_bits()).collect()
 }
 
-/// The same ladder with each step upward fused into one operation, which the format forbids.
+/// Returns the ladder with fused multiply-add, which the format forbids.
 fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     let mut gap = f32::from_bits(0x3300_0000 + (u32::from(gap) << 20));
     let mut targets = targets(anchor, 1, 0);

@@ -1,4 +1,4 @@
-//! Frames in good order: what neighbours may lie about, and what a relay sends itself.
+//! Well-formed frames with false contents, and a relay's own frames.
 
 use std::cell::Cell;
 
@@ -17,12 +17,12 @@ use super::receive::{drain, relay};
 use super::strategies::{messages, sweeps};
 use super::stream::unstuffed;
 
-/// The view of that number which relay 1 proposes; what is proposed has a number above 0.
+/// Returns the view of that number proposed by relay 1; proposed numbers are above 0.
 fn view(number: u16) -> u32 {
     u32::from(number.max(1)) << 10 | 1
 }
 
-/// Puts a number and a digest into a message, where it has them.
+/// Sets the number and digest of a message, where it has them.
 pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
     match &mut said {
         Said::Sweep(sweep) | Said::Measured { sweep, .. } | Said::Aside { sweep, .. } => {
@@ -48,14 +48,14 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         } => (*number, *mission) = (as_number, as_mission),
         Said::Claim { number, .. } => *number = as_number.into(),
         Said::Busy { number } => *number = as_number,
-        // The number of a fence is that of a talk, never 0.
+        // A fence's number is that of its association, never 0.
         Said::Heartbeat { mission, .. }
         | Said::Fence(Fenced { mission, .. })
         | Said::Level { mission, .. } => {
             *mission = as_mission;
         }
         Said::Hello(hello) => (hello.newest, hello.mission) = (view(as_number), as_mission),
-        // Of a view that flies the mission that was loaded.
+        // The view has the loaded mission.
         Said::Proposal(proposed) => {
             let Proposed {
                 call,
@@ -83,7 +83,7 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
     said
 }
 
-/// Messages in range that fit the sweep under way, from neighbours that lie: whatever they lead to stays on the line.
+/// Sends plausible false messages about the sweep in progress: setpoints stay on the line.
 #[test]
 fn lies_within_the_ranges_never_lead_out_of_bounds() {
     let setpoints = Cell::new(0);

@@ -1,7 +1,6 @@
-//! The wire format judged from outside: against golden vectors, against a second codec written from `FORMAT.md`'s rules,
-//! and with everything that must be refused.
+//! Wire format compared with golden vectors and a second codec written from `FORMAT.md`.
 //!
-//! Random tests draw from the environment variable `SEED` (1 if unset), which each of them prints.
+//! Random tests use the environment variable `SEED` (1 if unset), which each prints.
 
 use proptest::test_runner::{Config, RngSeed};
 use uav_relay_oracle::random::seed;
@@ -43,7 +42,7 @@ mod view_strategies;
 mod views;
 mod votes;
 
-/// `cases` cases from the seed in `SEED`; a failure prints its shrunk input and leaves no file behind.
+/// Returns a configuration for `cases` cases from `SEED`; failures leave no file behind.
 fn config(cases: u32) -> Config {
     Config {
         cases,

@@ -1,4 +1,4 @@
-//! The part of the second codec that is about uploads: what an offer says, its bytes, and its ranges.
+//! Second codec for uploads: contents of an offer, its bytes and ranges.
 
 use serde::Deserialize;
 use uav_relay::wire::message::Message;
@@ -6,11 +6,11 @@ use uav_relay::{Band, Interference, Interferer, Profile, Sites, Upload};
 
 use super::codec::{narrow, wide};
 
-/// A mission with its version, in the order in which it is sent.
+/// Mission with its version, in order of transmission.
 #[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
 pub(crate) struct Offer {
     pub(crate) version: u16,
-    /// Digest of the mission that was loaded before flight.
+    /// Digest of the mission loaded before flight.
     pub(crate) base: u16,
     pub(crate) relays: u16,
     pub(crate) distance_m: f32,
@@ -18,7 +18,6 @@ pub(crate) struct Offer {
     pub(crate) tx_power_w: f32,
     pub(crate) altitude_m: f32,
     pub(crate) power_w: f32,
-    /// The interferer's.
     pub(crate) interferer_w: f32,
     pub(crate) x_m: f32,
     pub(crate) y_m: f32,
@@ -28,18 +27,18 @@ pub(crate) struct Offer {
     pub(crate) eta: f64,
     pub(crate) least_m: f32,
     pub(crate) most_m: f32,
-    /// How far to the left, at most 0, and to the right, at least 0.
+    /// Lateral room to the left, at most 0, and to the right, at least 0.
     pub(crate) left_m: f32,
     pub(crate) right_m: f32,
     /// Noise power at every receiver; 0 for none.
     pub(crate) noise_w: f32,
     /// Latitude, longitude and height of Tx, then of Rx; all 0 for none.
     pub(crate) sites: [i32; 6],
-    /// The number of the hello that it answers; 0 for none.
+    /// Number of the hello that it answers; 0 for none.
     pub(crate) answer: u16,
 }
 
-/// Where each number begins in the body.
+/// Offset of each number in the body.
 pub(crate) const RELAYS: usize = 5;
 pub(crate) const DISTANCE: usize = 7;
 pub(crate) const SEPARATION: usize = 11;
@@ -61,12 +60,11 @@ pub(crate) const NOISE: usize = 83;
 pub(crate) const SITES: usize = 87;
 pub(crate) const ANSWER: usize = 111;
 
-/// Bytes of the body, and how many of them are kept across a reboot.
+/// Length of the body, and of the part stored across a reboot.
 pub(crate) const BYTES: usize = 113;
 pub(crate) const KEPT: usize = 111;
 
 impl Offer {
-    /// The bytes of the body.
     pub(crate) fn body(&self) -> Vec<u8> {
         let mut out = vec![14];
         for word in [self.version, self.base, self.relays] {
@@ -104,14 +102,14 @@ impl Offer {
         out
     }
 
-    /// What is kept of it: what it answers says nothing of the mission.
+    /// Encodes the stored part, without the answered hello.
     pub(crate) fn kept(&self) -> Vec<u8> {
         let mut body = self.body();
         body.truncate(KEPT);
         body
     }
 
-    /// What the bytes after the tag say, if there are enough of them, and those that are left.
+    /// Decodes an offer after its tag. Returns it with the remaining bytes.
     pub(crate) fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (bytes, rest) = bytes.split_at_checked(BYTES - 1)?;
         let word = |at: usize| u16::from_le_bytes([bytes[at - 1], bytes[at]]);
@@ -171,7 +169,6 @@ impl Offer {
                 .all(|at| self.sites[*at].unsigned_abs() <= 1_800_000_000)
     }
 
-    /// Whether nobody knows the interferer.
     fn is_unknown(&self) -> bool {
         [self.interferer_w, self.x_m, self.y_m].map(f32::to_bits) == [0; 3]
     }
@@ -182,22 +179,21 @@ impl Offer {
             && f64::from(self.noise_w) * self.eta / f64::from(self.interferer_w) <= 1e12
     }
 
-    /// Whether the relays have room between Tx and Rx.
+    /// Returns true if the relays have room between Tx and Rx.
     fn fits(&self) -> bool {
         let rounding = narrow(wide(self.distance_m) / 2_097_152.0);
         let step = narrow(wide(self.min_separation_m) + wide(rounding));
         narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
-    /// The digest of the mission that it is of: CRC-32C of all but version, base, sites and answer, and of the noise only where there is some;
-    /// and of that and the sites, if it has any.
+    /// Returns the mission's digest: CRC-32C of the mission, and of that with the sites, if any.
     pub(crate) fn digest(&self) -> u16 {
-        // A mission without noise is told by what there is of it.
+        // Zero noise is left out.
         let end = if self.noise_w > 0.0 { SITES } else { NOISE };
         self.between(low_half(&self.body()[RELAYS..end]))
     }
 
-    /// A digest, and its sites.
+    /// Combines a digest with the sites.
     pub(crate) fn between(&self, digest: u16) -> u16 {
         if self.sites == [0; 6] {
             return digest;
@@ -206,7 +202,7 @@ impl Offer {
         low_half(&[&digest.to_le_bytes()[..], &body[SITES..]].concat())
     }
 
-    /// The message that says this. Only the crate can make it of any numbers: each of them must be found again in it.
+    /// Converts to the crate's message, and checks each number in it, since only the crate can construct it.
     pub(crate) fn message(&self) -> Message {
         let upload = Upload::decode(&self.kept()).unwrap();
         let config = upload.config();
@@ -271,7 +267,7 @@ fn low_half(bytes: &[u8]) -> u16 {
     u16::try_from(crc & 0xFFFF).unwrap()
 }
 
-/// One that eight relays could fly.
+/// Returns an offer that eight relays can fly.
 pub(crate) fn offer() -> Offer {
     Offer {
         version: 2,

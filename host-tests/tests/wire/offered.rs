@@ -1,4 +1,4 @@
-//! What proptest draws of offers: missions in range with all their extremes, and where a number in one may be spoiled.
+//! Random offers: valid missions with all extremes, and offsets of numbers to spoil.
 
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ use super::offer::{
 };
 use super::sited::A_KILOMETRE;
 
-/// Where four bytes of an offer are an f32, or the upper half of an f64.
+/// Offsets of four bytes that are an f32 or the upper half of an f64.
 pub(crate) const NUMBERS: [usize; 17] = [
     DISTANCE,
     SEPARATION,
@@ -30,14 +30,14 @@ pub(crate) const NUMBERS: [usize; 17] = [
     NOISE,
 ];
 
-/// From `least` to `most`, small and large alike, and both often.
+/// Draws from `least` to `most`, log-uniform, with frequent limits.
 fn scaled(least: f32, most: f32) -> BoxedStrategy<f32> {
     let any_size =
         (least.log2()..=most.log2()).prop_map(move |log| log.exp2().max(least).min(most));
     prop_oneof![4 => any_size, 1 => Just(least), 1 => Just(most)].boxed()
 }
 
-/// Number of relays, distance, and a separation that they have room for.
+/// Draws a number of relays, a distance, and a separation that fits.
 fn rooms() -> BoxedStrategy<(u16, f32, f32)> {
     let relays = prop_oneof![4 => 1..=9_u16, 1 => 1..=1000_u16, 1 => Just(1), 1 => Just(1000)];
     let parts = prop_oneof![4 => 0.0..0.99_f32, 1 => Just(0.0), 1 => Just(-0.0)];
@@ -49,12 +49,12 @@ fn rooms() -> BoxedStrategy<(u16, f32, f32)> {
         .boxed()
 }
 
-/// Parts of the most noise: often none.
+/// Draws a fraction of the largest noise, often none.
 fn noises() -> BoxedStrategy<f64> {
     prop_oneof![2 => Just(0.0), 2 => 0.0..=1.0_f64, 1 => Just(1.0)].boxed()
 }
 
-/// Path-loss factors in order.
+/// Draws path-loss factors in order.
 fn factors() -> BoxedStrategy<[f64; 3]> {
     let parts = prop_oneof![4 => 0.0..=1.0_f64, 1 => Just(0.0), 1 => Just(1.0)];
     let logs = prop_oneof![4 => -3.0..=30.0_f64, 1 => Just(-3.0), 1 => Just(30.0)];
@@ -69,7 +69,7 @@ fn factors() -> BoxedStrategy<[f64; 3]> {
         .boxed()
 }
 
-/// The ends of a band and an altitude in it.
+/// Draws the limits of a band and an altitude within.
 fn bands() -> BoxedStrategy<[f32; 3]> {
     let ends = prop_oneof![
         3 => (scaled(0.1, 1e5), scaled(0.1, 1e5)),
@@ -88,12 +88,12 @@ fn bands() -> BoxedStrategy<[f32; 3]> {
         .boxed()
 }
 
-/// Room to one side: none, some, as much as may be.
+/// Draws room on one side: none, some or the maximum.
 fn room() -> BoxedStrategy<f32> {
     prop_oneof![2 => Just(0.0), 1 => Just(-0.0), 4 => scaled(0.1, 1e5)].boxed()
 }
 
-/// Along x or aside of it.
+/// Draws a coordinate along or beside the line.
 fn beside() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => -2e3..=2e3_f32,
@@ -104,7 +104,7 @@ fn beside() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// None; anywhere on earth; two that are a kilometre apart.
+/// Draws sites: none, anywhere on earth, or a kilometre apart.
 fn sites() -> BoxedStrategy<[i32; 6]> {
     let site = || {
         (
@@ -117,7 +117,6 @@ fn sites() -> BoxedStrategy<[i32; 6]> {
     prop_oneof![2 => Just([0; 6]), 2 => anywhere, 1 => Just(A_KILOMETRE)].boxed()
 }
 
-/// An offer in range.
 pub(crate) fn offers() -> BoxedStrategy<Said> {
     let versions = prop_oneof![4 => 1..9_u16, 1 => 1..=u16::MAX];
     let powers = (scaled(1e-6, 1e6), scaled(1e-6, 1e6), scaled(1e-6, 1e9));
@@ -145,7 +144,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                 let most_w = if unknown {
                     1.0
                 } else {
-                    // No louder than 1e12 times the interferer at a metre.
+                    // The limit is 1e12 times the interferer's power at a metre.
                     (9e11 * f64::from(interferer_w) / eta).min(1.0)
                 };
                 let [interferer_w, x_m, y_m] = if unknown {

@@ -1,4 +1,4 @@
-//! Random messages and random bytes, where the crate and the codec written from the rules must say the same.
+//! Random messages and bytes: the crate and the second codec agree.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -14,7 +14,7 @@ use super::strategies::{asides, headers, measured, messages, sweeps};
 use super::stream_strategies::bodies;
 use super::view_strategies::heard;
 
-/// Bodies are compared rather than messages: bytes tell -0 from 0.
+/// Encodes a message, because bytes distinguish -0 from 0.
 fn body_of(message: &Message) -> Vec<u8> {
     let mut body = [0; MAX_BODY];
     let len = message.encode(&mut body).unwrap();
@@ -38,7 +38,7 @@ proptest! {
         prop_assert_eq!(message_read, message);
     }
 
-    /// Header, body, CRC, a byte of stuffing and the delimiter.
+    /// Checks the overhead: header, CRC, a byte of stuffing and the delimiter.
     #[test]
     fn every_frame_takes_16_bytes_more_than_its_body_with_one_zero(said in messages(), head in headers()) {
         let mut frame = [0; MAX_FRAME];
@@ -131,7 +131,7 @@ proptest! {
 
     #[test]
     fn any_bytes_at_all_are_refused(bytes in vec(any::<u8>(), 0..300)) {
-        // A right CRC among random ones comes once in 2^32; these draws hold none.
+        // A valid CRC among random ones has probability 2^-32; these draws have none.
         let expected = if bytes.len() < 14 { FrameError::Short } else { FrameError::Crc };
         prop_assert_eq!(frame::decode(&bytes), Err(expected));
         let said = Said::read(&bytes);
@@ -145,12 +145,11 @@ fn the_draws_reach_messages_and_both_refusals() {
     use proptest::strategy::ValueTree;
     use proptest::test_runner::TestRunner;
 
-    /// The first tag without a message, for it and all after it.
+    /// First tag without a message, for it and all later ones.
     const NONE: usize = 20;
 
     let mut runner = TestRunner::new(config(1));
-    // Of each tag: messages, wrongly encoded, out of range. Every busy, every heartbeat and all that comes back of a pulse is in range, and of
-    // pulses all but those of no time.
+    // Counts for each tag: valid, wrongly encoded, out of range.
     let mut seen = [[0; 3]; 21];
     for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();

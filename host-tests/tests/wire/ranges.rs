@@ -1,4 +1,4 @@
-//! The ranges of an offer, number by number, up to their bounds and no farther; and what an operator's upload is written as.
+//! Ranges of an offer, number by number, and the encoding of an operator's upload.
 
 use host_tests::fixtures::paper;
 use uav_relay::channel::AirGround;
@@ -11,7 +11,7 @@ use super::offer::{
     Offer, POWER, RELAYS, RIGHT, SEPARATION, SITES, TOLERANCE, TX_POWER, X, Y, offer,
 };
 
-/// Whether a body is taken; out of range is the only other thing that it may be.
+/// Returns true if a body is accepted; otherwise it must be out of range.
 fn taken(body: &[u8]) -> bool {
     match Message::decode(body) {
         Ok(message) => {
@@ -26,14 +26,13 @@ fn taken(body: &[u8]) -> bool {
     }
 }
 
-/// The body of `offer` with other bytes at `at`.
 fn with(offer: &Offer, at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut body = offer.body();
     body[at..at + bytes.len()].copy_from_slice(bytes);
     body
 }
 
-/// An offer for one relay, which always has room, and for any altitude.
+/// Returns an offer for one relay, which always has room, with any altitude.
 fn roomy() -> Offer {
     Offer {
         relays: 1,
@@ -162,7 +161,7 @@ fn any_version_but_0_is_taken_and_up_to_a_thousand_relays() {
     }
 }
 
-/// From a little below the largest separation to a little above, in steps of one f32.
+/// Checks separations from slightly below to slightly above the limit, in f32 steps.
 #[test]
 fn relays_are_offered_no_longer_a_chain_than_there_is_room_for() {
     let mut seen = [0; 2];
@@ -189,7 +188,7 @@ fn relays_are_offered_no_longer_a_chain_than_there_is_room_for() {
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
 }
 
-/// A mission with another number in every place.
+/// Returns a mission in which every number differs.
 fn other(channel: Channel) -> MissionConfig {
     MissionConfig {
         relays: 8,
@@ -222,7 +221,7 @@ fn other(channel: Channel) -> MissionConfig {
 #[test]
 fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
     let base = Mission::try_new(paper(8)).unwrap();
-    // As large with line of sight as without: the weighted sum may be rounded to something else, and is written between them.
+    // With equal losses the weighted sum may be rounded, and is encoded between them.
     let equal = (0..=100).map(|step| (1.5, AirGround::Weighted(f64::from(step) / 100.0)));
     let others = [
         (3.0, AirGround::Los),

@@ -1,5 +1,4 @@
-//! The receiving side of a relay, fed with anything: each frame is counted once and where the document says, nothing
-//! panics, and noise makes no setpoint.
+//! Relay that receives random data: each frame is counted once, without panics or setpoints.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -22,7 +21,7 @@ use super::config;
 use super::stream::{chunks, unstuffed};
 use super::stream_strategies::pieces;
 
-/// A field in which a chain of eight can be placed.
+/// Field in which a chain of eight is feasible.
 pub(crate) const FIELD: Field = Field::new(&[
     FieldPoint {
         x_m: -100.0,
@@ -38,12 +37,11 @@ pub(crate) const FIELD: Field = Field::new(&[
     },
 ]);
 
-/// Relay `index` of `relays` in the paper's scenario, on network 7.
+/// Returns relay `index` of `relays` in the paper's scenario, on network 7.
 pub(crate) fn relay(index: u16, relays: u16, wiring: Wiring) -> Relay {
     relay_of(paper(relays), index, wiring)
 }
 
-/// Relay `index` of this mission, on network 7.
 pub(crate) fn relay_of(mission: MissionConfig, index: u16, wiring: Wiring) -> Relay {
     let mission = Mission::try_new(mission).unwrap();
     let settings = Settings {
@@ -53,7 +51,7 @@ pub(crate) fn relay_of(mission: MissionConfig, index: u16, wiring: Wiring) -> Re
     fixtures::relay(mission, index, settings)
 }
 
-/// The counters of which each incoming frame raises one.
+/// Returns the counters of which each received frame increments one.
 fn of_frames(stats: &Stats) -> [(&'static str, u32); 9] {
     [
         ("crc", stats.crc),
@@ -68,14 +66,14 @@ fn of_frames(stats: &Stats) -> [(&'static str, u32); 9] {
     ]
 }
 
-/// The counters of incoming frames and messages that are above zero, by name.
+/// Returns the names of the reception counters above zero.
 pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
     let of_messages = [
         ("misdirected", stats.misdirected),
         ("mission", stats.mission),
         ("repeated", stats.repeated),
         ("stale", stats.stale),
-        // Of messages at a relay without a key, which asks for no tag.
+        // Messages at a relay without a key.
         ("unsigned", stats.unsigned),
         ("view", stats.view),
     ];
@@ -88,8 +86,7 @@ pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
     names
 }
 
-/// Which counter the table of the document has for the bytes between two delimiters, at relay `own` of 8 that takes these
-/// two nodes for its neighbours.
+/// Returns the documented counter for the bytes between two delimiters, at relay `own` of 8.
 fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port) -> &'static str {
     let plain = match unstuffed(chunk) {
         Ok(plain) => plain,
@@ -136,14 +133,14 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
     match Said::read(&checked[10..]) {
         Err(_) => "malformed",
         Ok(Said::Hello(_) | Said::Claim { .. }) => "received",
-        // Tx and Rx say that.
+        // Only Tx and Rx send that.
         Ok(Said::Level { .. }) => "misaddressed",
         Ok(_) if neighbours.contains(&Some(sender)) => "received",
         Ok(_) => "misaddressed",
     }
 }
 
-/// Lets the relay do all it has to do at `now`; what it sends must be frames. Returns how many it sent.
+/// Sends all pending frames of the relay, which must be valid. Returns their number.
 pub(crate) fn drain(relay: &mut Relay, now: Instant) -> usize {
     let mut sent = 0;
     let mut buffer = [0; MAX_FRAME];
@@ -158,7 +155,7 @@ pub(crate) fn drain(relay: &mut Relay, now: Instant) -> usize {
     sent
 }
 
-/// Headers that are mostly for relay 4, from its neighbours, and sometimes anything.
+/// Draws headers, mostly to relay 4 from its neighbours.
 fn near_relay_4() -> impl Strategy<Value = Header> {
     let network = prop_oneof![8 => Just(NETWORK), 1 => any::<u16>()];
     let sender = prop_oneof![4 => Just(3), 4 => Just(5), 2 => 0..10_u16, 1 => 0..=4095_u16];
@@ -173,7 +170,7 @@ fn near_relay_4() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Feeds relay `index` of 8 with random pieces at random ports and compares every counter; all of `expected` must occur.
+/// Feeds relay `index` of 8 with random pieces; all counters of `expected` must occur.
 fn fed_with_anything(
     interference: Interference,
     index: u16,
@@ -206,7 +203,7 @@ fn fed_with_anything(
                     relay.handle_bytes(now, port, frame);
                     stream.extend(frame);
                     for chunk in chunks(stream).into_iter().filter(|_| wired(port)) {
-                        // A claim is taken by a passive relay, too.
+                        // A passive relay accepts claims too.
                         let decoded = unstuffed(chunk).map(|plain| frame::decode(&plain));
                         let claims = matches!(decoded, Ok(Ok((_, Message::Claim(_)))));
                         let name = match by_the_rules(chunk, index, neighbours, port) {

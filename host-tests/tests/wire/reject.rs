@@ -1,5 +1,4 @@
-//! What must be refused although its CRC is right, and with which reason: other versions, bodies that are no message,
-//! numbers out of range. `document.rs` has the same for the rows of the document.
+//! Refusals in spite of a valid CRC: versions, bodies, ranges; `document.rs` tests the document's rows.
 
 use uav_relay::wire::frame::{self, FrameError};
 use uav_relay::wire::message::MessageError;
@@ -35,7 +34,7 @@ pub(crate) fn verdict(commit: Option<u8>, slacks: &[f32]) -> Said {
     })
 }
 
-/// A verdict with a stand, which is at 10.
+/// Returns a verdict with a position, at offset 10.
 pub(crate) fn stood(x_m: f32) -> Said {
     Said::Verdict(Judged {
         number: 1,
@@ -91,7 +90,7 @@ pub(crate) const HELLO: Greeting = Greeting {
     flags: 0,
 };
 
-/// The first view that node 1 proposes.
+/// First view proposed by node 1.
 pub(crate) const VIEW: SizedView = SizedView {
     id: 0x0401,
     relays: 1,
@@ -103,7 +102,7 @@ pub(crate) const CALL: Call = Call {
     place: 1,
 };
 
-/// The next view of node 1000, the last that may propose.
+/// Next view of node 1000, the largest that may propose.
 pub(crate) const PROPOSAL: Proposed = Proposed {
     call: Call {
         view: 0x0BE8,

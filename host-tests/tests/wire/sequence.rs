@@ -1,5 +1,4 @@
-//! Intact messages of every kind, in any order and from either side: what a relay takes them for in a mission with an
-//! interferer and in one with a field.
+//! Intact messages in any order from either side, in a mission with an interferer and one with a field.
 
 use uav_relay::wire::digest::digest;
 use uav_relay::{Instant, Interference, Port, Wiring};
@@ -49,7 +48,7 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
         let other = own ^ 0x4000;
         let hello = |port| {
             let neighbour = if port == Port::Upstream { 3 } else { 5 };
-            // Fresh: it is alone.
+            // The relay is fresh, so it is alone.
             long(1, hearing(1, a_hello(0, own, neighbour, ASKS | FRESH)))
         };
         for said in one_of_each(FIRST, other) {
@@ -62,7 +61,7 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
             for port in [from, to] {
                 let mut after = relay.clone();
                 after.handle_bytes(Instant::ZERO, port, &framed(4, port, &said));
-                // That is for hellos and heartbeats to tell: of a view it may be another view alone.
+                // Hellos and heartbeats reveal another mission; a pass may only be of another view.
                 let of_a_view = !matches!(said.body()[0], 3 | 10 | 13 | 14);
                 let (expected, greeted) = if of_a_view {
                     (["received", "view"], Some((port, hello(port))))
@@ -158,7 +157,7 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
                 relay.handle_bytes(now, from, &framed(4, from, &one_of_each(FIRST, digest)[0]));
                 drain(&mut relay, now);
             }
-            // An answer to another pass, or of another kind; a token for a relay without a place; a pass that is over.
+            // Answer to another pass or of another kind; token for a relay without a position; pass that is over.
             let mut stale = vec![(from, one_of_each(SECOND, digest)[8].clone())];
             for kind in [1, 9] {
                 let number = if with_sweep && kind != 1 {
@@ -184,7 +183,7 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
     }
 }
 
-/// Nobody stands beyond Rx, whatever a neighbour says.
+/// Checks false positions beyond Rx.
 #[test]
 fn what_comes_from_beyond_rx_is_of_no_use() {
     let (mut relay, from, to) = relay_4(source());
@@ -218,7 +217,7 @@ fn what_comes_from_beyond_rx_is_of_no_use() {
     assert_eq!((*port, &sweep.reaches[..]), (to, &[][..]));
 }
 
-/// In a field there are no turns: such a pass changes nothing about the one under way.
+/// Checks that a token in a field does not affect the pass in progress.
 #[test]
 fn tokens_are_stale_in_a_field() {
     let (mut relay, from, to) = relay_4(mission(Interference::Field(FIELD)));
@@ -232,7 +231,7 @@ fn tokens_are_stale_in_a_field() {
     assert_eq!(after.phase(), relay.phase());
 }
 
-/// However far below a chain's best a target is, it is met: what is too large for an f32 on the way is no obstacle.
+/// Checks that tiny targets are met, although intermediate values exceed f32.
 #[test]
 fn the_smallest_targets_are_met_in_a_field() {
     for (field, anchor) in [
@@ -254,7 +253,7 @@ fn the_smallest_targets_are_met_in_a_field() {
             );
             match &sent(&mut relay, now)[..] {
                 [(Port::Upstream, Said::Sweep(Swept { reaches, .. }))] => {
-                    // Three relays before it may be above each other, as far as this one knows, and those then keep no distance along x.
+                    // As far as this relay knows, the three before it may be above each other, without distance along x.
                     assert!((1e-4..1e-2).contains(&reaches[0]), "{reaches:?}");
                 }
                 [

@@ -1,4 +1,4 @@
-//! On a channel that all hear: who is heard, and how two relays become neighbours.
+//! Shared channel: reception range, and how two relays become neighbours.
 
 use uav_relay::wire::digest::digest;
 use uav_relay::{Duration, Instant, Port, Relay, Wiring};
@@ -8,8 +8,7 @@ use super::kinds::{FIRST, one_of_each, sent};
 use super::receive::{counted, relay};
 use super::votes::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
 
-/// On a channel that all hear, hellos come from up to four nodes away; anything else from a node that is no neighbour is
-/// counted as misaddressed and answered by a hello, which says who the neighbours are.
+/// Checks hellos from up to four nodes away; other frames of strangers count as misaddressed.
 #[test]
 fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
     let now = Instant::ZERO;
@@ -20,13 +19,13 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         near.handle_bytes(now, Port::Shared, &between(sender, 6, &hello));
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
         let neighbour = if sender <= 6 { 5 } else { 7 };
-        // It hears whoever has just said something, but for nodes that are too far away.
+        // The relay receives the sender's frames, unless it is too far away.
         let mask = if heard {
             1 << (sender.abs_diff(6) - 1)
         } else {
             0
         };
-        // Fresh: it is alone.
+        // The relay is fresh, so it is alone.
         let answer = |from| long(1, hearing(mask, a_hello(0, mission, from, FRESH)));
         if heard {
             assert_eq!(counted(near.stats()), ["received"], "{sender}");
@@ -35,7 +34,7 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         }
         let out = sent(&mut near, now);
         let own = if sender == neighbour {
-            // It says that it takes nobody: courted until it says otherwise.
+            // The node reports no neighbour: the relay waits for its choice.
             assert_eq!(out.len(), 1);
             continue;
         } else {
@@ -58,13 +57,11 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
     }
 }
 
-/// Relay `own` of 12 on a shared channel.
 fn relay_of_12(own: u16) -> Relay {
     relay(own, 12, Wiring::Shared)
 }
 
-/// A neighbour that takes nobody is courted; what is said to it waits until it takes this relay again. If it has heard of a
-/// newer view by then, one of the two has missed something.
+/// Checks a neighbour that reports no neighbour: messages wait until it chooses this relay again.
 #[test]
 fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
     let now = Instant::ZERO;
@@ -76,7 +73,7 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
         assert!(soon(&mut relay, now).is_empty(), "{newest}");
         let now = now + Duration::from_millis(1);
         relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
-        // Somebody is on its other side now; but node 5 takes nobody, as far as it has said, so this relay comes between it and nobody.
+        // The node now has a neighbour on its other side; node 5 has reported none, so this relay separates no link.
         let flags = ASKS | FORMS | FRESH;
         let call = long(1, a_hello(newest, mission, 5, flags));
         let expected = calls.then_some((Port::Shared, call));
@@ -87,7 +84,7 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
     }
 }
 
-/// What waits for an answer is not said to a neighbour that takes another, and is said again once it takes this relay.
+/// Checks that a pending pass is held while the neighbour has chosen another node, and repeated afterwards.
 #[test]
 fn a_pass_waits_for_a_neighbour_that_takes_another() {
     let now = Instant::ZERO;
@@ -110,8 +107,7 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     );
 }
 
-/// A link that bears frames one way alone is none: whoever does not hear this relay has not taken it, whatever it says. But one that
-/// was linked stays so: a run of lost frames does not undo what was heard before.
+/// Checks that a one-way link is ignored, and that losses do not break an established one.
 #[test]
 fn a_neighbour_that_does_not_hear_the_relay_is_not_linked_but_stays_so() {
     let now = Instant::ZERO;

@@ -1,4 +1,4 @@
-//! A node that has the key, by the rules of `FORMAT.md`: a neighbour of the relay under test, or Tx or Rx.
+//! Peer with the key, by the rules of `FORMAT.md`: a neighbour or a ground station.
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
@@ -20,14 +20,14 @@ const KEY: [u8; 32] = *b"whoever reads this is not secret";
 const SIGNED: u8 = 0x10;
 const HELLO: u8 = 0x20;
 
-/// Relay `index` of eight in the paper's scenario, which has the key.
+/// Returns relay `index` of eight in the paper's scenario, with the key.
 pub(crate) fn with_key(index: u16, wiring: Wiring) -> Relay {
     let mission = Mission::try_new(paper(8)).unwrap();
     let (identity, settings) = set(index, wiring);
     Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
 }
 
-/// Who such a relay is, and what it is set to.
+/// Returns the identity and settings of relay `index` with the key.
 pub(crate) fn set(index: u16, wiring: Wiring) -> (Identity, Settings) {
     let identity = Identity {
         network: NETWORK,
@@ -44,21 +44,21 @@ pub(crate) fn set(index: u16, wiring: Wiring) -> (Identity, Settings) {
     (identity, settings)
 }
 
-/// Another node, and what it shares with the relay.
+/// Peer node with its session.
 #[derive(Clone, Debug)]
 pub(crate) struct Peer {
     node: u16,
     relay: u16,
     port: Port,
-    /// Its nonce toward the relay, and the relay's toward it.
+    /// Nonces of the peer and the relay.
     nonces: [u64; 2],
     counter: u32,
-    /// Digest of the mission that the relay was loaded with.
+    /// Digest of the mission loaded at the relay.
     base: u16,
 }
 
 impl Peer {
-    /// Node `node` meets `relay`, which then knows it.
+    /// Creates a peer `node` and authenticates it with `relay`.
     pub(crate) fn meets(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
         let mut peer = Self {
             node,
@@ -68,7 +68,7 @@ impl Peer {
             counter: 0,
             base: digest(relay.mission()),
         };
-        // It asks, it is answered, it shows that it has heard that.
+        // The peer asks, is answered, and confirms the answer.
         peer.handshake(relay, true);
         let answer = frames(relay, Instant::ZERO)
             .into_iter()
@@ -93,7 +93,6 @@ impl Peer {
         relay.handle_bytes(Instant::ZERO, self.port, &frame);
     }
 
-    /// The next frame with such a body.
     fn frame(&mut self, flags: u8, body: &[u8]) -> Vec<u8> {
         let mut bytes = header(Header {
             network: NETWORK,
@@ -113,7 +112,7 @@ impl Peer {
         wire(&sealed(bytes))
     }
 
-    /// Says something to the relay; an offer answers the hello that it would say now.
+    /// Sends a message to the relay; an offer answers the relay's current hello.
     pub(crate) fn says(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
         let mut said = said.clone();
         if let Said::Offer(offer) = &mut said {
@@ -122,7 +121,7 @@ impl Peer {
         self.says_as_it_is(relay, now, &said);
     }
 
-    /// The number of the hello that `relay` says when it is asked for one.
+    /// Returns the number of the hello with which `relay` answers a request.
     pub(crate) fn number(&mut self, mut relay: Relay, now: Instant) -> u16 {
         let mission = self.base;
         let asks = Said::Hello(Greeting {
@@ -151,14 +150,14 @@ impl Peer {
         hello.unwrap().nonce
     }
 
-    /// Says just that.
+    /// Sends a message unchanged.
     pub(crate) fn says_as_it_is(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
         let frame = self.frame(SIGNED, &said.body());
         relay.handle_bytes(now, self.port, &frame);
     }
 }
 
-/// All frames that `relay` sends at `now`: to whom, with which flags, which body.
+/// Returns destination, flags and body of all frames that `relay` sends at `now`.
 fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
@@ -171,7 +170,7 @@ fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
     out
 }
 
-/// What `relay` says at `now`, and to whom; handshakes left out, and the numbers of hellos.
+/// Returns the messages that `relay` sends at `now`, without handshakes and hello numbers.
 pub(crate) fn said(relay: &mut Relay, now: Instant) -> Vec<(u16, Said)> {
     frames(relay, now)
         .into_iter()

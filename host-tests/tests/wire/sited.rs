@@ -1,5 +1,4 @@
-//! Uploads with sites of their own: which are refused, what a relay flies between, and that no place along one line is taken for one
-//! along another.
+//! Uploads with sites: refusals, the sites in use, and separation of positions along different lines.
 
 use host_tests::fixtures::paper;
 use uav_relay::UploadError;
@@ -39,7 +38,7 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// An upload between those.
+/// Returns an upload with the sites of `A_KILOMETRE`.
 fn sited(version: u16, base: u16) -> Offer {
     Offer {
         sites: A_KILOMETRE,
@@ -47,7 +46,7 @@ fn sited(version: u16, base: u16) -> Offer {
     }
 }
 
-/// The same with the receiver's longitude so much farther east, 1e-7 degrees.
+/// Moves the receiver of an offer east by `east`, 1e-7 degrees.
 fn farther(offer: Offer, east: i32) -> Offer {
     let mut sites = offer.sites;
     sites[4] += east;
@@ -61,7 +60,7 @@ const SITES: Event = Event::UploadRefused {
     why: LineError::Sites,
 };
 
-/// Whether it flies along a line on earth or not, so that all of a chain hold a mission or none does.
+/// Checks refusals with and without a line on earth, so that a chain decides unanimously.
 #[test]
 fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_says_so() {
     for by_autopilot in [false, true] {
@@ -77,7 +76,7 @@ fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_say
         events(&mut relay);
         let base = digest(&mission);
         let near = |east| farther(sited(2, base), east);
-        // 7.5 mm a unit: 4.5 cm are a distance, 6 cm another one.
+        // A unit is 7.5 mm: 4.5 cm are tolerated, 6 cm are not.
         let mut none = sited(2, base);
         none.sites = [474_000_000, 85_400_000, 0, 474_000_000, 85_400_900, 0];
         let longer = Offer {
@@ -95,7 +94,7 @@ fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_say
             for told in [vec![why], vec![]] {
                 peer.says(&mut relay, NOW, &Said::Offer(offer));
                 assert_eq!(events(&mut relay), told, "{offer:?}");
-                // It answers by a hello that names what it refuses.
+                // The relay answers with a hello that names the refused mission.
                 let says = said(&mut relay, NOW);
                 let [(_, Said::Hello(hello))] = says.as_slice() else {
                     panic!("{says:?}")
@@ -113,7 +112,7 @@ fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_say
             assert_eq!(relay.clone().handle_upload(NOW, &upload), line);
             let mut begins = Relay::new(mission, identity, settings, 1, NOW).unwrap();
             assert_eq!(begins.resume(&upload), line);
-            // Nor does the ground make one.
+            // The ground station does not create such an upload either.
             let plain = Upload::decode(
                 &Offer {
                     sites: [0; 6],
@@ -149,10 +148,10 @@ fn the_sites_are_those_of_the_mission_that_is_flown() {
     );
     adopts(&mut relay, &mut peers, &first);
     assert_eq!(relay.sites(), Some(sites(A_KILOMETRE)));
-    // A newer one that is held is not flown.
+    // A newer mission that is held is not flown.
     peers[0].says(&mut relay, NOW, &Said::Offer(upload(3, base)));
     assert_eq!(relay.sites(), Some(sites(A_KILOMETRE)));
-    // After a reboot with what was kept.
+    // The stored mission applies after a reboot.
     let (identity, settings) = set(4, Wiring::Pair);
     let mission = Mission::try_new(paper(8)).unwrap();
     for (kept, expected) in [(first, Some(sites(A_KILOMETRE))), (upload(3, base), None)] {
@@ -163,11 +162,11 @@ fn the_sites_are_those_of_the_mission_that_is_flown() {
     }
 }
 
-/// Relay 4, guarded, with the neighbours it has met, and the digest of its mission.
+/// Returns relay 4 with a guard, its neighbours, and the digest of its mission.
 fn guarded() -> (Relay, [Peer; 2], u16) {
     let (identity, settings) = set(4, Wiring::Pair);
     let mission = Mission::try_new(paper(8)).unwrap();
-    // With room for all that is offered here.
+    // The geofence has room for all offers here.
     let mut guard = GuardConfig::of(&mission, mission.config().common);
     guard.fence = Geofence {
         least_y_m: -1e3,
@@ -221,7 +220,7 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     events(&mut relay);
     assert_eq!(stale(&relay, &peers, base), (1, 0));
     assert_eq!(stale(&relay, &peers, line), (0, 0));
-    // One without them is flown along the line that was loaded.
+    // A mission without sites uses the loaded line.
     let (mut relay, mut peers, base) = guarded();
     adopts(&mut relay, &mut peers, &upload(2, base));
     events(&mut relay);
@@ -229,7 +228,7 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_eq!(stale(&relay, &peers, line), (1, 0));
 }
 
-/// The relay that is alone has no neighbour to wait for: it has a place, and the guard's first setpoint, until the line is another one.
+/// Checks a single relay, which has a position and a guard's setpoint until the line changes.
 #[test]
 fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has_agreed() {
     let config = paper(1);

@@ -1,6 +1,6 @@
-//! What proptest draws: messages in range with all their extremes, bodies that are nearly messages, headers, streams.
+//! Random messages, nearly valid bodies, headers and streams.
 //!
-//! Nested ones are boxed: by value their trees overflow the stack of a test's thread.
+//! Nested strategies are boxed: by value their trees overflow the stack of a test's thread.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -10,7 +10,6 @@ use super::codec::{Handed, Judged, Said, Seats, Shifted, Swept, targets};
 use super::offered::offers;
 use super::view_strategies::{formings, heard, pulses};
 
-/// The largest node number.
 pub(crate) const MAX_NODE: u16 = 4094;
 
 pub(crate) fn headers() -> impl Strategy<Value = Header> {
@@ -36,7 +35,7 @@ pub(crate) fn metres(least: f32) -> impl Strategy<Value = f32> {
     ]
 }
 
-/// Anchor, gap code and growth code of a valid ladder.
+/// Draws anchor, gap code and growth code of a valid ladder.
 pub(crate) fn ladders() -> BoxedStrategy<(f32, u8, u8)> {
     let ordinary = (-20.0..20.0_f32).prop_map(f32::exp2);
     let any_normal = (0x0080_0000..0x7F80_0000_u32).prop_map(f32::from_bits);
@@ -51,7 +50,6 @@ pub(crate) fn ladders() -> BoxedStrategy<(f32, u8, u8)> {
         .boxed()
 }
 
-/// A sweep in range, of `least` reaches at least and with as many targets as that takes.
 pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
     let ladders = prop_oneof![
         4 => ladders(),
@@ -106,7 +104,7 @@ pub(crate) fn powers() -> impl Strategy<Value = f32> {
     prop_oneof![4 => 0.1..10.0_f32, 1 => 1e-6..=1e6_f32, 1 => Just(1e-6), 1 => Just(1e6)]
 }
 
-/// From 0 to `most`, small and large alike.
+/// Draws from 0 to `most` over all magnitudes.
 pub(crate) fn up_to(most: f32) -> BoxedStrategy<f32> {
     let any_size = (-40.0..=most.log2())
         .prop_map(f32::exp2)
@@ -126,7 +124,7 @@ fn sirs() -> impl Strategy<Value = f32> {
     prop_oneof![4 => 0.0..10.0_f32, 1 => up_to(f32::MAX)]
 }
 
-/// The sweeps of `plain` with a measured Upsilon.
+/// Adds a measured Upsilon to the sweeps of `plain`.
 pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
     let upsilons = prop_oneof![
         4 => (-29.0..106.0_f32).prop_map(f32::exp2),
@@ -144,7 +142,7 @@ pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
         .boxed()
 }
 
-/// The sweeps of `plain` from beside the line.
+/// Adds a lateral offset to the sweeps of `plain`.
 pub(crate) fn asides(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
     (plain, beside())
         .prop_map(|(said, y_m)| match said {
@@ -154,7 +152,7 @@ pub(crate) fn asides(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
         .boxed()
 }
 
-/// How far from the line, on either side.
+/// Draws a lateral offset on either side.
 fn beside() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => -100.0..=100.0_f32,
@@ -163,7 +161,7 @@ fn beside() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// What relays bring along, in range.
+/// Draws valid profiles of relays.
 fn rosters() -> BoxedStrategy<Seats> {
     let held = prop_oneof![1 => Just(0.0), 2 => altitudes()];
     let numbers = (any::<u16>(), any::<u16>());
@@ -186,12 +184,12 @@ fn rosters() -> BoxedStrategy<Seats> {
         .boxed()
 }
 
-/// A place along x.
+/// Draws a position along x.
 pub(crate) fn along() -> impl Strategy<Value = f32> {
     prop_oneof![4 => 0.0..=1000.0_f32, 1 => up_to(1e6)]
 }
 
-/// A turn's byte, how far it may go, columns and rows.
+/// Draws a turn's byte, range, columns and rows.
 fn turns() -> BoxedStrategy<(u8, f32, u8, u8)> {
     prop_oneof![
         1 => Just((0, 0.0, 0, 0)),
@@ -253,7 +251,6 @@ fn questions() -> impl Strategy<Value = u16> {
     prop_oneof![2 => Just(0), 3 => 0..9_u16, 1 => any::<u16>()]
 }
 
-/// A message in range.
 pub(crate) fn messages() -> BoxedStrategy<Said> {
     let verdicts = (
         any::<u16>(),

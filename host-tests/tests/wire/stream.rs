@@ -1,5 +1,4 @@
-//! The deframer: the same frames however the stream is cut, nothing accepted out of an oversized frame, and what another
-//! implementation of COBS says.
+//! Deframer: independence of cuts, oversized frames, and comparison with another COBS implementation.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -16,7 +15,7 @@ use super::stream_strategies::pieces;
 
 type Outcome = Result<Vec<u8>, DeframeError>;
 
-/// What the deframer gives for a stream.
+/// Returns the deframer's results for a stream.
 fn deframed(stream: &[u8]) -> Vec<Outcome> {
     let mut deframer = Deframer::new();
     let mut out = Vec::new();
@@ -28,7 +27,7 @@ fn deframed(stream: &[u8]) -> Vec<Outcome> {
     out
 }
 
-/// What the rules give for the bytes between two delimiters; there is at least one.
+/// Returns the result by the rules for the bytes between two delimiters, of which there is at least one.
 pub(crate) fn unstuffed(mut stuffed: &[u8]) -> Outcome {
     let mut plain = Vec::new();
     let mut whole = true;
@@ -51,7 +50,7 @@ pub(crate) fn unstuffed(mut stuffed: &[u8]) -> Outcome {
     }
 }
 
-/// The frames of a stream, stuffed, without empty ones and what follows the last delimiter.
+/// Returns the stuffed frames of a stream, without empty and incomplete ones.
 pub(crate) fn chunks(stream: &[u8]) -> Vec<&[u8]> {
     let mut chunks: Vec<&[u8]> = stream.split(|&byte| byte == 0).collect();
     chunks.pop();
@@ -63,7 +62,7 @@ fn by_the_rules(stream: &[u8]) -> Vec<Outcome> {
     chunks(stream).into_iter().map(unstuffed).collect()
 }
 
-/// All a relay has become after the stream, cut at the given lengths over and over.
+/// Returns a relay's state after the stream, cut at the given lengths in turn.
 fn state_after(stream: &[u8], cuts: &[usize]) -> String {
     let mut relay: Relay = relay(2, 8, Wiring::Pair);
     let mut rest = stream;
@@ -78,7 +77,7 @@ fn state_after(stream: &[u8], cuts: &[usize]) -> String {
     format!("{relay:?}")
 }
 
-/// Every golden frame, and between them noise, cut and oversized frames and empty ones.
+/// Returns every golden frame with noise, cut, oversized and empty frames in between.
 fn fixed_stream() -> Vec<u8> {
     let mut stream = b"noise before the first delimiter\0\0\0".to_vec();
     for (k, vector) in vectors().frames.into_iter().enumerate() {
@@ -113,7 +112,7 @@ fn every_chunk_size_gives_the_same() {
 fn the_tail_of_an_oversized_frame_is_never_a_frame() {
     let vectors = vectors().frames;
     let good = vectors[0].wire();
-    // However many bytes a deframer had swallowed before it gave up and began anew, one of these puts a good frame there.
+    // At any point where a deframer might restart, one of these places a valid frame.
     let data_runs = |len: usize| -> Vec<u8> {
         let bytes = std::iter::repeat_n([0x64; 100], len / 100 + 1).flatten();
         bytes.take(len).collect()
@@ -174,7 +173,7 @@ fn empty_frames_are_ignored() {
     let vector = &vectors().frames[0];
     let stream = [&[0, 0, 0][..], &vector.wire(), &[0, 0]].concat();
     assert_eq!(deframed(&stream), [Ok(vector.plain())]);
-    // A lone code byte is a frame without bytes, and no empty frame: it counts as one that is too short.
+    // A lone code byte is a frame without bytes, which counts as too short.
     assert_eq!(deframed(&[1, 0]), [Ok(vec![])]);
 }
 
@@ -204,7 +203,7 @@ proptest! {
 
     #[test]
     fn any_bytes_give_what_the_rules_say(draws in vec(any::<u16>(), 0..1000)) {
-        // One byte in 64 is a delimiter, half are small: runs end and zeros come often.
+        // One byte in 64 is a delimiter, half are small: short runs and frequent zeros.
         let bytes = draws.into_iter().map(|draw| match draw.to_le_bytes() {
             [_, 0..4] => 0,
             [byte, 4..128] => byte % 8,

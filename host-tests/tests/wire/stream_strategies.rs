@@ -1,4 +1,4 @@
-//! Bodies and pieces of a stream as they may come: good ones, damaged ones, noise.
+//! Random bodies and pieces of a stream: valid, damaged and noise.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -9,7 +9,7 @@ use super::offered::NUMBERS;
 
 use super::strategies::messages;
 
-/// Bytes that are a body, nearly one, or none.
+/// Draws a valid, nearly valid or invalid body.
 pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
     let valid = || messages().prop_map(|said| said.body()).boxed();
     let replaced = (valid(), any::<proptest::sample::Index>(), any::<u8>()).prop_map(
@@ -31,7 +31,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
     ]);
     let renumbered =
         (valid(), any::<proptest::sample::Index>(), strange).prop_map(|(mut body, at, number)| {
-            // Where numbers begin in the messages of each tag; in lists every four bytes from the last of them.
+            // Offsets of numbers in the messages of each tag; lists continue every four bytes from the last.
             let starts: &[usize] = match body[0] {
                 0 => &[5, 11, 15, 20, 24],
                 1 => &[8, 9, body.len() - 4],
@@ -57,7 +57,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
         body
     });
     let longer = (valid(), vec(any::<u8>(), 1..4)).prop_map(|(body, more)| [body, more].concat());
-    // Every byte that is no part of a number.
+    // Offsets of all other bytes.
     let recounted = (valid(), any::<proptest::sample::Index>(), any::<u8>()).prop_map(
         |(mut body, at, byte)| {
             let bytes: &[usize] = match body[0] {
@@ -103,7 +103,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
     .boxed()
 }
 
-/// Writes the tag or the count of a body as a varint with one byte more, and another `more` on top.
+/// Encodes a body's tag or count as a varint with `more` + 1 padding bytes.
 pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
     let count = match body[0] {
         0 => 19,
@@ -120,7 +120,7 @@ pub(crate) fn pad(body: &mut Vec<u8>, tag: bool, more: usize) {
     body.insert(at + 1 + more, 0);
 }
 
-/// Pieces of a stream: good frames, damaged ones, noise, oversized ones, delimiters.
+/// Draws pieces of a stream: valid, damaged and oversized frames, noise, delimiters.
 pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStrategy<Vec<u8>> {
     let heads = heads.boxed();
     let good = (heads.clone(), messages())

@@ -1,5 +1,4 @@
-//! Uploads, message by message, as the document has them: who is offered what, what a proposal of another mission leads to, and
-//! what is left after a reboot. `ground` has what Tx and Rx say.
+//! Uploads message by message: offers, proposals of another mission, reboots.
 
 use host_tests::fixtures::paper;
 use uav_relay::UploadError;
@@ -25,7 +24,7 @@ const REFUSED: Event = Event::UploadRefused {
     why: LineError::Distance,
 };
 
-/// Relay 4 of eight, which has nothing to say, the nodes beside it, and the digest of its mission.
+/// Returns an idle relay 4 of eight, its neighbours, and the digest of its mission.
 pub(crate) fn relay_4() -> (Relay, [Peer; 2], u16) {
     let mut relay = with_key(4, Wiring::Pair);
     let peers = [(3, Port::Upstream), (5, Port::Downstream)]
@@ -36,7 +35,7 @@ pub(crate) fn relay_4() -> (Relay, [Peer; 2], u16) {
     (relay, peers, base)
 }
 
-/// The mission of this version for the relays that were loaded with `base`.
+/// Returns a mission of `version` for relays loaded with `base`.
 pub(crate) fn upload(version: u16, base: u16) -> Offer {
     Offer {
         version,
@@ -45,7 +44,7 @@ pub(crate) fn upload(version: u16, base: u16) -> Offer {
     }
 }
 
-/// A hello of a node that has heard of view 0 alone, and holds the mission of these: digest and version.
+/// Returns the hello of a node that knows only view 0 and holds the mission `holds` (digest, version).
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
     Said::Hello(greeting(mission, neighbour, holds, flags))
 }
@@ -67,12 +66,12 @@ pub(crate) fn mission_id(offer: &Offer) -> (u16, u16) {
     (offer.digest(), offer.version)
 }
 
-/// What it says now, and what a millisecond later.
+/// Returns the messages sent now and a millisecond later.
 pub(crate) fn both(relay: &mut Relay) -> [Vec<(u16, Said)>; 2] {
     both_at(relay, NOW)
 }
 
-/// The same at another time.
+/// Returns the messages sent at `now` and a millisecond later.
 pub(crate) fn both_at(relay: &mut Relay, now: Instant) -> [Vec<(u16, Said)>; 2] {
     let first = said(relay, now);
     let later = now + Duration::from_millis(1);
@@ -94,7 +93,7 @@ fn an_offer_at_a_node_without_a_key_is_counted_and_nothing_else() {
         relay.handle_bytes(NOW, port, &framed(4, port, &offer));
         assert_eq!(counted(relay.stats()), ["received", "unsigned"]);
         assert_eq!((sent(&mut relay, NOW), held(&relay)), (vec![], None));
-        // Nor is it told by a hello.
+        // A hello has no effect either.
         let newer = hello(base, 4, (1, 1), 0);
         relay.handle_bytes(NOW, port, &framed(4, port, &newer));
         assert_eq!(sent(&mut relay, NOW), []);
@@ -113,10 +112,10 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
         assert_eq!(events(&mut relay), [Event::Uploaded]);
         assert_eq!(relay.version(), 0, "not flown before it is counted");
         let form = if side == 0 { FORMS } else { 0 };
-        // No message has come from the other side yet.
+        // There was no message from the other side yet.
         let answer = hello(base, from, mission_id(&newer), FRESH | form);
         let answer = long(1, hearing(1, answer));
-        // The other one has said no hello that an offer could answer: it is asked for one.
+        // The other neighbour has sent no hello that an offer could answer, so it is asked for one.
         let other = [5, 3][side];
         let form = if side == 1 { FORMS } else { 0 };
         let asks = hello(base, other, mission_id(&newer), ASKS | FRESH | form);
@@ -124,7 +123,7 @@ fn a_newer_mission_is_held_told_and_offered_on_and_a_view_called_for() {
         let call = hello(base, 3, mission_id(&newer), ASKS | FORMS | FRESH);
         let call = long(1, hearing([1, 0][side], call));
         assert_eq!(both(&mut relay), [now, vec![(3, call)]]);
-        // It has not said that it holds it.
+        // The neighbour does not hold the mission.
         let older = hello(base, 4, (base, 0), 0);
         peers[1 - side].says(&mut relay, NOW, &older);
         assert_eq!(said(&mut relay, NOW), [(other, Said::Offer(newer))]);
@@ -139,7 +138,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
     peers[1].says(&mut relay, NOW, &Said::Offer(newer));
     both(&mut relay);
     events(&mut relay);
-    // As large a version, and the smaller digest.
+    // Equal version, smaller digest.
     let rival = (1..u8::MAX)
         .map(|y| Offer {
             y_m: f32::from(y),
@@ -151,7 +150,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
         relays: 7,
         ..upload(3, base)
     };
-    // What cannot be held is not answered: it would only be offered again.
+    // A mission that cannot be held is not answered, because it would be offered again.
     let answer = long(1, hello(base, 5, mission_id(&newer), FRESH));
     let answer = || vec![(5, hearing(1, answer.clone()))];
     for (other, answer) in [
@@ -174,7 +173,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
     assert_eq!(held(&relay), Some(mission_id(&newer)));
 }
 
-/// There would be no line on earth for it.
+/// Checks a relay with sites, for which another distance has no line on earth.
 #[test]
 fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     let mission = Mission::try_new(paper(8)).unwrap();
@@ -209,7 +208,7 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     };
     peer.says(&mut relay, NOW, &Said::Offer(next));
     assert_eq!(events(&mut relay), [REFUSED]);
-    // By hand, and after a reboot.
+    // The mission is refused from the firmware, and after a reboot.
     let by_hand = Upload::new(
         &mission,
         4,
@@ -225,7 +224,7 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     assert_eq!(begins.resume(&by_hand), refused);
     let mut without = Relay::new(mission, identity, settings, 1, NOW).unwrap();
     assert_eq!(without.resume(&by_hand), Ok(()));
-    // One that keeps the distance is held, and from then on an older one is not looked at.
+    // A mission with the same distance is held, and older ones are ignored from then on.
     peer.says(&mut relay, NOW, &Said::Offer(upload(5, base)));
     assert_eq!(events(&mut relay), [Event::Uploaded]);
     peer.says(&mut relay, NOW, &Said::Offer(longer));
@@ -273,7 +272,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
         let expected: Vec<_> = expected.map(|said| (5, said)).into_iter().collect();
         assert_eq!(said(&mut after, NOW), expected, "{holds:?}");
     }
-    // What was loaded cannot be offered: whoever holds less than that was loaded with another mission.
+    // The loaded mission cannot be offered: a node that holds an older one was loaded differently.
     let (mut relay, mut peers, base) = relay_4();
     peers[1].says(
         &mut relay,
@@ -283,7 +282,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer_and_of_a_newer_one_by_a_h
     assert_eq!(said(&mut relay, NOW), []);
 }
 
-/// A proposal to relay 4, or a decision.
+/// Returns a proposal to relay 4, or a decision.
 pub(crate) fn forming(tag: u8, number: u32, of: (u16, u16), place: u16) -> Said {
     match tag {
         11 => Said::Proposal(proposed(id(number, 1), of, place, 8)),
@@ -320,7 +319,7 @@ fn the_node_after_is_offered_the_mission_before_the_proposal() {
     both(&mut relay);
     let proposal = |place| forming(11, 1, mission_id(&newer), place);
     peers[0].says(&mut relay, NOW, &proposal(3));
-    // It has said no hello that an offer could answer: it is asked for one. The relay is fresh no more, since it takes part in a proposal.
+    // The neighbour has sent no hello that an offer could answer, so it is asked for one.
     let asks = Greeting {
         newest: id(1, 1),
         behind: 4,
@@ -329,7 +328,7 @@ fn the_node_after_is_offered_the_mission_before_the_proposal() {
     assert_eq!(said(&mut relay, NOW), [(5, Said::Hello(asks))]);
     peers[1].says(&mut relay, NOW, &hello(base, 4, (base, 0), 0));
     assert_eq!(said(&mut relay, NOW), [(5, Said::Offer(newer))]);
-    // It is not repeated at once: a hello shows whether it has arrived.
+    // The offer is not repeated at once: a hello shows whether it has arrived.
     peers[1].says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), 0));
     assert_eq!(said(&mut relay, NOW), [(5, proposal(4))]);
 }

@@ -1,4 +1,4 @@
-//! Random messages on who is in the chain, and on what it hears.
+//! Random messages on views and on interference.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -7,12 +7,12 @@ use super::codec::{Call, Decided, Fenced, Greeting, Heard, Proposed, Said, Sized
 
 use super::strategies::{MAX_NODE, metres, up_to};
 
-/// How many relays, or which of them: small numbers mostly.
+/// Draws a number of relays or an index, mostly small.
 pub(crate) fn counts(least: u16) -> BoxedStrategy<u16> {
     prop_oneof![4 => least..=9, 1 => least..=1000, 1 => Just(least), 1 => Just(1000)].boxed()
 }
 
-/// The name of a view: of number 1 or more, by a node of a chain.
+/// Draws a view identifier: number 1 or more, proposed by a node of a chain.
 fn proposals() -> BoxedStrategy<u32> {
     let numbers = prop_oneof![4 => 1..8_u32, 1 => 1..=0x003F_FFFF_u32, 1 => Just(0x003F_FFFF)];
     (numbers, counts(1))
@@ -20,7 +20,7 @@ fn proposals() -> BoxedStrategy<u32> {
         .boxed()
 }
 
-/// A view that a node has proposed, and its size.
+/// Draws a proposed view with its size.
 fn views() -> impl Strategy<Value = SizedView> {
     (proposals(), counts(1)).prop_map(|(id, relays)| SizedView { id, relays })
 }
@@ -29,7 +29,7 @@ fn spans() -> impl Strategy<Value = u16> {
     prop_oneof![4 => 0..200_u16, 1 => any::<u16>(), 1 => Just(u16::MAX)]
 }
 
-/// A hello, a proposal, a decision or a fence.
+/// Draws a hello, proposal, decision or fence.
 pub(crate) fn formings() -> BoxedStrategy<Said> {
     let versions = || prop_oneof![4 => 0..8_u16, 1 => any::<u16>()];
     let stamps = || (any::<u16>(), versions());
@@ -54,7 +54,7 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
     let calls = || {
         (stamps(), proposals(), counts(1)).prop_map(|(of, view, place)| Call { of, view, place })
     };
-    // One after the other: what is agreed on, a view, what it was decided by, what is proposed.
+    // Views in order: agreed on, accepted, deciding proposal, proposed.
     let order = [proposals(), proposals(), proposals(), proposals()].prop_map(|mut order| {
         order.sort_unstable();
         order
@@ -124,7 +124,7 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
     prop_oneof![hello, proposal, decision, fence].boxed()
 }
 
-/// A pulse, or what came back of one.
+/// Draws a lease renewal or its completion.
 pub(crate) fn pulses() -> BoxedStrategy<Said> {
     let pulse = (any::<[u16; 2]>(), spans()).prop_map(|([number, mission], span)| Said::Pulse {
         number,
@@ -140,7 +140,7 @@ pub(crate) fn pulses() -> BoxedStrategy<Said> {
     prop_oneof![pulse, pulsed].boxed()
 }
 
-/// What the relays hear and believe.
+/// Draws measurements and estimates.
 pub(crate) fn hearings() -> BoxedStrategy<Heard> {
     let powers =
         || prop_oneof![1 => Just(0.0), 3 => 1e-12..1e-3_f32, 1 => Just(1e-30), 1 => Just(1e6)];
@@ -175,7 +175,7 @@ pub(crate) fn hearings() -> BoxedStrategy<Heard> {
         .boxed()
 }
 
-/// What the relays hear and believe, onward or back.
+/// Draws a message with measurements and estimates.
 pub(crate) fn heard() -> BoxedStrategy<Said> {
     prop_oneof![
         hearings().prop_map(Said::Sense),

@@ -1,4 +1,4 @@
-//! A relay in a view of the chain: which digests it takes, what is over for it, and whose call it hands on.
+//! Relay in a view: accepted digests, stale messages, and forwarded requests.
 
 use uav_relay::wire::digest::digest;
 use uav_relay::{Duration, Event, Instant, Port, Relay, Wiring};
@@ -10,7 +10,7 @@ use super::votes::{
     ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
 };
 
-/// Relay `own` of 8 with its part in `view`, which relay `own` - 1 has handed it as one of eight; it has nothing to say.
+/// Returns an idle relay `own` of 8 in `view`, received from relay `own` - 1 as a view of eight.
 fn in_view(own: u16, view: u32) -> (Relay, u16) {
     let mut relay = relay(own, 8, Wiring::Pair);
     let mission = digest(relay.mission());
@@ -25,7 +25,7 @@ fn in_view(own: u16, view: u32) -> (Relay, u16) {
     (relay, mission)
 }
 
-/// The same once it has agreed on its place in the view.
+/// Returns relay `own` of 8 in `view`, idle after the agreement on positions in it.
 fn agreed_in_view(own: u16, view: u32) -> (Relay, u16) {
     let (mut relay, mission) = in_view(own, view);
     let digest = mission.wrapping_add(mark(view));
@@ -44,7 +44,7 @@ fn agreed_in_view(own: u16, view: u32) -> (Relay, u16) {
     (relay, mission)
 }
 
-/// Whoever bears another digest is in another view, or flies another mission: which of the two is for a hello to say.
+/// Checks that another digest means another view or mission, which a hello tells apart.
 #[test]
 fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission() {
     let now = Instant::ZERO;
@@ -62,14 +62,14 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
             } else {
                 &["received", "view"]
             };
-            // An answer comes from the other side, and so does what came back of a pulse.
+            // Answers, and completions of a renewal, come from the other side.
             for (kind, port, neighbour) in [
                 (0, Port::Upstream, 3),
                 (15, Port::Upstream, 3),
                 (1, Port::Downstream, 5),
                 (16, Port::Downstream, 5),
             ] {
-                // A pulse is for relays that have agreed on their places.
+                // Renewals are for relays that have agreed on their positions.
                 let mut after = if known && kind == 15 {
                     agreed_in_view(4, view).0
                 } else {
@@ -95,7 +95,7 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
     }
 }
 
-/// A neighbour that has said that it is of this mission is in another view, if its passes are: somebody has missed something.
+/// Checks passes of another view from a neighbour with equal mission: the relay requests a new view.
 #[test]
 fn a_pass_of_another_view_has_the_relay_ask_for_one() {
     let now = Instant::ZERO;
@@ -149,7 +149,7 @@ fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hear
     let (mut relay, mission) = in_view(4, id(5, 2));
     let mut now = Instant::ZERO;
     let of = (mission, 0);
-    // View 5 from another place than the one it was agreed with.
+    // View 5 from another place than before.
     for (nth, view, place) in [(1, id(5, 2), 2), (2, id(5, 1), 3), (3, id(3, 9), 3)] {
         let proposal = Said::Proposal(proposed(view, of, place, 8));
         relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
@@ -195,8 +195,7 @@ fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() 
     }
 }
 
-/// A relay that has accepted a view, and not heard that all have, is a member of the one before yet: it says what it has accepted. Once a
-/// pass or a pulse of that view has come, all have accepted it, and it counts.
+/// Checks that an accepted view counts only after a pass or renewal in it: all have then accepted it.
 #[test]
 fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
     let now = Instant::ZERO;
@@ -235,7 +234,7 @@ fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
     }
 }
 
-/// A pulse goes onward, what came of it back; the next one grants the lease, and when it runs out a view is asked for.
+/// Checks lease renewals: the next one grants the lease, and its expiry causes a view request.
 #[test]
 fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
     let view = id(3, 2);
@@ -274,7 +273,7 @@ fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
         None,
         "the others may not have taken part yet"
     );
-    // What does not fit is stale.
+    // Other messages are stale.
     for (port, said) in [
         (up, pulse(8)),
         (down, pulsed(9, true)),
@@ -290,7 +289,7 @@ fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
         Some(at(10 + 16_000)),
         "from when it was handed on"
     );
-    // One that begins elsewhere grants nothing.
+    // A renewal out of sequence grants no lease.
     assert_eq!(hear(&mut relay, 60, up, &pulse(50)), [(down, pulse(50))]);
     assert_eq!(relay.lease(), Some(at(16_010)));
     let mut now = at(60);

@@ -1,4 +1,4 @@
-//! Hellos, proposals and decisions to write, and what a relay says in return.
+//! Constructors of hellos, proposals and decisions, and a relay's responses.
 
 use host_tests::fixtures::NETWORK;
 use uav_relay::wire::frame::Header;
@@ -15,7 +15,7 @@ pub(crate) const FLIES: u8 = 16;
 pub(crate) const WHOLE: u8 = 32;
 pub(crate) const REFUSED: u8 = 64;
 
-/// What node `sender` says to node `destination`, on network 7.
+/// Encodes a frame of node `sender` to node `destination`, on network 7.
 pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     let header = Header {
         network: NETWORK,
@@ -26,23 +26,22 @@ pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// The view of that number which `node` proposes.
+/// Returns the view of that number proposed by `node`.
 pub(crate) const fn id(number: u32, node: u16) -> u32 {
     number << 10 | node as u32
 }
 
-/// What a view adds to the digest of the mission that it flies.
+/// Returns a view's contribution to the digest of its mission.
 pub(crate) fn mark(view: u32) -> u16 {
     let low = view & 0xFFFF;
     let (top, next) = (view >> 24, view >> 16 & 0xFF);
     u16::try_from((low + (next << 8) + top) & 0xFFFF).unwrap()
 }
 
-/// How long a relay that has just been switched on may be relied on, in tenths of a second: for `dead_after`.
+/// Time for which a booted relay may be relied on, in tenths of a second: `dead_after`.
 pub(crate) const RELIED: u16 = 150;
 
-/// What the relay at `place` hands on of a proposal of `view`, where all up to there have just been switched on and are members of
-/// the chain of `relays` as it was loaded.
+/// Returns the proposal of `view` forwarded at `place`, with votes of all booted relays up to there.
 pub(crate) fn proposed(view: u32, of: (u16, u16), place: u16, relays: u16) -> Proposed {
     Proposed {
         call: Call { of, view, place },
@@ -55,7 +54,7 @@ pub(crate) fn proposed(view: u32, of: (u16, u16), place: u16, relays: u16) -> Pr
     }
 }
 
-/// The decision for the view that was proposed, of so many relays, whose places are to be taken at once.
+/// Returns the decision for the proposed view of `relays`, whose positions may be used at once.
 pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Said {
     Said::Decision(Decided {
         call: Call { of, view, place },
@@ -66,7 +65,7 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Sai
     })
 }
 
-/// The decision that `there` of eight relays are too few.
+/// Returns the decision that `there` of eight relays are too few.
 pub(crate) fn refused(view: u32, of: (u16, u16), place: u16, there: u16) -> Said {
     Said::Decision(Decided {
         call: Call { of, view, place },
@@ -77,7 +76,7 @@ pub(crate) fn refused(view: u32, of: (u16, u16), place: u16, there: u16) -> Said
     })
 }
 
-/// The hello of a node that hears nobody, flies the mission that was loaded before flight, and has no other.
+/// Returns the hello of a node that receives no others and holds and flies the loaded mission.
 pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> Said {
     Said::Hello(Greeting {
         mission,
@@ -91,7 +90,7 @@ pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> S
     })
 }
 
-/// The same hello of a node that hears these, bit 0 for the nearest.
+/// Sets the nodes that a hello's sender receives, bit 0 for the nearest.
 pub(crate) fn hearing(hears: u8, said: Said) -> Said {
     match said {
         Said::Hello(greeting) => Said::Hello(Greeting { hears, ..greeting }),
@@ -99,7 +98,7 @@ pub(crate) fn hearing(hears: u8, said: Said) -> Said {
     }
 }
 
-/// The same hello of a node from which so many relays hang together on, itself included.
+/// Changes a hello to one with `behind` connected relays, the sender included.
 pub(crate) fn long(behind: u16, said: Said) -> Said {
     match said {
         Said::Hello(greeting) => Said::Hello(Greeting { behind, ..greeting }),
@@ -107,7 +106,7 @@ pub(crate) fn long(behind: u16, said: Said) -> Said {
     }
 }
 
-/// What a relay with a key says, but for the number of a hello, which is never 0 there.
+/// Removes a hello's number, which is never 0 at a relay with a key.
 pub(crate) fn unnumbered(mut said: Said) -> Said {
     if let Said::Hello(greeting) = &mut said {
         assert_ne!(greeting.nonce, 0);
@@ -116,7 +115,7 @@ pub(crate) fn unnumbered(mut said: Said) -> Said {
     said
 }
 
-/// What `relay` sends at `now` or a millisecond later.
+/// Returns the messages that `relay` sends at `now` or a millisecond later.
 pub(crate) fn soon(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = sent(relay, now);
     let later = now + Duration::from_millis(1);
@@ -129,7 +128,6 @@ pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
     std::iter::from_fn(|| relay.poll_event()).collect()
 }
 
-/// The one message that `relay` sends at `now`.
 pub(crate) fn only(relay: &mut Relay, now: Instant) -> (Port, Said) {
     let mut out = sent(relay, now);
     let said = out.pop().unwrap();

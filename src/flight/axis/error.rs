@@ -1,22 +1,22 @@
-//! What is wrong with a pair of sites.
+//! Error for an invalid pair of sites.
 
 use crate::geodetic::Geodetic;
 
-/// The shortest line: the units of a latitude turn it by a thousandth.
+/// Minimum length of a line, at which one unit of latitude turns it by a thousandth.
 #[cfg_attr(
     not(feature = "internals"),
     allow(unreachable_pub, reason = "public with the feature `internals`")
 )]
 pub const SHORTEST_M: f64 = 10.0;
 
-/// The longest line whose accuracy is known.
+/// Maximum length of a line for which the accuracy is known.
 #[cfg_attr(
     not(feature = "internals"),
     allow(unreachable_pub, reason = "public with the feature `internals`")
 )]
 pub const LONGEST_M: f64 = 100_000.0;
 
-/// What is wrong with a pair of sites.
+/// Reason why a pair of sites is rejected.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AxisError {
@@ -24,14 +24,14 @@ pub enum AxisError {
     Tx(Geodetic),
     /// The latitude or longitude of the receiver is not on earth.
     Rx(Geodetic),
-    /// The sites are nearer to each other than 10 m.
+    /// The sites are less than 10 m apart.
     TooShort {
         /// The distance, m.
         distance_m: f64,
     },
-    /// The sites are farther from each other than 100 km.
+    /// The sites are more than 100 km apart.
     TooLong {
-        /// The distance, m: of the chord.
+        /// Length of the chord, m.
         distance_m: f64,
     },
 }

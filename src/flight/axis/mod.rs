@@ -1,32 +1,32 @@
-//! The line from transmitter to receiver on earth: a latitude and longitude to a place along it, and back.
+//! Line from transmitter to receiver on earth: conversion between geodetic and mission positions.
 //!
 //! # Derivation
-//! Everything is on the WGS84 ellipsoid in earth-centred coordinates, in f64. T and R are the two sites and P is the point, all three
-//! at height 0 above the ellipsoid: a height would shift x, by 1.2 m at 10 km for 1 500 m. With the midpoint m = (T + R) / 2 of the
-//! chord C = |R - T|, its direction u, the ellipsoid's normal at m made perpendicular to u (*up*), and the radius of curvature r of the
-//! ellipsoid at m in the direction u (Euler: 1/r = cos²α / M + sin²α / N),
+//! Everything is on the WGS84 ellipsoid in earth-centred coordinates, in f64. T and R are the two sites and P is the point, all
+//! three at height 0 above the ellipsoid: a height would shift x, by 1.2 m at 10 km for 1 500 m. Let m = (T + R) / 2 be the
+//! midpoint of the chord C = |R - T|, u its direction, *up* the ellipsoid's normal at m made perpendicular to u, and r the radius
+//! of curvature of the ellipsoid at m in the direction u (Euler: 1/r = cos²α / M + sin²α / N). Then
 //!
-//! - c = (P - m) · u is how far along the chord P is, and x = D / 2 + c (1 + (c/r)² / 6): an arc is that much longer than its chord,
+//! - c = (P - m) · u is P's coordinate along the chord, and x = D / 2 + c (1 + (c/r)² / 6), the longer arc,
 //! - y = (P - m) · (u × up), to the right of the line,
-//! - D is x at R, twice C / 2 (1 + (C / 2r)² / 6).
+//! - D is x at R: twice C / 2 (1 + (C / 2r)² / 6).
 //!
-//! Back: c is the sine's series at x - D / 2, P is m + c u + y (u × up) + z up with the sagitta z = (C²/4 - c² - y²) / 2r, and one step
-//! of Bowring's method gives its latitude.
+//! Inverse: c is the sine's series at x - D / 2, P is m + c u + y (u × up) + z up with the sagitta z = (C²/4 - c² - y²) / 2r, and
+//! one step of Bowring's method gives its latitude.
 //!
 //! # Height
 //! h is above the *datum* of the mission, the straight line from the ground at Tx to the ground at Rx:
-//! AMSL = tx + (rx - tx) x / D + h. A height above the sea follows the earth's curve by itself.
+//! AMSL = tx + (rx - tx) x / D + h. A height above the sea follows the earth's curvature.
 //!
 //! # Distance of a far point
-//! A point that is too far away to have a place still has a distance from the line. Its foot is where the plane through the point and the
-//! line's axis of rotation, at the centre of curvature, meets the line: φ = atan2((P - m) · u, (P - m) · up + r), x - D / 2 = r φ, cut to the
-//! two ends. The distance is the chord from the foot to the point, lengthened as an arc of a sphere is longer than its chord, at the angle
-//! that both points make at the earth's centre.
+//! A point too far away for a position still has a distance from the line. Its foot is where the plane through the point and the
+//! line's axis of rotation, at the centre of curvature, meets the line: φ = atan2((P - m) · u, (P - m) · up + r), x - D / 2 = r
+//! φ, clamped to the two ends. The distance is the chord from the foot to the point, scaled by the ratio of arc to chord of a
+//! sphere, at the angle between the two points at the earth's centre.
 //!
 //! # Accuracy
-//! Against geodesics, for points up to 500 m beside the line: within 1 mm for lines up to 10 km, within 5 mm for 100 km
-//! (`places_agree_with_geodesics` in `host-tests/tests/axis`); there and back within one unit of [`Geodetic`]. The distance of a far point:
-//! within 0.2 % anywhere on earth, and 0.002 % up to 1000 km (`distances_agree_with_geodesics`, as above).
+//! Error against geodesics, for points up to 500 m beside the line: at most 1 mm for lines up to 10 km, 5 mm for 100 km
+//! (`places_agree_with_geodesics` in `host-tests/tests/axis`); round trip within one unit of [`Geodetic`]. The distance of a far
+//! point: within 0.2 % anywhere on earth, and 0.002 % up to 1000 km (`distances_agree_with_geodesics`, in the same folder).
 
 mod error;
 #[cfg(test)]
@@ -46,7 +46,7 @@ use error::{LONGEST_M, SHORTEST_M};
 #[doc(hidden)]
 pub use error::{LONGEST_M, SHORTEST_M};
 
-/// How far the mission's distance may be from that of the sites, m: what the units of the sites amount to, and f32.
+/// Allowed difference between the mission's distance and that of the sites, m, for the rounding of the sites and of f32.
 const TOLERANCE_M: f64 = 0.05;
 
 /// The line from the transmitter's site to the receiver's.
@@ -54,7 +54,7 @@ const TOLERANCE_M: f64 = 0.05;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
     middle: Vector,
-    /// Toward the receiver, to the right, and up.
+    /// Unit vectors toward the receiver, to the right, and up.
     along: Vector,
     right: Vector,
     up: Vector,
@@ -67,10 +67,12 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// How far from the line a place may be, and before and behind its ends, m.
+    /// Maximum distance of a position beside the line, and before and beyond its ends, m.
     pub const AROUND_M: f32 = 5_000.0;
 
-    /// The line between two sites on the ground; poles and the antimeridian are places like any other. Constant work.
+    /// Creates the line between two sites on the ground.
+    ///
+    /// Poles and the antimeridian need no special case. Constant work.
     ///
     /// ```
     /// use uav_relay::flight::axis::Axis;
@@ -86,7 +88,7 @@ impl Axis {
     /// ```
     ///
     /// # Errors
-    /// A latitude or longitude that is not on earth, sites too near to each other or too far apart.
+    /// [`AxisError`] if a latitude or longitude is out of range, or the sites are too close or too far apart.
     #[cfg_attr(feature = "upload", inline(never))] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
@@ -123,28 +125,29 @@ impl Axis {
         })
     }
 
-    /// The line between both `sites`: as [`try_new`](Self::try_new).
+    /// Creates the line between both `sites`, see [`try_new`](Self::try_new).
     ///
     /// # Errors
-    /// As there.
+    /// As for [`try_new`](Self::try_new).
     #[inline] // a line is returned through the stack
     pub fn between(sites: Sites) -> Result<Self, AxisError> {
         Self::try_new(sites.tx, sites.rx)
     }
 
-    /// The distance D from transmitter to receiver along the ground, m.
+    /// Distance D from transmitter to receiver along the ground, m.
     pub const fn distance_m(&self) -> f64 {
         self.distance_m
     }
 
-    /// Whether a mission over `distance_m` metres is one between these sites.
+    /// Returns true if `distance_m` matches the distance of the sites.
     pub fn is_of(&self, distance_m: f32) -> bool {
         let rounded = f64::from(distance_m) * f64::from(f32::EPSILON);
         (f64::from(distance_m) - self.distance_m).abs() <= TOLERANCE_M + rounded
     }
 
-    /// Where a point on earth is along the line; `None` for one that is not on earth, or farther than [`AROUND_M`](Self::AROUND_M) from the line or from
-    /// its ends. Constant work.
+    /// Converts a geodetic position to mission coordinates.
+    ///
+    /// `None` if it is invalid, or farther than [`AROUND_M`](Self::AROUND_M) from the line or its ends. Constant work.
     pub fn place(&self, point: Geodetic) -> Option<Placement> {
         if !point.is_valid() {
             return None;
@@ -158,15 +161,15 @@ impl Axis {
             y_m: narrow(from.dot(self.right)),
             altitude_m: narrow(h),
         };
-        // What is behind the earth has a small x and y as well: it is too deep.
+        // A point on the far side of the earth has a small x and y as well, but is too deep.
         let is_near = self.is_around(place)
             && from.dot(self.up).abs() <= self.half_chord_m + f64::from(Self::AROUND_M);
         is_near.then_some(place)
     }
 
-    /// Returns the distance along the ground from a point to the nearest point of the line, m; `None` for a point that is not on earth.
+    /// Returns the distance along the ground from a point to the nearest point of the line, m; `None` for an invalid point.
     ///
-    /// It is known everywhere on earth, where [`place`](Self::place) is `None` as well. Constant work.
+    /// It is defined everywhere on earth, also where [`place`](Self::place) is `None`. Constant work.
     ///
     /// ```
     /// use uav_relay::flight::axis::Axis;
@@ -189,7 +192,7 @@ impl Axis {
         let from = point.minus(self.middle);
         let half_m = self.distance_m / 2.0;
         let foot = libm::atan2(from.dot(self.along), from.dot(self.up) + self.radius_m);
-        // Not `clamp`, which panics where a limit is no number.
+        // `clamp` would panic on a NaN limit.
         let foot = self.on_line((foot * self.radius_m).max(-half_m).min(half_m), 0.0);
         let chord = point.minus(foot).length();
         // Twice the sine and cosine of half the angle.
@@ -203,8 +206,9 @@ impl Axis {
         Some(chord * longer)
     }
 
-    /// Where a place along the line is on earth; `None` for one that is not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line or from
-    /// its ends. Constant work.
+    /// Converts mission coordinates to a geodetic position.
+    ///
+    /// `None` if they are not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line or its ends. Constant work.
     pub fn point(&self, place: Placement) -> Option<Geodetic> {
         if !self.is_around(place) {
             return None;
@@ -232,23 +236,23 @@ impl Axis {
             .plus(self.up.times(sagitta))
     }
 
-    /// The azimuth of the line where it passes `x_m`, radians clockwise from north; of no meaning at a pole. Constant work.
+    /// Returns the azimuth of the line at `x_m`, radians clockwise from north; meaningless at a pole. Constant work.
     pub fn azimuth_rad(&self, x_m: f32) -> f32 {
         let [north, east] = self.direction(x_m);
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle between this line and another one where they begin, radians in [0, π]. Constant work.
+    /// Returns the angle between this line and `other` at their transmitters, radians in [0, π]. Constant work.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }
 
-    /// That azimuth and `aside_rad` more, from -π to π, where that is. Constant work.
+    /// Returns the line's azimuth at `x_m` plus `aside_rad`, from -π to π. Constant work.
     pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
         turned(self.azimuth_rad(x_m) + aside_rad)
     }
 
-    /// A velocity along x, y and h at `x_m` as one toward north, east and down; all in m/s. Constant work.
+    /// Converts a velocity along x, y and h at `x_m` to north, east and down; all in m/s. Constant work.
     pub fn to_ned(&self, x_m: f32, velocity_m_s: [f32; 3]) -> [f32; 3] {
         let [x, y, h] = velocity_m_s.map(f64::from);
         let [north, east] = self.direction(x_m);
@@ -257,14 +261,14 @@ impl Axis {
         [x * north - y * east, x * east + y * north, -climb].map(narrow)
     }
 
-    /// How much of the line's direction where it passes `x_m` is north, and how much east.
+    /// Returns the north and east components of the line's direction at `x_m`.
     fn direction(&self, x_m: f32) -> [f64; 2] {
-        // The tangent turns with the earth: c / r is how far.
+        // The tangent turns with the earth's curvature by c / r.
         let c = chord(f64::from(x_m) - self.distance_m / 2.0, self.radius_m);
         let turn = c / self.radius_m;
         let tangent = self.along.minus(self.up.times(turn));
         let normal = self.up.plus(self.along.times(turn)).unit();
-        // North is what is left of the earth's axis in the ground plane; both are as long as the cosine of the latitude.
+        // North is the projection of the earth's axis onto the ground plane; both are as long as the cosine of the latitude.
         let north = tangent.dot(Vector::POLE.minus(normal.times(normal.z)));
         let east = tangent.dot(Vector::POLE.cross(normal));
         let length = libm::sqrt(north * north + east * east);
@@ -275,7 +279,7 @@ impl Axis {
         }
     }
 
-    /// Whether a place is finite and near the line. NaN is not.
+    /// Returns true if a position is finite and near the line.
     #[inline(never)] // called from several places
     pub(super) fn is_around(&self, place: Placement) -> bool {
         let Placement {
@@ -289,7 +293,6 @@ impl Axis {
             && altitude_m.abs() <= Self::AROUND_M
     }
 
-    /// AMSL of the datum at `x`, m.
     fn datum_m(&self, x: f64) -> f64 {
         let [tx, rx] = self.ends_amsl_m;
         tx + (rx - tx) * x / self.distance_m
@@ -301,7 +304,7 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// The arc over a half chord, and the half chord under an arc, both from the middle.
+/// Returns the arc over half a chord, from the middle.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)

@@ -1,4 +1,4 @@
-//! The line where there is something special about it: at its ends, over a pole, across the antimeridian, turning with the earth.
+//! Special cases of the line: its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
 
 use super::{Axis, AxisError, LONGEST_M};
 use crate::geodetic::Geodetic;
@@ -27,7 +27,7 @@ fn the_sites_are_the_ends_of_the_line() {
 
 #[test]
 fn y_is_to_the_right() {
-    // Eastward: the right is the south.
+    // Eastward line: the right side is south.
     let axis = Axis::try_new(site(47.4, 8.54, 0.0), site(47.4, 8.55, 0.0)).expect("a line");
     let south = axis.place(site(47.399, 8.545, 0.0)).expect("near");
     near(south.y_m, 111.2, 0.1);
@@ -117,7 +117,7 @@ fn the_azimuth_turns_along_the_line() {
     let axis = Axis::try_new(site(60.0, 10.0, 0.0), site(60.0, 11.0, 0.0)).expect("a line");
     #[expect(clippy::cast_possible_truncation, reason = "missions are f32")]
     let d = axis.distance_m() as f32;
-    // Eastward in the middle; meridians converge by 0.866 degrees from one end to the other.
+    // Eastward in the middle; the meridians converge by 0.866 degrees from one end to the other.
     for (x, degrees) in [(0.0, 89.567), (d / 2.0, 90.0), (d, 90.433)] {
         let azimuth = axis.azimuth_rad(x).to_degrees();
         near(azimuth, degrees, 2e-3);
@@ -126,7 +126,7 @@ fn the_azimuth_turns_along_the_line() {
 
 #[test]
 fn velocities_turn_with_the_line() {
-    // Toward the south-east, 100 m up in all.
+    // Line toward the south-east that climbs 100 m.
     let axis = Axis::try_new(site(0.01, 10.0, 0.0), site(0.0, 10.01, 100.0)).expect("a line");
     let [north, east, down] = axis.to_ned(800.0, [10.0, 0.0, 1.0]);
     near(north, -7.05, 0.05);

@@ -1,12 +1,12 @@
-//! Points and directions in earth-centred coordinates, the ellipsoid through them, and angles in the integers that autopilots speak.
+//! Vectors in earth-centred coordinates, the ellipsoid, and angles in 1e-7 degrees.
 
 use crate::geodetic::Geodetic;
 
-/// WGS84: the semi-axis at the equator, m, and the squared eccentricity.
+/// WGS84: semi-major axis, m, and squared eccentricity.
 const A_M: f64 = 6_378_137.0;
 const E2: f64 = 6.694_379_990_141_316e-3;
 
-/// Earth-centred, earth-fixed: m, or a direction.
+/// Earth-centred, earth-fixed vector: a position in m, or a direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Vector {
@@ -22,7 +22,7 @@ impl Vector {
         z: 1.0,
     };
 
-    /// The point of that latitude and longitude at height 0.
+    /// Returns the point with that latitude and longitude at height 0.
     pub(super) fn on_ellipsoid(point: Geodetic) -> Self {
         let [sin_lat, cos_lat] = sine_and_cosine(point.lat_e7);
         let [sin_lon, cos_lon] = sine_and_cosine(point.lon_e7);
@@ -34,7 +34,6 @@ impl Vector {
         }
     }
 
-    /// The normal of the ellipsoid through this point.
     pub(super) fn normal(self) -> Self {
         Self {
             z: self.z / (1.0 - E2),
@@ -43,10 +42,10 @@ impl Vector {
         .unit()
     }
 
-    /// Of a point near the ellipsoid, by one step of Bowring's method; radians.
+    /// Returns latitude and longitude of a point near the ellipsoid, by one step of Bowring's method; radians.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
-        // b / a; the latter is what the parametric latitude's tangent is p / z over.
+        // b / a. The tangent of the parametric latitude is z / (p b / a).
         let flat = libm::sqrt(1.0 - E2);
         let length = libm::sqrt(self.z * self.z + flat * p * flat * p);
         let (sin, cos) = (self.z / length, flat * p / length);
@@ -55,7 +54,7 @@ impl Vector {
         [lat, libm::atan2(self.y, self.x)]
     }
 
-    #[inline(never)] // called from many places, and what it calls is no instruction
+    #[inline(never)] // called from many places, and an f64 operation is a call
     pub(super) fn plus(self, other: Self) -> Self {
         Self {
             x: self.x + other.x,
@@ -99,14 +98,14 @@ impl Vector {
     }
 }
 
-/// The ellipsoid's radius of curvature where its normal is `normal`, in the direction `along`.
+/// Returns the ellipsoid's radius of curvature where its normal is `normal`, in the direction `along`, m.
 pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
     let cos2 = 1.0 - sin2;
     let w2 = 1.0 - E2 * sin2;
     let prime = A_M / libm::sqrt(w2);
     let meridian = prime * (1.0 - E2) / w2;
-    // At a pole both are the same.
+    // At a pole both radii are equal.
     let north2 = if cos2 > 1e-12 {
         (along.z * along.z / cos2).min(1.0)
     } else {
@@ -115,13 +114,12 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     1.0 / (north2 / meridian + (1.0 - north2) / prime)
 }
 
-/// Degrees of 10⁻⁷, in radians.
+/// Radians in 10⁻⁷ degrees.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
-/// Sine and cosine of an angle in units of 10⁻⁷ degrees.
-///
-/// The angle within an eighth of a turn of an axis is exact in integers; the sine and cosine of that are fdlibm's series, within a unit in the
-/// last place. A function for any f64 would be ten times as large, for turns that no place on earth makes.
+/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The angle is reduced to an eighth of a turn exactly, in
+/// integers; sine and cosine of the remainder are fdlibm's series, within a unit in the last place. A function for any f64 would
+/// be ten times as large, for angles that no position has.
 #[inline(never)] // called from several places
 pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     const EIGHTH: i32 = 450_000_000;
@@ -140,7 +138,7 @@ pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     }
 }
 
-/// The same angle, which is one turn off at most, from -π to π.
+/// Wraps an angle within (-3π, 3π) to -π to π.
 pub(super) fn turned(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {
@@ -152,7 +150,7 @@ pub(super) fn turned(angle: f32) -> f32 {
     }
 }
 
-/// fdlibm's coefficients for up to an eighth of a turn, the highest power first.
+/// Coefficients of fdlibm's series for up to an eighth of a turn, highest power first.
 const SINE: [f64; 6] = [
     1.589_690_995_211_55e-10,
     -2.505_076_025_340_686_3e-8,
@@ -180,7 +178,7 @@ mod angle_tests {
         for step in 0_i32..20_000 {
             for units in [units, (step - 10_000) * 180_000] {
                 let [sin, cos] = sine_and_cosine(units);
-                // The angle as an f64 is off by more than the series is.
+                // The conversion of the angle to f64 has a larger error than the series.
                 let (expected_sin, expected_cos) = libm::sincos(f64::from(units) * UNIT);
                 assert!((sin - expected_sin).abs() < 1e-15, "{units}");
                 assert!((cos - expected_cos).abs() < 1e-15, "{units}");

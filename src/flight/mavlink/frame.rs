@@ -1,55 +1,55 @@
-//! What stands around a payload.
+//! Layout of a MAVLink 2 frame.
 //!
-//! | byte | what |
+//! | byte | content |
 //! | --- | --- |
 //! | 0 | 0xFD |
-//! | 1 | bytes of payload; zeros at its end are left out, but for the first byte |
-//! | 2, 3 | flags that have to be understood (1: signed), and others |
-//! | 4 | counts the frames of a sender |
-//! | 5, 6 | the sender's system and component |
-//! | 7 to 9 | the message's number, little-endian |
+//! | 1 | payload length; trailing zeros are not sent, except for the first byte |
+//! | 2, 3 | incompatible flags (1: signed), and compatible flags |
+//! | 4 | sequence number of the sender |
+//! | 5, 6 | system and component of the sender |
+//! | 7 to 9 | message id, little-endian |
 //! | then | payload, checksum (2 bytes), signature (13 bytes, if signed) |
 //!
-//! The checksum is CRC-16/MCRF4XX over all but the first byte, and over one more that is not sent: the message's own.
+//! The checksum is CRC-16/MCRF4XX over all bytes but the first, and over the message's CRC seed, which is not sent.
 
 use crc::{CRC_16_MCRF4XX, Crc, NoTable};
 
 use super::table::Known;
 
-/// The first byte.
+/// First byte of a frame.
 pub const MAGIC: u8 = 0xFD;
 
-/// Bytes before the payload.
+/// Length of the header, bytes.
 pub const HEADER: usize = 10;
 
-/// Bytes of the checksum, and of the signature of a signed frame.
+/// Length of the checksum, bytes.
 pub const CHECKSUM: usize = 2;
-/// See [`CHECKSUM`].
+/// Length of a signed frame's signature, bytes.
 pub const SIGNATURE: usize = 13;
 
-/// The longest payload.
+/// Maximum payload length, bytes.
 pub const MAX_PAYLOAD: usize = 255;
 
-/// The longest frame.
+/// Maximum frame length, bytes.
 pub const MAX_FRAME: usize = HEADER + MAX_PAYLOAD + CHECKSUM + SIGNATURE;
 
-/// The flag of a signed frame.
+/// Incompatible flag of a signed frame.
 pub const SIGNED: u8 = 1;
 
-/// A table would be a kilobyte of flash; a link to an autopilot carries some ten kilobytes a second.
+/// Bitwise CRC: a table would be a kilobyte of flash, and a link to an autopilot carries only some ten kilobytes a second.
 static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 
-/// Who sends, or is meant.
+/// Sender or addressee of a message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Address {
-    /// The vehicle, 1 to 255.
+    /// System id, 1 to 255.
     pub system: u8,
-    /// What of it: 1 is the autopilot, 191 an onboard computer.
+    /// Component id: 1 is the autopilot, 191 an onboard computer.
     pub component: u8,
 }
 
-/// The checksum of a frame whose bytes between the first and the checksum are `covered`.
+/// Returns the checksum of a frame; `covered` are the bytes between the first one and the checksum.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);

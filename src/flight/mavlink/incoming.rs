@@ -1,9 +1,9 @@
-//! Messages from the autopilot, and from ground stations behind it, that a companion needs.
+//! Received messages, from the autopilot and from ground stations behind it.
 
 use super::frame::{Address, MAX_PAYLOAD};
 use super::table::id;
 
-/// The payload of a message, with the zeros at its end that are not sent.
+/// Payload of a message; reads beyond its end return 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Payload<'a>(pub(super) &'a [u8]);
 
@@ -44,7 +44,7 @@ impl Payload<'_> {
 
 const _: () = assert!(MAX_PAYLOAD <= u8::MAX as usize, "what a length says");
 
-/// A message, in the units and frames of the wire. Numbers of enums are as they came.
+/// Received message, in the units and frames of the wire. Enum values are unchecked numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -57,22 +57,22 @@ pub enum Incoming {
         autopilot: u8,
         /// `MAV_MODE_FLAG`: bit 7 is armed.
         base_mode: u8,
-        /// The mode, as the autopilot numbers it.
+        /// Mode number of the autopilot.
         custom_mode: u32,
         /// `MAV_STATE`.
         status: u8,
     },
     /// GLOBAL_POSITION_INT.
     GlobalPosition {
-        /// When it was there, ms since the autopilot began.
+        /// Time of the position, ms since the autopilot's start.
         boot_ms: u32,
         /// 10⁻⁷ degrees.
         lat_e7: i32,
         /// 10⁻⁷ degrees.
         lon_e7: i32,
-        /// Above the mean sea level, mm.
+        /// Height above mean sea level, mm.
         amsl_mm: i32,
-        /// Toward north, east and down, cm/s.
+        /// Velocity toward north, east and down, cm/s.
         velocity_cm_s: [i16; 3],
     },
     /// EXTENDED_SYS_STATE.
@@ -80,9 +80,9 @@ pub enum Incoming {
         /// `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
         landed_state: u8,
     },
-    /// POSITION_TARGET_LOCAL_NED: of it, what kind of target is flown to.
+    /// POSITION_TARGET_LOCAL_NED; only its kind of target.
     PositionTargetLocal {
-        /// Bits of what is left out.
+        /// Bits of the ignored fields.
         type_mask: u16,
     },
     /// POSITION_TARGET_GLOBAL_INT.
@@ -91,54 +91,54 @@ pub enum Incoming {
         lat_e7: i32,
         /// 10⁻⁷ degrees.
         lon_e7: i32,
-        /// m, in that frame.
+        /// Altitude in `frame`, m.
         altitude_m: f32,
-        /// Bits of what is left out.
+        /// Bits of the ignored fields.
         type_mask: u16,
-        /// `MAV_FRAME`: 5 is above the mean sea level.
+        /// `MAV_FRAME`: 5 is above mean sea level.
         frame: u8,
     },
     /// COMMAND_LONG.
     CommandLong {
-        /// Which command.
+        /// `MAV_CMD`.
         command: u16,
-        /// Its seven parameters.
+        /// Seven parameters.
         parameters: [f32; 7],
-        /// The system and the component that it is for.
+        /// System and component of the addressee.
         to: Address,
-        /// True if it was sent before and not answered.
+        /// True for a repetition of a command without an answer.
         is_repeated: bool,
     },
     /// COMMAND_ACK.
     CommandAck {
-        /// Which command.
+        /// `MAV_CMD`.
         command: u16,
         /// `MAV_RESULT`: 0 accepted.
         result: u8,
     },
-    /// TIMESYNC: a question, or the answer to one.
+    /// TIMESYNC: a request or its reply.
     TimeSync {
-        /// The clock of who answers, ns; 0 in a question.
+        /// Clock of the replying system, ns; 0 in a request.
         answered: u64,
-        /// The clock of who asked.
+        /// Clock of the requesting system.
         asked: u64,
     },
     /// FENCE_STATUS.
     FenceStatus {
-        /// True while the vehicle is outside of its fence.
+        /// True while the vehicle is outside of its geofence.
         is_breached: bool,
     },
-    /// RADIO_STATUS, of a SiK radio, in the units of [`sik`](super::sik): 255 is unknown.
+    /// RADIO_STATUS of a SiK radio, in the units of [`sik`](super::sik); 255 is unknown.
     RadioStatus {
-        /// What was heard at the last frame.
+        /// Signal strength of the last frame.
         rssi: u8,
-        /// What is heard between frames.
+        /// Noise level between frames.
         noise: u8,
     },
 }
 
 impl Incoming {
-    /// The message of that number; `None` for one that says a companion nothing.
+    /// Decodes a payload; `None` for a message that a companion does not use.
     pub(super) fn read(id: u32, payload: Payload<'_>) -> Option<Self> {
         Some(match id {
             id::HEARTBEAT => Self::Heartbeat {

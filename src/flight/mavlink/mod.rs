@@ -1,17 +1,17 @@
-//! MAVLink 2, as far as a companion needs it: by a table of messages, numbers instead of enums, nothing that can panic.
+//! MAVLink 2 subset for a companion: a table of messages, numbers instead of enums, and no panics.
 //!
-//! | module | one idea |
+//! | module | content |
 //! | --- | --- |
-//! | [`table`] | the messages that are known: number, CRC seed, length |
-//! | [`frame`] | what stands around a payload, and the checksum |
-//! | [`parser`] | frames out of a stream of bytes |
-//! | [`incoming`] | what an autopilot says |
-//! | [`outgoing`] | what a companion says |
-//! | [`sik`] | the units of a SiK radio |
-//! | `signing` | with the feature `mavlink-signing`, who has the key |
+//! | [`table`] | known messages: id, CRC seed, length |
+//! | [`frame`] | frame layout, and the checksum |
+//! | [`parser`] | frames from a byte stream |
+//! | [`incoming`] | messages from an autopilot |
+//! | [`outgoing`] | messages of a companion |
+//! | [`sik`] | units of a SiK radio |
+//! | `signing` | signatures, with the feature `mavlink-signing` |
 //!
-//! A number that no enum has, and a message that the table has not, cost nothing but their bytes. MAVLink 1 is not read; an autopilot
-//! that begins with it changes to MAVLink 2 as soon as it has heard a frame of that.
+//! Unknown enum values and unknown messages cost only their bytes. MAVLink 1 is not supported; an autopilot that starts with it
+//! changes to MAVLink 2 once it has received a frame of that.
 
 #![cfg_attr(
     not(feature = "internals"),

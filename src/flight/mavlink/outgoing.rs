@@ -1,4 +1,4 @@
-//! What a companion says.
+//! Messages that a companion sends.
 
 use heapless::Vec;
 
@@ -6,83 +6,83 @@ use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum};
 use super::table::{self, id};
 use crate::geodetic::Geodetic;
 
-/// The longest payload of what is said.
+/// Maximum payload length of these messages, bytes.
 const LONGEST: usize = 54;
 
-/// Bytes of a signature, where this crate was built to sign.
+/// Length of a signature, if the crate was built with signing.
 const SIGNING: usize = if cfg!(feature = "mavlink-signing") {
     SIGNATURE
 } else {
     0
 };
 
-/// A frame to send, with room for its signature.
+/// Frame to send, with room for its signature.
 pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM + SIGNING }>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {
-    /// Something is wrong that the flight goes on with.
+    /// Problem with which the flight continues.
     pub const WARNING: u8 = 4;
-    /// Something an operator wants to know.
+    /// Information for an operator.
     pub const INFO: u8 = 6;
 }
 
-/// A message, in the units and frames of the wire.
+/// Message to send, in the units and frames of the wire.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Outgoing<'a> {
-    /// HEARTBEAT of an onboard computer that is active.
+    /// HEARTBEAT of an active onboard computer.
     Heartbeat,
-    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: have a message sent that often.
+    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: requests a message at an interval.
     SetMessageInterval {
-        /// Which message.
+        /// Id of the requested message.
         id: u32,
-        /// µs from one to the next.
+        /// Interval, µs.
         interval_us: u32,
     },
-    /// COMMAND_ACK: the answer to a command.
+    /// COMMAND_ACK: reply to a command.
     CommandAck {
-        /// Which command.
+        /// `MAV_CMD`.
         command: u16,
         /// `MAV_RESULT`.
         result: u8,
-        /// The sender of the command.
+        /// Sender of the command.
         to: Address,
     },
-    /// SET_POSITION_TARGET_GLOBAL_INT, above the mean sea level (frame 5).
+    /// SET_POSITION_TARGET_GLOBAL_INT, above mean sea level (frame 5).
     SetPosition {
-        /// Since the companion began, ms.
+        /// Time since the companion's start, ms.
         boot_ms: u32,
-        /// Where to.
+        /// Target position.
         at: Geodetic,
-        /// Toward north, east and down, m/s: with it the autopilot follows a target that moves, without it it stops there.
+        /// Target velocity toward north, east and down, m/s; without it the autopilot stops at the target.
         velocity_m_s: Option<[f32; 3]>,
-        /// Which way to look, radians clockwise from north.
+        /// Heading, radians clockwise from north.
         yaw_rad: Option<f32>,
     },
-    /// TIMESYNC: a question, which the autopilot sends back.
+    /// TIMESYNC request, which the autopilot sends back.
     TimeSync {
-        /// What is sent back.
+        /// Value that is sent back.
         asked: u64,
     },
-    /// STATUSTEXT of at most 50 bytes; what is longer is cut.
+    /// STATUSTEXT of at most 50 bytes; a longer text is truncated.
     StatusText {
         /// See [`severity`].
         severity: u8,
-        /// The line.
+        /// Text.
         text: &'a str,
     },
     /// NAMED_VALUE_FLOAT.
     NamedValue {
-        /// Since the companion began, ms.
+        /// Time since the companion's start, ms.
         boot_ms: u32,
-        /// At most ten bytes; what is longer is cut.
+        /// Name of at most ten bytes; a longer one is truncated.
         name: &'a str,
-        /// The number.
+        /// Value.
         value: f32,
     },
 }
 
-/// `type_mask` of a target: what is left out of position (0 to 2), velocity (3 to 5), acceleration (6 to 8), yaw (10), its rate (11).
+/// `type_mask` of a target: ignored position (bits 0 to 2), velocity (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
 mod mask {
     pub(super) const VELOCITY: u16 = 0b11_1000;
     pub(super) const ACCELERATION: u16 = 0b1_1100_0000;
@@ -90,10 +90,9 @@ mod mask {
     pub(super) const YAW_RATE: u16 = 1 << 11;
 }
 
-/// `MAV_FRAME_GLOBAL_INT`: latitude, longitude, and altitude above the mean sea level.
+/// `MAV_FRAME_GLOBAL_INT`: latitude, longitude, and altitude above mean sea level.
 const FRAME_AMSL: u8 = 5;
 
-/// MAV_CMD_SET_MESSAGE_INTERVAL.
 pub(in crate::flight) const SET_MESSAGE_INTERVAL: u16 = 511;
 
 impl Outgoing<'_> {
@@ -109,7 +108,7 @@ impl Outgoing<'_> {
         }
     }
 
-    /// The frame that says it, unsigned, the `sequence`-th of that sender, to the autopilot `to` where the message names one. Constant work.
+    /// Encodes an unsigned frame; `to` is the autopilot, for messages with an addressee. Constant work.
     pub fn encode(&self, from: Address, to: Address, sequence: u8) -> FrameBytes {
         let mut writer = Writer(FrameBytes::new());
         let [a, b, c, _] = self.id().to_le_bytes();
@@ -136,7 +135,7 @@ impl Outgoing<'_> {
     fn write(&self, to_frame: &mut Writer, to: Address) {
         match *self {
             Self::Heartbeat => {
-                // An onboard controller (18), no autopilot (8), no flags, active (4), of MAVLink's third version.
+                // Onboard controller (18), no autopilot (8), no flags, active (4), MAVLink version 3.
                 to_frame.bytes(&[0, 0, 0, 0, 18, 8, 0, 4, 3]);
             }
             Self::SetMessageInterval { id, interval_us } => {
@@ -213,7 +212,7 @@ impl Outgoing<'_> {
     }
 }
 
-/// Never more than a frame holds: each message's fields are `LONGEST` bytes or fewer.
+/// Writer into a frame; it never overflows, since each message's fields are at most `LONGEST` bytes.
 struct Writer(FrameBytes);
 
 impl Writer {
@@ -221,12 +220,12 @@ impl Writer {
     fn bytes(&mut self, bytes: &[u8]) {
         debug_assert!(self.0.len() + bytes.len() <= self.0.capacity());
         for byte in bytes {
-            // Cannot fail.
+            // There is room, as asserted.
             let _ = self.0.push(*byte);
         }
     }
 
-    /// `N` bytes: what fits of `text`, and zeros. No character is cut in two.
+    /// Writes `N` bytes: as much of `text` as fits, without a partial character, and zeros.
     fn text<const N: usize>(&mut self, text: &str) {
         let mut end = text.len().min(N);
         while !text.is_char_boundary(end) {

@@ -1,7 +1,7 @@
-//! Frames out of a stream of bytes.
+//! Parser of frames from a byte stream.
 //!
-//! Where a frame seems to begin and does not hold, reading goes on with the byte after its first: nothing that is whole behind it gets
-//! lost. What begins like a frame has one of the numbers of the [table], so in noise and in other messages few do.
+//! After an invalid frame the parser continues with the byte after its first one, so no valid frame behind it is lost. A frame
+//! must have an id of the [table], so few false starts occur in noise and in other messages.
 
 use heapless::Vec;
 
@@ -9,52 +9,50 @@ use super::frame::{Address, CHECKSUM, HEADER, MAGIC, MAX_FRAME, SIGNATURE, SIGNE
 use super::incoming::{Incoming, Payload};
 use super::table::{self, Known};
 
-/// A message, and who sent it.
+/// Received message, and its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Received {
-    /// Who sent it.
+    /// Address of the sender.
     pub from: Address,
-    /// What it says; `None` for one that is known only to be passed over, or that a companion sends.
+    /// Content; `None` for a message that is only skipped, or that only a companion sends.
     pub message: Option<Incoming>,
-    /// Its number.
+    /// Message id.
     pub id: u32,
-    /// Whether it carries a signature, which the parser does not check.
+    /// True if the frame has a signature, which the parser does not check.
     pub is_signed: bool,
 }
 
-/// What has been read.
+/// Counters of a parser.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
-    /// Frames that were whole.
+    /// Valid frames.
     pub frames: u32,
-    /// What began like one that is known and had another checksum, or flags that are not understood: frames that were hurt, and now and then
-    /// the bytes of something else.
+    /// Known messages with a wrong checksum or unknown incompatible flags: corrupted frames, sometimes other bytes.
     pub broken: u32,
 }
 
-/// Takes bytes, gives messages. It holds no more than one frame of the longest kind.
+/// Parser with a buffer of one frame of maximum length.
 #[derive(Clone, Debug, Default)]
 pub struct Parser {
-    /// Begins with what may be a frame, if it is not empty.
+    /// Received bytes; if not empty, they start with a possible frame.
     bytes: Vec<u8, MAX_FRAME>,
     counters: Counters,
 }
 
-/// What the first bytes are.
 enum First {
-    /// A frame's beginning.
+    /// Incomplete frame.
     Part,
-    /// No frame.
+    /// Unknown or invalid header.
     None,
-    /// No frame, though it looked like one.
+    /// Corrupted frame.
     Broken,
     Frame(Received, usize),
 }
 
 impl Parser {
-    /// One that has read nothing.
+    /// Creates a parser.
     pub const fn new() -> Self {
         Self {
             bytes: Vec::new(),
@@ -65,24 +63,26 @@ impl Parser {
         }
     }
 
-    /// Takes one byte. Call [`next_message`](Self::next_message) until it gives `None` before the next one. Constant work.
+    /// Adds one byte. Call [`next_message`](Self::next_message) until it returns `None` before the next one. Constant work.
     pub fn push(&mut self, byte: u8) {
         if self.bytes.is_empty() && byte != MAGIC {
             return;
         }
         if self.bytes.push(byte).is_err() {
-            // Nobody took what was there.
+            // The caller has not polled for messages.
             self.bytes.clear();
         }
     }
 
-    /// The next message of the bytes so far. Constant work for each byte, as [`next_frame`](Self::next_frame) says.
+    /// Returns the next message. Constant work for each byte, see [`next_frame`](Self::next_frame).
     pub fn next_message(&mut self) -> Option<Received> {
         self.next_frame(|received, _| received)
     }
 
-    /// The same, as `read` has it of the message and the frame's bytes. Each byte begins at most one checksum, of at most 266 bytes. In frames one byte in ten or fewer
-    /// does; of bytes that somebody has chosen for it one in three may.
+    /// Returns the result of `read` for the next message and its frame.
+    ///
+    /// Each byte starts at most one checksum, of at most 266 bytes. In real frames at most one byte in ten does so, in
+    /// maliciously chosen bytes one in three.
     pub fn next_frame<T>(&mut self, read: impl FnOnce(Received, &[u8]) -> T) -> Option<T> {
         while !self.bytes.is_empty() {
             match first(&self.bytes) {
@@ -104,18 +104,18 @@ impl Parser {
         None
     }
 
-    /// What has been read so far.
+    /// Counters since the parser was created.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// Goes on behind the first `length` bytes, with the next one that may begin a frame.
+    /// Discards the first `length` bytes, and those up to the next possible start of a frame.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();
         let from = length + skipped;
         let left = self.bytes.len().saturating_sub(from);
-        // By hand: what `copy_within` calls is a kilobyte and a half of flash.
+        // A manual loop, since `copy_within` calls code of a kilobyte and a half of flash.
         for at in 0..left {
             let byte = self.bytes.get(from + at).copied().unwrap_or_default();
             if let Some(place) = self.bytes.get_mut(at) {
@@ -157,7 +157,7 @@ fn first(bytes: &[u8]) -> First {
     First::Frame(received, all)
 }
 
-/// Whether the checksum at `end` is that of the bytes before it.
+/// Returns true if the checksum at `end` matches the bytes before it.
 fn holds(bytes: &[u8], end: usize, known: Known) -> bool {
     let said = bytes.get(end..).and_then(<[u8]>::first_chunk);
     bytes

@@ -1,17 +1,18 @@
-//! Signatures of MAVLink 2: who has the key, and that a frame is not an old one.
+//! MAVLink 2 signatures: authentication and replay protection.
 //!
-//! | byte behind the checksum | what |
+//! | byte after the checksum | content |
 //! | --- | --- |
-//! | 0 | link: a sender with several links numbers them |
-//! | 1 to 6 | stamp: 10 µs since 2015-01-01, little-endian; it rises from frame to frame of a link |
-//! | 7 to 12 | the first 6 bytes of SHA-256 over the key, the frame up to its checksum, link and stamp |
+//! | 0 | link id, for a sender with several links |
+//! | 1 to 6 | timestamp: 10 µs units since 2015-01-01, little-endian; it rises from frame to frame of a link |
+//! | 7 to 12 | first 6 bytes of SHA-256 over the key, the frame up to its checksum, link id and timestamp |
 //!
-//! A frame is taken if its signature is right and its stamp above the last of its sender and link. The first of a sender may be a minute
-//! behind the own stamp. What is taken moves the own stamp forward, so two that hear each other have one time.
+//! A frame is accepted if its signature is right and its timestamp is above the last one of its sender and link. The first
+//! timestamp of a sender may be up to a minute behind the own one. An accepted timestamp advances the own one, so both ends share
+//! one time.
 //!
-//! *A board without a clock* begins in 2015. Until it has taken a frame it cannot tell an old one from a new one: one that was recorded may
-//! be the first it takes, and those recorded behind it; from the first true one on none is. What it says before that is too old for an autopilot that has
-//! the time, which ignores it.
+//! *A board without a clock* starts in 2015. Until it has accepted a frame it cannot tell an old one from a new one, so a
+//! replayed recording may be accepted first; after the first current frame none is. Its own frames before that are too old for an
+//! autopilot with a clock, which ignores them.
 
 use sha2::{Digest as _, Sha256};
 
@@ -21,70 +22,69 @@ use super::parser::Received;
 use super::table;
 use crate::time::{Duration, Instant};
 
-/// Bytes of the hash that are sent.
+/// Length of the truncated hash, bytes.
 const TAG: usize = 6;
 
-/// Bytes of link and stamp.
+/// Length of link id and timestamp, bytes.
 const STAMPED: usize = SIGNATURE - TAG;
 
-/// A minute, in units of a stamp: so far the first frame of a sender may be behind.
+/// Maximum age of the first frame of a sender: a minute, in timestamp units.
 const BEHIND: u64 = 6_000_000;
 
-/// The last stamp there is, in the year 2104.
+/// Maximum timestamp, in the year 2104.
 const LAST: u64 = (1 << 48) - 1;
 
-/// Microseconds of a unit.
 const UNIT_US: u32 = 10;
 
-/// Seconds from 1970-01-01 to 2015-01-01, where stamps begin.
+/// Seconds from 1970-01-01 to 2015-01-01, where timestamps start.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Senders that are remembered: what an autopilot passes on from others is signed by them.
+/// Number of remembered senders; an autopilot forwards frames that others have signed.
 const SENDERS: usize = 8;
 
-/// Who has sent, and when last. A sender that is new takes the place of the one whose last frame is the oldest: of that one, frames of the
-/// last minute could be played again.
+/// Sender and its next timestamp. A new sender replaces the one with the oldest last frame, whose last minute could then be
+/// replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
     link: u8,
-    /// The least stamp of its next frame; 0 where there is no sender.
+    /// Minimum timestamp of its next frame; 0 for an unused entry.
     next: u64,
 }
 
-/// The time by stamps, on the relay's clock.
+/// Time as a signature's timestamp.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Stamp(u64);
 
 impl Stamp {
-    /// That of a board without a clock.
+    /// Timestamp of a board without a clock.
     pub const UNKNOWN: Self = Self(0);
 
-    /// That of a Unix time.
+    /// Converts a Unix time.
     pub const fn of_unix_micros(micros: u64) -> Self {
         let units = (micros / UNIT_US as u64).saturating_sub(BEGIN_S * 100_000);
         Self(if units < LAST { units } else { LAST })
     }
 }
 
-/// What is wrong with a frame.
+/// Reason why a frame is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Flaw {
-    /// It is not signed.
+    /// Unsigned frame.
     Unsigned,
-    /// It is signed with another key.
+    /// Signature with another key.
     Key,
-    /// It is of the past, or was taken before.
+    /// Timestamp in the past, or already used.
     Old,
 }
 
-/// A key, and what has been signed with it so far.
+/// Key, and the state of its timestamps.
 #[derive(Clone)]
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// The time by stamps at `at`, and that of the last frame sent.
+    /// Timestamp at `at`, and that of the last sent frame.
     stamp: u64,
     at: Instant,
     sent: u64,
@@ -92,14 +92,14 @@ pub struct Signing {
 }
 
 impl core::fmt::Debug for Signing {
-    /// Without the key, which does not belong into logs.
+    /// Omits the key, which must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Signing(..)")
     }
 }
 
 impl Signing {
-    /// Signs and checks with `key` on link number `link`; at `now` it is `stamp`.
+    /// Creates signing with `key` on the link id `link`; `stamp` is the timestamp at `now`.
     pub const fn new(key: [u8; 32], link: u8, stamp: Stamp, now: Instant) -> Self {
         const NOBODY: Sender = Sender {
             from: Address {
@@ -119,7 +119,7 @@ impl Signing {
         }
     }
 
-    /// Moves the time on to `now`. An hour at once, of a caller that was away for longer: a division of 64 bits is a kilobyte of flash.
+    /// Advances the timestamp to `now`, by at most about an hour per call, because a 64-bit division is a kilobyte of flash.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;
@@ -127,7 +127,7 @@ impl Signing {
         self.at = self.at + Duration::from_micros(u64::from(units) * u64::from(UNIT_US));
     }
 
-    /// The same frame, signed. Work: a checksum and a hash of one frame.
+    /// Returns the signed frame. Work: a checksum and a hash of one frame.
     pub fn sign(&mut self, now: Instant, frame: FrameBytes) -> FrameBytes {
         self.advance(now);
         self.sent = self.stamp.max(self.sent.saturating_add(1)).min(LAST);
@@ -144,7 +144,7 @@ impl Signing {
         let sum = id
             .and_then(table::find)
             .map_or(0, |known| checksum(covered, known));
-        // There is room for it: see `FrameBytes`.
+        // `FrameBytes` has room for the signature.
         let _ = frame.extend_from_slice(&sum.to_le_bytes());
         let _ = frame.push(self.link);
         let [stamp @ .., _, _] = self.sent.to_le_bytes();
@@ -154,10 +154,10 @@ impl Signing {
         frame
     }
 
-    /// Checks a whole frame. Work: a hash of one frame.
+    /// Checks the signature of a whole frame. Work: a hash of one frame.
     ///
     /// # Errors
-    /// [`Flaw`] says why it is not to be taken.
+    /// [`Flaw`] states why the frame is rejected.
     pub fn check(&mut self, now: Instant, received: &Received, frame: &[u8]) -> Result<(), Flaw> {
         if !received.is_signed {
             return Err(Flaw::Unsigned);
@@ -178,7 +178,7 @@ impl Signing {
             Some(next) => stamp >= next,
             None => stamp.saturating_add(BEHIND) >= self.stamp,
         };
-        // First: that the key is another one says more than that the frame is old.
+        // The key is checked first, since a wrong key is the more informative reason.
         if !is_same(self.tag(covered), *told) {
             return Err(Flaw::Key);
         }
@@ -210,7 +210,7 @@ impl Signing {
     }
 }
 
-/// In the same time wherever they differ.
+/// Compares in constant time.
 fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     let differs = one
         .into_iter()

@@ -1,14 +1,15 @@
-//! The units of a SiK radio.
+//! Units of a SiK radio.
 
-/// By how much 1/1.9 dB changes a power, as a power of 2: log2(10) / 19.
+/// A unit, 1/1.9 dB, as a power of 2: log2(10) / 19.
 const PER_UNIT: f32 = 0.174_838_32;
 
-/// 0 of the radio's units, -127 dBm, as a power of 2 of a watt: -15.7 log2(10).
+/// Unit 0, -127 dBm, as a power of 2 of a watt: -15.7 log2(10).
 const ZERO: f32 = -52.154_27;
 
-/// The power that is heard between frames, W, by `noise` of RADIO_STATUS: the radio's documentation has `signal_dBm = (RSSI / 1.9) - 127`, near
-/// enough, and the same units for the noise. `None` for 255, which says that it is unknown, and for 0, which a radio says that has
-/// measured nothing: it is below what any of them hears.
+/// Returns the noise power between frames, W, for `noise` of RADIO_STATUS.
+///
+/// The radio's documentation states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise. `None`
+/// for 255 (unknown), and for 0, which a radio reports before its first measurement and which is below any real noise.
 ///
 /// Source: "SiK Radio, advanced configuration" of ArduPilot, on `LBT_RSSI`; mavros (`3dr_radio`) and INAV convert alike.
 pub fn noise_w(noise: u8) -> Option<f32> {

@@ -1,52 +1,52 @@
-//! The messages that are known, from the `common` dialect.
+//! Known messages of the `common` dialect.
 
-/// What the checksum and the parser have to know of a message.
+/// Properties of a message for the checksum and the parser.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
-    /// Its number, of 24 bits.
+    /// Message id, 24 bits.
     pub id: u32,
-    /// The byte that is added to the checksum: a digest of the message's fields, so that both ends mean the same by it.
+    /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
     pub crc_extra: u8,
-    /// Bytes of its fields, without what a later dialect may add.
+    /// Length of its fields, without extensions of later dialects, bytes.
     pub length: u8,
 }
 
-/// Numbers of messages.
+/// Message ids.
 pub mod id {
-    /// Who is there, of what kind, in which mode.
+    /// Type, mode and state of a system.
     pub const HEARTBEAT: u32 = 0;
-    /// Where the vehicle is.
+    /// Position of the vehicle.
     pub const GLOBAL_POSITION_INT: u32 = 33;
-    /// A command with seven numbers.
+    /// Command with seven parameters.
     pub const COMMAND_LONG: u32 = 76;
-    /// What became of a command.
+    /// Reply to a command.
     pub const COMMAND_ACK: u32 = 77;
-    /// What an ArduPilot or PX4 flies to, in its own local frame.
+    /// Current target of an ArduPilot or PX4, in its local frame.
     pub const POSITION_TARGET_LOCAL_NED: u32 = 85;
-    /// Where to fly to.
+    /// Target position to fly to.
     pub const SET_POSITION_TARGET_GLOBAL_INT: u32 = 86;
-    /// What the vehicle flies to.
+    /// Current target of the vehicle.
     pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
-    /// What a radio has heard.
+    /// Signal and noise level of a radio.
     pub const RADIO_STATUS: u32 = 109;
-    /// A clock that is sent back.
+    /// Clock value that is sent back.
     pub const TIMESYNC: u32 = 111;
-    /// The state of the vehicle's fence.
+    /// State of the vehicle's geofence.
     pub const FENCE_STATUS: u32 = 162;
-    /// Whether it is on the ground.
+    /// Landed state of the vehicle.
     pub const EXTENDED_SYS_STATE: u32 = 245;
-    /// A number with a name, for an operator to plot.
+    /// Named value, for an operator to plot.
     pub const NAMED_VALUE_FLOAT: u32 = 251;
-    /// A line for an operator to read.
+    /// Text for an operator.
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// So many bytes a later dialect may add to a message. What says that it is longer is none: its number is noise.
+/// Maximum length of a later dialect's extensions, bytes; a longer message is treated as noise.
 const ADDED: u8 = 24;
 
 impl Known {
-    /// The longest payload that is taken for this message.
+    /// Maximum payload length of this message.
     pub const fn longest(self) -> u8 {
         self.length.saturating_add(ADDED)
     }
@@ -60,7 +60,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// First what is read or written; then what carries bytes of others, which may look like frames: it has to be known to be passed over whole.
+/// Messages that are read or written, and then messages whose payload may contain frames, which are skipped as a whole.
 const TABLE: [Known; 26] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::GLOBAL_POSITION_INT, 104, 28),
@@ -93,7 +93,7 @@ const TABLE: [Known; 26] = [
     known(385, 147, 133),
 ];
 
-/// What is known of that message.
+/// Returns the properties of a message.
 pub fn find(id: u32) -> Option<Known> {
     TABLE.into_iter().find(|known| known.id == id)
 }

@@ -1,4 +1,4 @@
-//! Starts anywhere in the air, and the halt of a chain of which one relay is out of order.
+//! Tests: starts anywhere in the air, and the halt of a chain with one relay out of order.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Long after the last setpoint it is reported there.
+    /// Reports the relay there, long after the last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);
@@ -19,7 +19,7 @@ impl One {
     }
 }
 
-/// What the neighbour says once it knows this relay's association.
+/// Returns a message of a neighbour that knows this relay's association.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
     let echo = one.says(side).association;
     Fence {
@@ -36,14 +36,14 @@ fn the_first_setpoint_is_the_place_in_space_until_the_order_is_known() {
         now: Instant::ZERO,
     };
     one.guard.commit(at(60.0));
-    // Above its neighbour, to the side, and outside the box.
+    // Above its neighbour, to the side, and outside of the geofence.
     let high = aside(100.0, -80.0, 160.0);
     one.is_at_place(high);
     for _ in 0..20 {
         one.is_at_place(high);
         assert_eq!(one.guard.setpoint(), Some(high));
     }
-    // The neighbour is found beyond, 3 m on: the two part along x before either moves across the line.
+    // The neighbour is reported 3 m beyond: the two move apart along x before either moves across the line.
     let told = answer(&mut one, Side::Downstream, 103.0, 0);
     one.hears(Side::Downstream, 2, told);
     let first = one.guard.setpoint().unwrap();
@@ -70,7 +70,7 @@ fn a_start_outside_the_box_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Reports that are off by 1 m each do not tell the order of two relays that are 1 m apart, unless they may pass each other.
+/// Two relays 1 m apart, with an error of 1 m per report, are not in order, unless they may pass each other.
 #[test]
 fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
@@ -108,7 +108,7 @@ fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     }
 }
 
-/// Each of two neighbours may be in order with the relay between them by the error of the reports alone, and the two not with each other.
+/// Two neighbours may each be in order with the relay between them by the error of the reports, but not with each other.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -131,7 +131,7 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     }
 }
 
-/// A relay on its way that is told to halt stops where it was reported last, and goes on when the halt is over or forgotten.
+/// A relay on its way that receives a halt stops where it was last reported, and continues when the halt ends or expires.
 #[test]
 fn a_relay_that_halts_on_its_way_stops_there() {
     for forgotten in [false, true] {
@@ -170,7 +170,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// A relay that halts on its way into the box stops where it is, outside: the nearest place in the box may be a neighbour's.
+/// A relay that halts on its way into the geofence stops outside: the nearest position inside may be a neighbour's.
 #[test]
 fn a_relay_that_halts_outside_the_box_stops_there() {
     let mut one = One {
@@ -199,14 +199,14 @@ fn a_relay_that_halts_outside_the_box_stops_there() {
     one.guard.position(one.now, midway);
     one.hears(Side::Downstream, 2, halts);
     assert_eq!(one.guard.setpoint(), Some(midway));
-    // No report lets it go farther out than where it came from.
+    // No report makes it go farther out than where it came from.
     one.hears(Side::Downstream, 2, told);
     one.guard.position(one.now, aside(100.0, 0.0, 190.0));
     one.hears(Side::Downstream, 2, halts);
     assert_eq!(one.guard.setpoint(), Some(high));
 }
 
-/// A neighbour that was rebooted does not know what it had requested: its first messages withdraw no halt.
+/// A rebooted neighbour does not know its earlier request: its first messages withdraw no halt.
 #[test]
 fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -269,7 +269,7 @@ fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
     }
 }
 
-/// A relay that is not flown, or has just begun, passes a halt on all the same.
+/// A relay that is not flown, or has just started, also forwards a halt.
 #[test]
 fn a_halt_passes_a_relay_that_is_not_flown() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -287,7 +287,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!((told.flags, told.x_m), (flags, 100.0));
     assert!(told.is_valid());
     assert!(one.guard.poll().is_none());
-    // Its neighbour upstream, which is flown, halts by that and leaves no association for it.
+    // Its neighbour upstream, which is flown, halts because of that, and leaves no association for it.
     let mut before = One::new([None, Some(2)], 50.0, 60.0);
     let known = answer(&mut before, Side::Downstream, 100.0, 0);
     before.hears(Side::Downstream, 2, known);
@@ -296,7 +296,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
 }
 
-/// A relay in its pilot's hands knows of flown neighbours whether it is in order with them.
+/// A relay in its pilot's hands knows its order relative to flown neighbours.
 #[test]
 fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     let mut one = One {
@@ -320,8 +320,8 @@ fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// A relay that began beside a silent one goes off from it to the separation, then across, and stays so far away until the silent one is
-/// cleared; meanwhile it tells why.
+/// A relay that started beside a silent one moves away to the separation, then across, and stays so far away until the silent one
+/// is cleared; meanwhile it reports the reason.
 #[test]
 fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     let mut one = One {
@@ -350,12 +350,12 @@ fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
         one.guard.hold_reason(Side::Upstream),
         Some(HoldReason::Lost)
     );
-    one.guard.forget(Side::Upstream);
+    one.guard.forget(Side::Upstream, false);
     one.is_at(110.0);
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
 
-/// A relay that is out of order with a neighbour stays where it is when that one falls silent, and halts the others, until it is cleared.
+/// A relay out of order with a neighbour that becomes silent stays, and halts the others, until that one is cleared.
 #[test]
 fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -378,13 +378,13 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
             assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits(), "{side:?}");
             assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
         }
-        one.guard.forget(side);
-        one.guard.forget(side.other());
+        one.guard.forget(side, false);
+        one.guard.forget(side.other(), false);
         assert_eq!(one.setpoint().to_bits(), to_m.to_bits(), "{side:?}");
     }
 }
 
-/// A relay beside one that is not flown waits for it without a halt of the chain, where the places of the two show their order.
+/// A relay beside one that is not flown waits without halting the chain, if the positions of the two show their order.
 #[test]
 fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -412,7 +412,7 @@ fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     }
 }
 
-/// The fence of an association from before a reboot may be far beyond this relay: it is not where its owner is.
+/// The fence of an association from before a reboot may be far beyond this relay; it is not its owner's position.
 #[test]
 fn an_old_fence_says_nothing_of_where_its_owner_is() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -435,8 +435,7 @@ fn an_old_fence_says_nothing_of_where_its_owner_is() {
     }
 }
 
-/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other: what relay 2 tells upstream is the lower one
-/// of the two, so that relay 1 counts on no more.
+/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other: relay 2 sends the lower x upstream.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -461,7 +460,7 @@ fn gaps_that_are_negative_by_the_error_add_up() {
             let guard = &mut guards[k];
             guard.commit(end);
             guard.position(now, place);
-            // Setpoints are not flown: what relay 2 tells is looked at before anything has moved.
+            // Setpoints are not flown: the message of relay 2 is checked before any move.
             guard.steer(now);
             guard.remind();
             while let Some((side, to, fence)) = guards[k].poll() {
@@ -482,4 +481,54 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     }
     let told = told.expect("relay 2 is in order with relay 3");
     assert!((100.0..=100.5).contains(&told), "{told}");
+}
+
+/// Relay 1 starts beside relay 2, in order with it but for the error of the reports, after relays 2 and 3 have cleared their first fence:
+/// the next fence between these two is the separation beyond relay 1, too (rule 7).
+#[test]
+fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
+    let config = GuardConfig {
+        hover_m: 2.0,
+        ..config()
+    };
+    let places = [
+        Placement {
+            y_m: 20.0,
+            ..at(202.0)
+        },
+        at(200.0),
+        at(212.0),
+    ];
+    let mut guards = [1_u16, 2, 3].map(|k| {
+        let neighbours = [(k == 2).then_some(1), (k == 2).then_some(3)];
+        let neighbours = if k == 3 { [Some(2), None] } else { neighbours };
+        Guard::new(config, neighbours, 7 + u32::from(k), Instant::ZERO)
+    });
+    guards[1].link(Side::Upstream, None);
+    guards[1].forget(Side::Upstream, false);
+    let mut fences = [0.0_f32; 2];
+    for second in 1..20 {
+        let now = Instant::from_millis(1_000 * second);
+        let first = if second < 10 { 1 } else { 0 };
+        if second == 10 {
+            guards[0].link(Side::Downstream, Some(2));
+            guards[1].link(Side::Upstream, Some(1));
+        }
+        for k in first..3 {
+            guards[k].commit(places[k]);
+            guards[k].position(now, places[k]);
+            guards[k].steer(now);
+            guards[k].remind();
+            while let Some((side, to, fence)) = guards[k].poll() {
+                if side == Side::Downstream && fence.number > 0 {
+                    fences[k] = fence.x_m;
+                }
+                let from = u16::try_from(k).unwrap_or(0) + 1;
+                guards[usize::from(to) - 1].hear(side.other(), from, &fence);
+            }
+        }
+    }
+    let [first_m, second_m] = fences;
+    assert!(first_m >= 212.0, "{first_m}");
+    assert!(second_m >= first_m, "{second_m} {first_m}");
 }

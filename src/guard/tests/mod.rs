@@ -1,4 +1,4 @@
-//! The rules of the guard, one by one: relays whose messages are handed over by hand.
+//! Tests of the guard's rules, with messages passed by hand.
 
 mod halted;
 mod pairs;
@@ -34,7 +34,7 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// What a neighbour says first.
+/// Returns a neighbour's first message.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -48,7 +48,7 @@ fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     }
 }
 
-/// A guard between `neighbours` that hovers at `x_m` and is to be at `target_m`, and the clock.
+/// Guard between `neighbours` that hovers at `x_m`, with the agreed position `target_m`, and the clock.
 struct One {
     guard: Guard,
     now: Instant,
@@ -66,7 +66,7 @@ impl One {
         one
     }
 
-    /// Long after the last setpoint it is reported to be at `x_m`.
+    /// Reports the relay at `x_m`, long after the last setpoint.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));
@@ -77,7 +77,6 @@ impl One {
         self.guard.steer(self.now).unwrap().x_m
     }
 
-    /// What it has to say on `side`.
     fn says(&mut self, side: Side) -> Fence {
         self.guard.steer(self.now);
         self.guard.follower.association.due = true;
@@ -141,7 +140,7 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Rule 1: not even where the neighbour on the other side began too close.
+/// Rule 1, even if the neighbour on the other side started too close.
 #[test]
 fn a_squeezed_relay_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -181,7 +180,7 @@ fn a_lost_relay_is_kept_clear_of() {
         one.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Lost)
     );
-    one.guard.forget(Side::Downstream);
+    one.guard.forget(Side::Downstream, false);
     assert_eq!(one.setpoint().to_bits(), 400.0_f32.to_bits());
 
     lost.guard.commit(at(50.0));
@@ -189,8 +188,35 @@ fn a_lost_relay_is_kept_clear_of() {
     assert!(least >= 300.0 - 200.0);
     lost.guard.link(Side::Upstream, None);
     assert_eq!(lost.setpoint().to_bits(), least.to_bits());
-    lost.guard.forget(Side::Upstream);
+    lost.guard.forget(Side::Upstream, false);
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
+}
+
+/// An operator has cleared the lost neighbour; the one beyond it was never heard.
+#[test]
+fn a_relay_keeps_clear_of_those_beyond_a_cleared_one_until_it_hears_them() {
+    let mut one = One::new([Some(2), None], 300.0, 300.0);
+    let mut next = One::new([None, Some(3)], 100.0, 100.0);
+    one.guard.link(Side::Upstream, None);
+    one.guard.forget(Side::Upstream, true);
+    one.guard.commit(at(200.0));
+    assert_eq!(one.setpoint().to_bits(), 300.0_f32.to_bits());
+    let reason = one.guard.hold_reason(Side::Upstream);
+    assert_eq!(reason, Some(HoldReason::Lost));
+    // It moves away from them before it moves across the line.
+    one.guard.commit(Placement {
+        y_m: 50.0,
+        ..at(200.0)
+    });
+    assert_eq!(one.guard.steer(one.now), Some(at(310.0)));
+    one.is_at(310.0);
+    one.guard.link(Side::Upstream, Some(1));
+    for _ in 0..6 {
+        one.hears(Side::Upstream, 1, next.says(Side::Downstream));
+        next.hears(Side::Downstream, 3, one.says(Side::Upstream));
+    }
+    one.guard.commit(at(200.0));
+    assert_eq!(one.setpoint().to_bits(), 200.0_f32.to_bits());
 }
 
 #[test]
@@ -206,7 +232,7 @@ fn one_that_was_never_heard_may_be_anywhere() {
         guard.steer(now);
         assert_eq!(guard.steer(now), Some(at(500.0)));
     }
-    guard.forget(Side::Downstream);
+    guard.forget(Side::Downstream, false);
     assert_eq!(guard.steer(now), Some(at(900.0)));
 }
 
@@ -238,7 +264,7 @@ fn a_relay_that_turns_flies_on_no_farther_than_it_was_told() {
     assert_eq!(after(10_000, &[80.0], 50.0), (20.0, 80.0));
     assert_eq!(after(10_200, &[], 48.0), (20.0, 80.0));
     assert_eq!(after(13_900, &[90.0], 36.0), (20.0, 90.0));
-    // By now it has stopped and turned, and what it is told on its way does not take that back.
+    // By now it has stopped and turned; setpoints on its way do not change that.
     assert_eq!(after(14_000, &[], 36.0), (36.0, 90.0));
     assert_eq!(after(14_200, &[95.0], 38.0), (38.0, 95.0));
     assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));

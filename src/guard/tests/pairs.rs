@@ -1,4 +1,4 @@
-//! Two relays and the fence between them.
+//! Tests of two relays and the fence between them.
 
 use super::{One, at, config, fence};
 use crate::guard::{Fence, Guard, HoldReason};
@@ -6,11 +6,11 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// The setpoints of the two, m along x: they are to be exact.
+/// Exact setpoints of the two, m along x.
 #[derive(PartialEq, Debug)]
 struct Both(f32, f32);
 
-/// Relay 1 toward Tx and relay 2 toward Rx, between them one fence.
+/// Relay 1 toward Tx and relay 2 toward Rx, with one fence between them.
 struct Pair {
     owner: One,
     follower: One,
@@ -34,7 +34,7 @@ impl Pair {
         self.owner.hears(Side::Downstream, 2, fence);
     }
 
-    /// Both hear what the other one has to say, until nothing is new.
+    /// Exchanges all messages until nothing changes.
     fn talk(&mut self) {
         for _ in 0..8 {
             self.ask();
@@ -58,7 +58,7 @@ fn nobody_moves_before_the_other_one_was_heard() {
         pair.owner.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Unheard)
     );
-    // Away from where the other one should be: that may be where it is.
+    // Away from the expected position of the other one, which may be its real one.
     pair.owner.guard.commit(at(50.0));
     pair.follower.guard.commit(at(400.0));
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
@@ -66,7 +66,7 @@ fn nobody_moves_before_the_other_one_was_heard() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Rules 3, 4 and 6: a fence on the right is asked for, and flown to as the other one clears it.
+/// Rules 3, 4 and 6: a fence to the right is requested, and approached as the other relay clears it.
 #[test]
 fn the_keeper_follows_the_kept_relay() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -90,7 +90,7 @@ fn the_keeper_follows_the_kept_relay() {
     );
 }
 
-/// Rules 1 and 5: a fence on the left is lowered as the owner clears it.
+/// Rules 1 and 5: a fence to the left is lowered as the owner clears it.
 #[test]
 fn the_kept_relay_follows_the_keeper() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -104,13 +104,13 @@ fn the_kept_relay_follows_the_keeper() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Rule 3: what was told with an older fence, or late, does not count.
+/// Rule 3: messages with an older fence, or late ones, do not count.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
     let high = pair.follower.says(Side::Upstream);
-    // It is lowered to (20 + 120 + 10) / 2, but nobody has said so to the follower yet.
+    // The fence is lowered to (20 + 120 + 10) / 2, but the follower has not received that yet.
     pair.owner.guard.commit(at(20.0));
     pair.follower.guard.commit(at(120.0));
     pair.answer();
@@ -137,7 +137,7 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// A report that is older than the setpoint, or that the setpoint cannot have had an effect on, frees nothing.
+/// A report that is older than the setpoint, or too early for its effect, frees nothing.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -185,7 +185,7 @@ fn relays_in_the_wrong_order_stay() {
     let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
     pair.follower.guard.commit(at(300.0));
     pair.talk();
-    // Away from where the other one should be: that is where it is.
+    // Away from the expected position of the other one, which is its real one.
     pair.owner.guard.commit(at(250.0));
     pair.follower.guard.commit(at(140.0));
     pair.talk();
@@ -196,8 +196,8 @@ fn relays_in_the_wrong_order_stay() {
     );
 }
 
-/// An owner that starts again knows nothing of the fence it had announced: the follower goes by it until it has talked to the
-/// new one, and by no old message after that.
+/// A restarted owner does not know its announced fence: the follower keeps it until it has exchanged messages with the new owner,
+/// and ignores old messages afterwards.
 #[test]
 fn a_new_life_is_told_from_an_old_one() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -205,7 +205,7 @@ fn a_new_life_is_told_from_an_old_one() {
     let old = pair.owner.says(Side::Downstream);
     let told = pair.follower.says(Side::Upstream);
     pair.owner = One::new([None, Some(2)], 100.0, 280.0);
-    // Another seed, as it has to be.
+    // Another seed, as required.
     pair.owner.guard = {
         let mut guard = Guard::new(config(), [None, Some(2)], 8, Instant::ZERO);
         guard.commit(at(280.0));
@@ -226,7 +226,7 @@ fn a_new_life_is_told_from_an_old_one() {
         pair.follower.hears(Side::Upstream, 1, old);
     }
     assert_eq!(pair.follower.setpoint().to_bits(), 295.0_f32.to_bits());
-    // Three in a row look like a third life; but they grant nothing either.
+    // Three in a row look like another restart, but grant nothing either.
     pair.follower.hears(Side::Upstream, 1, old);
     assert!(pair.follower.setpoint() >= 295.0);
     pair.talk();
@@ -237,7 +237,7 @@ fn a_new_life_is_told_from_an_old_one() {
     );
 }
 
-/// A relay that is not in order with one neighbour grants the other one nothing: it tells it to halt, without a place that counts.
+/// A relay out of order with one neighbour grants nothing to the other one: it requests a halt, with an x that does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -266,7 +266,7 @@ fn a_relay_out_of_order_grants_nothing() {
         one.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Order)
     );
-    // What is told so grants nothing to the neighbour upstream.
+    // That message grants nothing to the neighbour upstream.
     let mut owner = One::new([None, Some(2)], 50.0, 60.0);
     let association = owner.says(Side::Downstream).association;
     let told = Fence {
@@ -283,7 +283,7 @@ fn a_relay_out_of_order_grants_nothing() {
     );
     beyond.x_m = 120.0;
     one.hears(Side::Downstream, 3, beyond);
-    // Now its place counts; but no fence downstream before it has heard of one upstream.
+    // Now its x counts; but it sends no fence downstream before it has received one from upstream.
     assert_eq!(one.says(Side::Upstream).flags & Fence::UNPLACED, 0);
     assert_eq!(one.says(Side::Upstream).x_m.to_bits(), 100.0_f32.to_bits());
     assert_eq!(one.says(Side::Downstream).number, 0);

@@ -1,4 +1,4 @@
-//! A relay that is not flown to its setpoints.
+//! Tests of a relay that is not flown to its setpoints.
 
 extern crate std;
 
@@ -10,7 +10,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::Instant;
 
-/// Three relays in a row, 100 m apart; the middle one is taken.
+/// Three relays in a row, 100 m apart; the pilot takes the middle one.
 struct Row {
     all: [One; 3],
 }
@@ -35,7 +35,7 @@ impl Row {
         row
     }
 
-    /// All that there is to say is heard, until there is nothing.
+    /// Exchanges all messages until there are none.
     fn talk(&mut self) {
         for _ in 0..8 {
             for k in 0..3 {
@@ -45,7 +45,7 @@ impl Row {
         }
     }
 
-    /// One message of relay `k` from 0, which its neighbour hears.
+    /// Passes one message of relay `k`, from 0, to its neighbour.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
@@ -104,13 +104,13 @@ fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
         );
     }
     assert_eq!(row.all[1].guard.hold_reason(Side::Upstream), None);
-    // What both may do once somebody has looked.
+    // Both may move after an operator has checked.
     row.all[0].guard.commit(at(180.0));
-    row.all[0].guard.forget(Side::Downstream);
+    row.all[0].guard.forget(Side::Downstream, false);
     assert_eq!(row.setpoint(0), Some(180.0));
 }
 
-/// Rule 15: its pilot flies the middle one in front of its neighbour, across the line or along it.
+/// Rule 15: the pilot flies the middle one in front of its neighbour, across the line or along it.
 #[test]
 fn nobody_flies_through_a_drone_that_its_pilot_hovers_in_the_way() {
     for (y_m, expected_m) in [(0.0, 80.0), (6.0, 80.0), (20.0, 20.0)] {
@@ -125,14 +125,14 @@ fn nobody_flies_through_a_drone_that_its_pilot_hovers_in_the_way() {
         let reason = row.all[0].guard.hold_reason(Side::Downstream);
         let expected = (expected_m > 20.0).then_some(HoldReason::NotFlown);
         assert_eq!(reason, expected);
-        // It is gone again.
+        // The drone is gone again.
         row.all[1].guard.position(now, at(200.0));
         row.talk();
         assert_eq!(row.setpoint(0), Some(20.0));
     }
 }
 
-/// A relay that is already on its way stops before it, and stays there whatever the noise of its reports.
+/// A relay on its way stops before the drone, and stays there despite the noise of its reports.
 #[test]
 fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     let mut row = Row::new();
@@ -151,7 +151,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// Within the separation along x it moves across the line away from the drone only.
+/// Within the separation along x a relay moves across the line only away from the drone.
 #[test]
 fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
     for (y_m, moves) in [(-30.0, true), (30.0, false)] {
@@ -172,7 +172,7 @@ fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
     }
 }
 
-/// A neighbour that has told its place alone, before it was in an association, and then fell silent is a lost one.
+/// A neighbour that sent its position without an association, and then became silent, is lost.
 #[test]
 fn one_that_began_and_fell_silent_is_lost() {
     let mut row = Row::new();
@@ -187,7 +187,7 @@ fn one_that_began_and_fell_silent_is_lost() {
     assert_eq!(reason, Some(HoldReason::Lost));
 }
 
-/// What it told in its pilot's hands, and comes late, makes it no obstacle again.
+/// A late message from its time in the pilot's hands does not make a drone an obstacle again.
 #[test]
 fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
     let mut row = Row::new();
@@ -212,7 +212,7 @@ fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// The companion of the neighbour was started again and not engaged: its old association still limits this relay.
+/// The neighbour's companion restarted and was not engaged: its old association still limits this relay.
 #[test]
 fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     let mut row = Row::new();
@@ -230,7 +230,7 @@ fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// A neighbour that is flown and silent makes no room: that is told after five reminders, and not while the way goes on.
+/// A flown and silent neighbour makes no room: that is reported after five reminders, and not while the relay moves.
 #[test]
 fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
     let mut row = Row::new();
@@ -278,7 +278,7 @@ fn given_back_it_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// It is told until the neighbour has begun anew, even if the pilot has given it back by then.
+/// The release is repeated until the neighbour has started a new association, even if the pilot has given the drone back.
 #[test]
 fn what_is_lost_is_told_again() {
     let mut row = Row::new();
@@ -303,7 +303,7 @@ fn what_is_lost_is_told_again() {
     assert!(row.all.iter().all(|one| one.guard.is_there()));
 }
 
-/// What was said before the pilot took it, and comes late, does not bring it back; nor does what it says of its leaving send it away again.
+/// Late messages from before the pilot took over do not bring the relay back; late releases do not send it away again.
 #[test]
 fn late_messages_say_nothing_of_who_flies() {
     let mut row = Row::new();
@@ -339,7 +339,7 @@ fn late_messages_say_nothing_of_who_flies() {
     assert_eq!(row.setpoint(0), Some(200.0 - APART));
 }
 
-/// A pilot has both: each tells the other one, and both find each other again.
+/// Two relays in a row are taken: each informs the other one, and both associate again.
 #[test]
 fn two_in_a_row_are_taken_and_given_back() {
     let mut row = Row::new();
@@ -347,7 +347,7 @@ fn two_in_a_row_are_taken_and_given_back() {
     let now = row.all[2].now;
     row.all[2].guard.control(now, false);
     row.talk();
-    // Each tells its place now and then, and neither answers that.
+    // Each sends its position now and then, without a reply.
     assert!(row.all[1].guard.poll().is_none() && row.all[2].guard.poll().is_none());
     row.give();
     row.all[1].is_at(200.0);

@@ -1,4 +1,4 @@
-//! Hellos: those that a relay owes, and one that it has received: whether its sender hears this relay, and is taken for the neighbour.
+//! Pending hellos, and received ones, by which the neighbours are selected.
 
 use super::state::Node;
 use crate::event::About;
@@ -10,7 +10,7 @@ use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 
-/// What a hello says of a mission.
+/// Mission state in a hello.
 struct MissionSaid {
     holds: MissionId,
     flies: bool,
@@ -19,14 +19,14 @@ struct MissionSaid {
 }
 
 impl Node {
-    /// Owes node `to` at `side` a hello, which may ask for one in return.
+    /// Schedules a hello to node `to` at `side`; `ask` requests one in return.
     #[inline(never)] // called from many places
     pub(super) fn owe_hello(&mut self, side: Side, to: u16, ask: bool) {
         let distance = to.abs_diff(self.member.node);
         self.layers.neighbours.at_mut(side).owe(distance, ask);
     }
 
-    /// The next hello that is owed: at which side, to which node.
+    /// Returns the next pending hello with its side and its destination node.
     pub(super) fn next_hello(&mut self, now: Instant) -> Option<(Side, u16, Hello)> {
         let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
@@ -59,7 +59,7 @@ impl Node {
             form: self.layers.view.asking.asks() && side == self.back(),
             fresh: self.layers.round.is_fresh(),
             ready: false,
-            // Who has just been switched on is in no part yet.
+            // A relay that has just started belongs to no part of the chain.
             behind: if self.layers.round.is_fresh() {
                 1
             } else {
@@ -78,7 +78,7 @@ impl Node {
         }
     }
 
-    /// What a hello says of the mission: of the one that is held, or of a newer one that this relay has refused.
+    /// Returns the state of the stored mission, or of a newer one that was refused.
     fn says_of_mission(&self) -> MissionSaid {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         #[cfg(feature = "upload")]
@@ -103,8 +103,9 @@ impl Node {
         }
     }
 
-    /// Whether this relay could come between node `other` at `side` and the one that it takes there: whether that one and this relay hear
-    /// each other, or there is a neighbour that comes along with it.
+    /// Returns true if this relay could join between node `other` at `side` and the neighbour of `other`.
+    ///
+    /// For that, this relay and that neighbour receive each other, or a nearer linked neighbour of this relay joins too.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -119,12 +120,12 @@ impl Node {
         let settings = &self.member.settings;
         let far = self.layers.neighbours.at(side.other());
         let distance = beyond.abs_diff(own);
-        // Of two links that cross the one that ends nearest to Rx is given up.
+        // If two links cross, the one whose end is nearer to Rx is replaced.
         let crosses = side == Side::Downstream && far.goes_past(distance);
         there && (far.is_two_way(distance, now, settings) || far.comes_along(distance) || crosses)
     }
 
-    /// How many relays there are on that side in the part of the chain that this relay is in, as it was counted last.
+    /// Returns the number of relays at `side` in this part of the chain, as of the last count.
     pub(super) fn beyond(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
@@ -141,7 +142,7 @@ impl Node {
         }
     }
 
-    /// The number of a hello that is said now, for the offer that answers it; 0 where none is taken.
+    /// Returns the number of a hello sent now, for the offer that answers it; 0 if uploads are not accepted.
     #[cfg(feature = "upload")]
     pub(super) fn ask_number(&mut self, now: Instant) -> u16 {
         if takes_uploads(&self.member) {
@@ -159,14 +160,14 @@ impl Node {
 }
 
 impl Node {
-    /// A hello from node `from` at `side`, of the same mission.
+    /// Handles a hello of the same mission from node `from` at `side`.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let known = self.layers.view.newest();
         self.layers.view.heard_of(hello.newest);
         if self.searches() {
             let heard = hello.is_heard(from, own);
-            // One that asks for nothing may be the answer to what was heard just now.
+            // A hello without a request may be a reply to one that was just received.
             if heard || hello.ask {
                 self.says_it_hears(side, from, heard);
             }
@@ -191,13 +192,13 @@ impl Node {
             self.layers.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
                 let two_way = hello.is_heard(from, own);
-                // A run of lost frames does not undo what was heard before: silence has its own measure.
+                // A few lost frames do not end a link; the neighbour's silence has its own timer.
                 let linked = self.layers.neighbours.at(side).is_mutual();
                 let mutual = hello.neighbour == own && (two_way || linked);
                 self.told(now, side, mutual);
             }
             let waits = self.layers.view.awaited().is_some();
-            // One that holds a newer mission takes part in no view without it: it is asked for once this relay holds it, too.
+            // A neighbour with a newer mission joins no view without it, so a view is requested when this relay has that mission.
             let newer = takes_uploads(&self.member)
                 && !hello.refused
                 && hello.holds > self.layers.update.latest();
@@ -214,7 +215,7 @@ impl Node {
         self.review(now);
     }
 
-    /// Node `from` at `side` has said whether it hears this relay.
+    /// Records whether node `from` receives this relay, and reports the node if it repeatedly does not.
     pub(super) fn says_it_hears(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -227,23 +228,21 @@ impl Node {
         }
     }
 
-    /// A hello from node `from` at `side`, which is not taken for the neighbour there.
-    ///
-    /// One that does not hear this relay is none: nothing can be agreed on with it.
+    /// Considers node `from` at `side` as the new neighbour there; one-way links are ignored.
     fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.beyond(side);
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
         neighbour.notice(now, settings);
-        // It would rather have this relay than one that is farther away.
+        // The candidate prefers this relay to a neighbour that is farther away.
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther;
         if taken || !hello.is_heard(from, own) {
             return;
         }
         let pairs = hello.neighbour == own;
-        // The candidate leads to all relays of the last view beyond the node taken, except that node: they have closed up without it.
+        // The candidate reaches all relays beyond the current neighbour except that one: they have a link past it.
         let all_but_one = hello.behind > 1 && hello.behind.checked_add(1) == Some(there);
         let candidate = Candidate {
             node: from,
@@ -272,14 +271,14 @@ impl Node {
         }
     }
 
-    /// The neighbour at `side` has said, one way or the other, whether it takes this relay for its own.
+    /// Handles the neighbour's report whether it uses this relay as its neighbour (`mutual`).
     pub(super) fn told(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).told(mutual, now) || !mutual {
             return;
         }
         let newer = self.layers.view.newest() > self.member.view;
         if newer && !self.layers.neighbours.at(side).has_grace(now) {
-            // One of the two has missed something.
+            // One of the two relays has missed a view change.
             self.layers.view.asking.ask(now);
         }
         self.layers.resend();

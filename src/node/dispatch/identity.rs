@@ -1,4 +1,4 @@
-//! Another node under this relay's number: what follows for the other layers, and which claims are sent.
+//! Duplicates of this relay's node number: effects on the other layers, and claims to the number.
 
 use super::state::Node;
 use crate::event::{About, Event};
@@ -10,12 +10,11 @@ use crate::time::Instant;
 use crate::wire::message::{Claim, Message};
 
 impl Node {
-    /// Handles a frame under this relay's own number.
     pub(crate) fn hear_duplicate(&mut self, now: Instant, sender: Sender) {
         let settings = self.member.settings;
         let shown = match sender {
             Sender::Itself => false,
-            // It may be a frame of its own, which only a claim shows.
+            // Without signatures the frame may be this relay's own, which only a claim can tell.
             Sender::Unknown => settings.auth.is_some(),
             Sender::Rival(rival) => rival.is_current,
         };
@@ -30,12 +29,12 @@ impl Node {
             if let Sender::Rival(rival) = sender
                 && rival.newer_epoch
             {
-                // The other one may be this relay itself, as it was before its epoch went back.
+                // The other node may be this relay itself, before its epoch went back.
                 self.raise_about(About::Epoch, Side::Upstream, node);
             }
         }
         let placed = self.setpoint().is_some();
-        // A relay keeps its claim to its place while the next view is agreed on: a duplicate may have requested it.
+        // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
         let lease = &self.layers.lease;
         let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
         let has_lease = placed && leased;
@@ -47,7 +46,7 @@ impl Node {
         }
     }
 
-    /// Handles a claim from node `from` at `side`: one to repeat there, or an echo for this relay. Returns false where it has no meaning.
+    /// Repeats a claim to its sender, or compares an echo; returns false if signed frames replace claims.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -67,7 +66,6 @@ impl Node {
         true
     }
 
-    /// Returns the next claim, or the next echo of one.
     pub(super) fn next_claim(&mut self) -> Option<(Side, u16, Message)> {
         if let Some((side, to, claim)) = self.echo.take() {
             return Some((side, to, Message::Claim(claim)));
@@ -82,8 +80,9 @@ impl Node {
         Some((side, to, Message::Claim(claim)))
     }
 
-    /// Returns the node to which a claim is due, and marks it as sent: the neighbours in turn, or its own number on a channel
-    /// without any.
+    /// Returns the destination of a due claim, and marks it as sent.
+    ///
+    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;
@@ -95,20 +94,20 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the claim number for all sessions to begin anew with, if they have to.
+    /// Returns the claim number if all sessions must be started again with it.
     #[cfg(feature = "auth")]
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
 
-    /// Returns the claim number of this relay.
     #[cfg(feature = "auth")]
     pub(crate) const fn claim_number(&self) -> u32 {
         self.duplicate.number()
     }
 
-    /// Returns true if a handshake goes with `message`: on a shared channel with one message of each pulse, so that another relay with this
-    /// number that receives it learns of this one although the chain has nothing else to send.
+    /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
+    ///
+    /// Another relay with this number then detects this one even if the chain sends nothing else.
     #[cfg(feature = "auth")]
     pub(crate) fn shows_its_nonce(&self, message: &Message) -> bool {
         let once = match message {
@@ -119,24 +118,23 @@ impl Node {
         once && self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Classifies a claim number under this relay's own node number.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         self.duplicate.rival(claim)
     }
 
-    /// Returns true while it takes part in nothing, because another relay has its number.
+    /// Returns true while this relay is passive, because another one has its number.
     pub(crate) const fn is_passive(&self) -> bool {
         self.duplicate.is_passive()
     }
 
-    /// Handles the report that the other relay with this number is gone.
+    /// Handles the report that the other relay with this number has been removed.
     pub(crate) fn clear_duplicate(&mut self, now: Instant) {
         if self.duplicate.clear(now, &self.member.settings) {
             self.become_active(now);
         }
     }
 
-    /// Takes part again, as after a restart with the record of votes: view, lease and proposal may be those of the other node by now.
+    /// Becomes active as after a restart: view, lease and proposal may be those of the other node by now.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.leave();

@@ -1,6 +1,4 @@
-//! Messages received: which are for this relay, on which side their sender is, and which layer handles each.
-//!
-//! A decision changes the view, and perhaps the mission, of this relay. A tag shows that its sender is there.
+//! Received messages: which are accepted, on which side their sender is, and which layer handles each.
 
 use super::state::Node;
 use crate::event::{About, Event};
@@ -17,8 +15,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::Message;
 
 impl Node {
-    /// A message from node `from` at `side`, intact and addressed to this relay; whether it was one to say to this relay.
-    /// Bounded by 16 reaches.
+    /// Handles an intact message from node `from` at `side`; returns false if that node may not send it. Bounded by 16 reaches.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,
@@ -39,7 +36,7 @@ impl Node {
         }
         #[cfg(feature = "upload")]
         if let Message::Level { .. } = message {
-            // The ground alone says that.
+            // Only the ground station sends levels.
             return false;
         }
         let taken = self.layers.neighbours.at(side).node() == from;
@@ -58,7 +55,7 @@ impl Node {
             && !taken
             && takes_uploads(&self.member)
         {
-            // It takes this relay for its neighbour: a hello alone would only make it say the same again.
+            // The sender uses this relay as its neighbour: a hello alone would only trigger the same offer again.
             if self.is_of_mission(now, side, from, upload.base()) {
                 self.on_offer(now, side, from, upload, *answer);
             }
@@ -69,7 +66,7 @@ impl Node {
             return false;
         }
         if self.searches() {
-            // Nobody says anything else to a node that it has not taken.
+            // Such a message is sent only to a neighbour, so the sender uses this relay as one.
             self.told(now, side, true);
         }
         if !self.is_of_this_view(now, side, from, message) {
@@ -80,8 +77,9 @@ impl Node {
         true
     }
 
-    /// Whether `message` from the neighbour `from` is of the mission and, if it is of one, of the view that this relay is in.
-    /// What is not is counted and answered by a hello, and a pass of another view has the relay ask for one.
+    /// Returns true if `message` from a neighbour is of the current mission and, where it matters, view.
+    ///
+    /// Other messages are counted and answered by a hello. A pass of another view also triggers a request for a new view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.mission() else {
             return true;
@@ -101,10 +99,10 @@ impl Node {
             _ => digest == self.member.pass_digest(),
         };
         if !known {
-            // What it flies, and in which view, it says in a hello.
+            // The hello informs the sender of this relay's mission and view.
             bump(&mut self.telemetry.stats.view);
             self.owe_hello(side, from, true);
-            // It has said that it is of this mission: then the two are in different views.
+            // The sender has the same mission, so only the view differs.
             let of_mission = self.layers.neighbours.at(side).holds.is_some();
             if of_mission && message.is_of_a_view() && message.is_onward() {
                 self.layers.view.asking.ask(now);
@@ -113,7 +111,7 @@ impl Node {
         known
     }
 
-    /// Whether a place that `from` tells is along the line of this relay. It is not while one of the two flies an upload with other sites.
+    /// Returns true if positions of `from` are along the same line: both relays fly between the same sites.
     #[cfg(feature = "upload")]
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.line();
@@ -142,7 +140,7 @@ impl Node {
         }
     }
 
-    /// A message of this mission, and of this view if it is of one, from the neighbour `from` at `side`.
+    /// Passes a message of the current mission and view to its layer.
     fn dispatch(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
         match message {
             Message::Heartbeat { ask, answer, .. } => {
@@ -164,7 +162,7 @@ impl Node {
             _ => {}
         }
         if message.is_of_a_view() && !self.layers.neighbours.at(side).is_agreed() {
-            // It is in no view with this relay yet.
+            // The sender is not this relay's neighbour in the view.
             return bump(&mut self.telemetry.stats.stale);
         }
         let wanted = if message.is_onward() {
@@ -180,11 +178,11 @@ impl Node {
         let effects = match message {
             Message::Proposal(_) | Message::Decision(_) => layers.view.handle(&context, message),
             Message::Busy { sweep } if layers.view.on_busy(&context, *sweep) => Effects::NONE,
-            // No pass goes on while a view is proposed.
+            // No pass continues during a view change.
             _ if layers.view.awaited().is_some() => Effects::STALE,
             _ => {
                 if message.is_of_a_view() && message.is_onward() {
-                    // What was agreed on in the view has come: all have accepted it.
+                    // A pass or a renewal shows that all members have accepted the view.
                     layers.view.commit(self.member.view);
                     layers.lease.commit();
                 }
@@ -198,7 +196,7 @@ impl Node {
         self.apply(now, effects);
     }
 
-    /// The neighbour at `side` was there `at` that time or later: it has answered what this relay said then.
+    /// Records that the neighbour at `side` was alive at time `at` or later, by its reply to a message.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.confirmed(now, at) {
@@ -210,15 +208,14 @@ impl Node {
 
 #[cfg(feature = "auth")]
 impl Node {
-    /// Node `from` at `side` has made itself known, for the first time if `first`: then what waits for an answer from there is
-    /// said again.
+    /// Handles an authentic frame of node `from` at `side`; after the `first` one, messages are sent again.
     pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
         }
         if self.layers.neighbours.at(side).node() != from {
             if first {
-                // What was to be said to it before could not be read there.
+                // That node could not verify earlier messages of this relay.
                 self.owe_hello(side, from, true);
             }
             return;
@@ -228,7 +225,7 @@ impl Node {
         }
     }
 
-    /// Node `from` at `side` has said that it is there, and not shown that it has heard this relay.
+    /// Handles a handshake of node `from` at `side` that does not prove that this relay is received.
     pub(crate) fn called(&mut self, side: Side, from: u16) {
         self.is_signed_right(side, from);
         if self.searches() {
@@ -236,7 +233,7 @@ impl Node {
         }
     }
 
-    /// A handshake under the number of node `from` at `side` was signed with another key, or altered.
+    /// Handles a handshake under the number of node `from` at `side` with a wrong tag.
     pub(crate) fn is_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self.layers.neighbours.at_mut(side).is_forged(distance) {
@@ -244,7 +241,7 @@ impl Node {
         }
     }
 
-    /// Node `from` at `side` has the key.
+    /// Records that node `from` at `side` has the right key.
     pub(crate) fn is_signed_right(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         self.layers
@@ -253,14 +250,14 @@ impl Node {
             .is_signed_right(distance);
     }
 
-    /// Node `from` at `side` goes on with an older epoch than it had.
+    /// Reports that node `from` at `side` uses an older epoch than before.
     pub(crate) fn went_back(&mut self, side: Side, from: u16) {
         self.raise_about(About::Epoch, side, from);
     }
 }
 
 impl Node {
-    /// Where passes go to, and where they come from.
+    /// Side to which passes are forwarded.
     pub(super) const fn onward(&self) -> Side {
         Side::onward(self.member.mission.heading())
     }
@@ -269,8 +266,7 @@ impl Node {
         Side::back(self.member.mission.heading())
     }
 
-    /// On which side node `sender` is, if it may have something to say to this relay: a neighbour, or one that might become
-    /// one, or the ground where it may upload missions.
+    /// Returns the side of node `sender` if it is a neighbour, a candidate, or an accepted ground station.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
@@ -287,7 +283,7 @@ impl Node {
         })
     }
 
-    /// On which side `node` is, if it is the ground transmitter or receiver and near enough to be heard.
+    /// Returns the side of `node` if it is a ground station that may be received here.
     pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {
@@ -302,12 +298,12 @@ impl Node {
         }
     }
 
-    /// Whether others than the neighbours of the mission can be heard.
+    /// Returns true on a shared channel, on which other nodes than the neighbours can be received.
     pub(super) fn searches(&self) -> bool {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Node `from` was heard at the port of side `through`: at that of the other side than its own, it may be heard at both.
+    /// Handles a frame of node `from` at the port `through`; received at both ports, its index is a duplicate.
     pub(crate) fn hear_at_both(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;
@@ -324,7 +320,7 @@ impl Node {
 }
 
 impl Node {
-    /// What came of a proposal is known: how many relays there are, or that they are too few.
+    /// Handles the decision on a proposal: on acceptance, starts the new view with its mission.
     pub(super) fn decided(&mut self, now: Instant, decided: Decided) {
         let Some(proposed) = self.layers.view.proposed() else {
             return;
@@ -375,15 +371,15 @@ impl Node {
         self.telemetry.told_refused = false;
         self.raise(Event::Reformed);
         if id != self.layers.update.latest() {
-            // A newer one has come in the meantime.
+            // A newer mission has arrived in the meantime.
             self.layers.view.asking.ask(now);
         }
     }
 
-    /// Flies `mission` from now on, which is that of `id`.
+    /// Sets the mission of the new view, which has the identifier `id`.
     fn fly(&mut self, now: Instant, mission: Mission, id: MissionId) {
         if id == self.member.active {
-            // With other relays.
+            // The number of relays may have changed.
             self.member.mission = mission;
             return;
         }
@@ -391,8 +387,9 @@ impl Node {
         self.raise(Event::Adopted);
     }
 
-    /// `mission` is another one than before, and the one held; since `now` if the relay has flown another one. Between other sites no place
-    /// is what it was: there is none to be at until the chain has agreed on new ones, and the guard begins anew.
+    /// Replaces the active mission by the stored one, `mission`, at time `now`, or after a start if `None`.
+    ///
+    /// With other sites all positions are void: there is no setpoint until the next agreement, and the guard starts again.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();

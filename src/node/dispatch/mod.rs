@@ -1,15 +1,15 @@
-//! What a relay does with what happens to it: each message, each timer and each effect of a layer goes to the layer that it is for.
+//! Dispatch of messages, timers and effects to the layers.
 //!
-//! [`Node`] is one struct; each of the files below [`state`] has what it does on one occasion.
+//! [`Node`] is one struct; each file has its methods for one purpose.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `state` | all that a relay holds, the five layers, and how the effects of one layer come to the others; links that a part without a quorum gives up |
-//! | `incoming` | a message comes: is it for this relay, of its mission and view, and which layer takes it; what a decision and a tag mean |
-//! | `outgoing` | the next message, what is due at a time, and the setpoint |
-//! | `hellos` | hellos: the ones that are owed, and who is taken for the neighbour by one that comes |
-//! | `offers` | newer missions between neighbours, and with the ground |
-//! | `identity` | another node under this relay's number, and claims to it |
+//! | `state` | state of a relay, its layers, effects of one layer on the others, and search without a quorum |
+//! | `incoming` | received messages: checks, choice of the layer, decisions on views, and results of handshakes |
+//! | `outgoing` | next message, expired timers, and setpoint |
+//! | `hellos` | pending hellos, and selection of the neighbour by received ones |
+//! | `offers` | newer missions, exchanged with neighbours and with the ground |
+//! | `identity` | duplicates of this relay's node number, and claims to it |
 
 mod hellos;
 mod identity;

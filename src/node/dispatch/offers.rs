@@ -1,4 +1,4 @@
-//! Newer missions, in flight: what is offered, to whom, and what the ground is told; and what the ground measures.
+//! Newer missions in flight, exchanged with neighbours and the ground, and measurements from the ground.
 
 use super::state::Node;
 use crate::event::Event;
@@ -12,7 +12,7 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// A message from the ground at `side`; whether it is one for the ground to say.
+    /// Handles a message from the ground station at `side`; returns false if it may not send it.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -53,7 +53,7 @@ impl Node {
         true
     }
 
-    /// Returns what the ground at `side` is owed, a hello or the upload that it asked for, and its node number.
+    /// Returns the pending hello or requested upload for the ground station at `side`, and its node number.
     pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = match side {
             Side::Upstream => 0,
@@ -73,7 +73,7 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Whether an offer of that number answers a hello of late; one that does not is counted.
+    /// Returns true if `answer` is the number of a recent hello; otherwise it counts the offer as stale.
     fn is_asked(&mut self, now: Instant, answer: u16) -> bool {
         let asked = self.layers.update.asked(answer, now, &self.member.settings);
         if !asked {
@@ -82,8 +82,10 @@ impl Node {
         asked
     }
 
-    /// An offer from node `from` at `side`, for relays that were loaded with the same mission. One that answers a hello of late is
-    /// answered only by who holds as new a mission then: any other answer would be answered by the same offer.
+    /// Handles an offer from node `from` at `side`, for relays loaded with the same mission.
+    ///
+    /// An offer that answers a recent hello is answered only if this relay then has a mission as new, or refuses the offered one.
+    /// Any other answer would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -110,8 +112,7 @@ impl Node {
         }
     }
 
-    /// Holds `upload` from now on, if it is newer than what is held. One that has no line on earth, or leaves the geofence, is counted, and
-    /// told once.
+    /// Stores `upload` if it is newer. One without a valid line on earth, or beyond the geofence, is counted and reported once.
     fn hold(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.hold(&self.member, upload) {
             Offered::Held => self.held(now),
@@ -125,10 +126,10 @@ impl Node {
         }
     }
 
-    /// A newer mission is held.
+    /// Reports a newer mission, offers it to the neighbours, and requests a view.
     fn held(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
-        // The leader has to hold it first; the others hold it best before the proposal comes to them.
+        // The leader needs the mission to propose it, and the other relays before the proposal reaches them.
         for side in [Side::Upstream, Side::Downstream] {
             self.layers.neighbours.at_mut(side).offer = true;
             self.layers.update.begin_offers(side);
@@ -136,7 +137,6 @@ impl Node {
         self.layers.view.asking.ask(now);
     }
 
-    /// The same by the relay's own firmware.
     pub(crate) fn handle_upload(
         &mut self,
         now: Instant,
@@ -147,7 +147,7 @@ impl Node {
         Ok(())
     }
 
-    /// A relay that has just been switched on flies `upload`, which it held before.
+    /// Restores the active `upload` after a start.
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         let untouched = self.layers.view.is_untouched() && self.layers.round.is_untouched();
         let mission = self.layers.update.resume(&self.member, upload, untouched)?;
@@ -155,12 +155,11 @@ impl Node {
         Ok(())
     }
 
-    /// The newest mission held, if it was uploaded.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         self.layers.update.upload()
     }
 
-    /// The neighbour at `side` says that the mission of that number is refused, by itself or beyond it.
+    /// Handles the statement of the neighbour at `side` that it, or a relay beyond it, refuses a mission.
     pub(super) fn hear_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !takes_uploads(&self.member) {
@@ -176,7 +175,7 @@ impl Node {
         }
     }
 
-    /// The neighbour `from` at `side` says that it holds the mission of that number.
+    /// Schedules a hello or an offer to the neighbour `from` at `side`, by the mission that it `holds`.
     pub(super) fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
         if !takes_uploads(&self.member) {
             return;
@@ -197,12 +196,12 @@ impl Node {
                 .awaited()
                 .is_some_and(|proposed| proposed.mission_id == latest)
         {
-            // The proposal had to wait for that.
+            // The proposal was waiting for that.
             self.layers.view.resend();
         }
     }
 
-    /// The offer that is owed to the neighbour at `side`, or the hello that asks for one that it can answer: to which node.
+    /// Returns the pending offer to the neighbour at `side`; without a recent hello to answer, a hello that requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at_mut(side);
         let due = core::mem::take(&mut neighbour.offer);
@@ -222,7 +221,7 @@ impl Node {
         Some((side, to, message))
     }
 
-    /// Whoever has not said since that it holds the mission is offered it again.
+    /// Schedules an offer again to a neighbour that has not reported the mission in time.
     pub(super) fn offer_again(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             if self.layers.update.offers_again(side, now) {

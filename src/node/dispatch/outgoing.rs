@@ -3,6 +3,7 @@
 use super::state::Node;
 use crate::event::{About, Event};
 use crate::guard::HoldReason;
+use crate::node::context::Member;
 use crate::node::neighbour::liveness::patient_tick;
 use crate::node::timing::first_pass;
 use crate::place::Placement;
@@ -12,7 +13,7 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 impl Node {
-    /// The next message to send, to which node at which side. Call until there is none.
+    /// Returns the next message with its side and its destination node; call it until it returns `None`.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         if self.member.settings.auth.is_none()
             && let Some(claim) = self.next_claim()
@@ -51,19 +52,19 @@ impl Node {
         Some((side, to, Message::Fence { mission, fence }))
     }
 
-    /// The next message of a view change or of a round.
+    /// Returns the next message of a view change, a lease renewal or a round.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {
             let neighbour = self.layers.neighbours.at(side);
-            // To one that is lost nothing is repeated until something comes from it.
+            // A lost neighbour gets no retransmissions until it is received again.
             (neighbour.is_mutual() && !neighbour.is_silent())
                 .then_some((neighbour.node(), neighbour.is_agreed()))
         };
         let (next, before) = (peer(onward), peer(back));
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
-        // Without anybody to hand it to it waits.
+        // A proposal waits while there is no next relay.
         if let Some((to, _)) = next
             && let Some(message) = layers.view.take_onward(&context, to)
         {
@@ -110,7 +111,7 @@ impl Node {
 }
 
 impl Node {
-    /// Where to be in the end: at the place agreed on, or beside it while others may fly there.
+    /// Returns the agreed position, or without a quorum the one by `Settings::without_quorum`.
     fn wanted(&self) -> Option<Placement> {
         let agreed = self.layers.round.setpoint()?;
         Some(if self.layers.view.has_no_quorum() {
@@ -120,37 +121,40 @@ impl Node {
         })
     }
 
-    /// Moves the setpoint as far as it may go by what is known now.
     pub(super) fn steer(&mut self, now: Instant) {
         if self.steering.steer(now, self.wanted()) {
             self.raise(Event::SetpointChanged);
         }
     }
 
-    /// The drone was at `place` at time `at`.
     pub(crate) fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
         self.steering.position(at, place);
         self.steer(now);
     }
 
-    /// Whether the drone flies to the setpoints from now on.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) {
         self.steering.control(now, flown);
         self.steer(now);
     }
 
-    /// Who fell silent at `side` is not in the air any more.
+    /// Handles the report that the lost relays at `side` are not in the air any more. The others of the view at that side are not
+    /// meant.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
-        self.steering.clear_lost(side);
+        let Member { index, mission, .. } = &self.member;
+        let in_view = match side {
+            Side::Upstream => index.saturating_sub(1),
+            Side::Downstream => mission.relays().saturating_sub(*index),
+        };
+        let lost = u16::from(self.layers.neighbours.at(side).node() != 0);
+        self.steering.clear_lost(side, in_view > lost);
         self.steer(now);
     }
 
-    /// Where to be in the end.
     pub(crate) const fn final_setpoint(&self) -> Option<Placement> {
         self.layers.round.setpoint()
     }
 
-    /// Where to fly now.
+    /// Returns the current setpoint; `None` while the relay is passive.
     pub(crate) fn setpoint(&self) -> Option<Placement> {
         if self.is_passive() {
             return None;
@@ -158,14 +162,13 @@ impl Node {
         self.steering.setpoint(self.wanted())
     }
 
-    /// What keeps the relay from its place at `side`.
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.steering.hold_reason(side)
     }
 }
 
 impl Node {
-    /// Handles what has run out by `now`, each layer once; the work is that of one portion of a computation.
+    /// Handles expired timers, each layer once. Bounded by one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.duplicate.handle_timeout(now, &self.member.settings) {
             self.become_active(now);
@@ -251,7 +254,7 @@ impl Node {
         self.review(now);
     }
 
-    /// Asks for a new view if the chain is another than the one agreed on.
+    /// Requests a new view if the neighbours differ from those of the last decision.
     pub(super) fn review(&mut self, now: Instant) {
         if self.layers.neighbours.have_changed(now) {
             self.layers.view.asking.ask(now);
@@ -259,21 +262,21 @@ impl Node {
         if self.layers.neighbours.at(self.onward()).has_no_peer()
             && self.layers.view.awaited().is_some()
         {
-            // Whoever was to be counted next is not there any more.
+            // The next relay of the outstanding proposal is lost, so this relay is the last one and decides.
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.view.decide(&context);
             self.apply(now, effects);
         }
     }
 
-    /// Whether it is at the chain's solution, as every relay of its view is.
+    /// Returns true while this relay computes the joint solution, as all relays of its view do.
     fn is_solving(&self, now: Instant) -> bool {
         self.layers
             .round
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// It has just found out where it is to be: what it waits for it waits for from now on.
+    /// Restarts the timers for neighbours and for the first pass, which waited for the joint solution.
     fn solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);
@@ -284,12 +287,12 @@ impl Node {
         }
     }
 
-    /// Whether no pass has come yet, and it has not asked for a view.
+    /// Returns true if neither a pass has been received nor a view requested since the start.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.asking.asks()
     }
 
-    /// By when the first pass should have come, were this the beginning.
+    /// Starts the timer for the first pass; when it expires, the relay requests a view.
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
         let there_and_back = settings.hop_time.times(2 * u32::from(all));

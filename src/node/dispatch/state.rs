@@ -1,8 +1,8 @@
 //! State of a relay: its five layers, events and counters, and how the effects of one layer reach the others.
 //!
-//! A relay whose part of the chain has no quorum gives its links up after a while and searches anew.
-//! Two parts that are interleaved, as 1 - 3 - 5 and 2 - 4 are, or a part of which no relay takes the one that could lead it back, would
-//! keep their links for good. One that has no quorum has nothing to lose by them.
+//! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved parts,
+//! such as 1 - 3 - 5 and 2 - 4, or a part that has not selected the node toward the rest of the chain, would keep their links
+//! forever. A part without a quorum loses nothing by it.
 
 use crate::event::{About, Event, Pending};
 use crate::mission::Mission;
@@ -24,10 +24,9 @@ use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 use crate::wire::message::Claim;
 
-/// Claim to repeat: at which side, to which node.
+/// Claim to repeat: side, destination node and claim.
 pub(crate) type Echo = (Side, u16, Claim);
 
-/// A relay's share of the protocol.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub(super) member: Member,
@@ -35,22 +34,21 @@ pub(crate) struct Node {
     pub(super) steering: Steering,
     pub(super) duplicate: DuplicateIndex,
     pub(super) adrift: Adrift,
-    /// Claim of a neighbour that is to be repeated to it.
+    /// Received claim that is to be repeated to its sender.
     pub(super) echo: Option<Echo>,
-    /// Side of the next claim.
+    /// Side to which the next claim is sent.
     pub(super) claim_side: Side,
     pub(super) telemetry: Telemetry,
 }
 
-/// The relay's own seed.
 fn seed_of(identity: Identity, seed: u32) -> u32 {
     seed.wrapping_add(u32::from(identity.index))
 }
 
 impl Node {
-    /// A relay before it has [begun](Self::begin). `identity` and `settings` have been checked.
+    /// Creates a relay before [`begin`](Self::begin), with valid `identity` and `settings`.
     ///
-    /// Plain numbers alone, which are written where the relay is to stand.
+    /// The value consists of plain numbers only, so that it is written in place.
     pub(crate) fn new(
         mission: &Mission,
         identity: Identity,
@@ -82,7 +80,7 @@ impl Node {
         }
     }
 
-    /// It is switched on at `now`, with the seed that it was made with.
+    /// Starts the relay at `now`, with the same `seed` as in [`new`](Self::new).
     #[inline(never)] // as `Steering::begin`
     pub(crate) fn begin(&mut self, identity: Identity, seed: u32, now: Instant) {
         let Member {
@@ -112,7 +110,7 @@ impl Node {
         self.telemetry.events.raise_about(about, side, node);
     }
 
-    /// Has the other layers know what one of them came to.
+    /// Applies the effects of one layer to the others, and to events and counters.
     pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
         for (happened, counter) in [
@@ -172,7 +170,7 @@ impl Node {
         }
     }
 
-    /// Flies by what is believed from now on.
+    /// Bases the active mission on the new interference estimate.
     fn believe(&mut self) {
         let told = self.layers.round.sensing().told();
         let believing = self
@@ -189,7 +187,7 @@ impl Node {
         self.telemetry.events.take()
     }
 
-    /// Until when it may hold what was agreed on.
+    /// Returns the expiry of the lease; `None` without one.
     pub(crate) const fn lease(&self) -> Option<Instant> {
         self.layers.lease.until()
     }
@@ -208,7 +206,6 @@ impl Node {
         &self.member
     }
 
-    /// The neighbours toward Tx and toward Rx.
     pub(crate) fn neighbours(&self) -> [Option<u16>; 2] {
         self.layers.neighbours.nodes()
     }
@@ -225,12 +222,12 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// What it has said in the votes on views.
+    /// Returns the acceptor state, for storage.
     pub(crate) const fn view_record(&self) -> ViewRecord {
         self.layers.view.record(self.member.digest)
     }
 
-    /// A relay that has just been switched on has said what is in `record`.
+    /// Restores the stored acceptor state after a start.
     pub(crate) fn resume_view(
         &mut self,
         now: Instant,
@@ -244,14 +241,14 @@ impl Node {
         Ok(())
     }
 
-    /// One measurement, by a relay that measures.
+    /// Handles a measurement; counts it if it is rejected.
     pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
         if !self.layers.round.handle_sample(now, &self.member, sample) {
             bump(&mut self.telemetry.stats.samples_refused);
         }
     }
 
-    /// The leader begins again, at `now`; nobody else has anything to begin.
+    /// Starts the search of targets again; no effect except at the leader with a view.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
@@ -263,7 +260,6 @@ impl Node {
     }
 }
 
-/// The layers of one relay.
 #[derive(Clone, Debug)]
 pub(super) struct Layers {
     pub(super) neighbours: Neighbours,
@@ -274,7 +270,7 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// What a layer is handed. It borrows the member alone, which stands beside the layers: any of them can be lent while it lasts.
+    /// Returns the state that a layer receives. It borrows only `member`, so that each layer can be borrowed mutably meanwhile.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {
@@ -286,31 +282,31 @@ impl Layers {
         }
     }
 
-    /// What could not be said to the neighbour after can be now.
+    /// Schedules outstanding messages again: the next relay can be reached again.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();
     }
 }
 
-/// What the firmware is told.
+/// Events and counters for the firmware.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// Whether a lapse of the lease, and a refusal, have been told since a view was agreed on.
+    /// True once a lease expiry, or a missing quorum, has been reported since the last view.
     pub(super) told_lapsed: bool,
     pub(super) told_refused: bool,
 }
 
-/// So many times `dead_after` a part without a quorum keeps its links, at first and at most.
+/// Multiples of `dead_after` for which a part without a quorum keeps its links: first, and later.
 const FIRST: u32 = 3;
 const MOST: u32 = 4;
 
-/// Since when there is no quorum, and how often the links were given up since.
+/// Timer for dropping the links of a part without a quorum.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Adrift {
-    /// When the links are given up; `None` where there is a quorum.
+    /// Expiry; `None` with a quorum.
     at: Option<Instant>,
     again: bool,
 }
@@ -327,7 +323,7 @@ impl Adrift {
 }
 
 impl Node {
-    /// The part that this relay is in has been refused a view, or has one.
+    /// Starts the timer if this part of the chain has no quorum, and stops it otherwise.
     pub(super) fn drift(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.adrift = Adrift::NONE;
@@ -336,7 +332,7 @@ impl Node {
         }
     }
 
-    /// How long links are kept without a quorum.
+    /// Returns the time for which links are kept without a quorum.
     fn keeps_links_for(&self) -> Duration {
         let settings = &self.member.settings;
         let times = if self.adrift.again { MOST } else { FIRST };
@@ -344,7 +340,7 @@ impl Node {
         settings.dead_after.times(times).max(pass)
     }
 
-    /// Gives the links up if it is time to.
+    /// Drops the links to both neighbours if the timer has expired.
     pub(super) fn search_anew(&mut self, now: Instant) {
         if self.adrift.at.is_none_or(|at| now < at) {
             return;

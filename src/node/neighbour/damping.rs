@@ -1,39 +1,39 @@
-//! Damping of flapping links: how long a node has to be heard before it is taken, and before the hellos say that it is heard.
+//! Damping of flapping links: how long a node must be heard before it is selected or reported as heard.
 //!
-//! Each side counts the losses of the links to its four nearest nodes. A link with more than two losses is held down: its node is neither
-//! taken nor reported as heard until it has been heard without a gap for `dead_after`, and for twice as long after every further loss, up to
-//! six times `dead_after`. Hellos leave out links that are held down, so that no other relay makes room for a node that could not be linked.
+//! Each side counts the losses of the links to its four nearest nodes. A link with more than two losses is held down: its node is
+//! neither selected nor reported as heard until it has been heard without a gap for `dead_after`, and for twice as long after
+//! every further loss, up to six times `dead_after`. Hellos omit links that are held down, so that no other relay makes room for
+//! a node that could not be linked.
 //!
 //! | state of the side | event | losses |
 //! | --- | --- | --- |
-//! | linked | neighbour lost, few frames lost on the channel | of its link: one more |
+//! | linked | neighbour lost, few frames lost on the channel | one more for its link |
 //! | linked | neighbour lost, many frames lost on the channel | unchanged, unless the link is held down or its node is then silent for longer than `dead_after` |
-//! | without a neighbour | candidate heard again after a silence of more than `dead_after` | of its link: one more |
-//! | without a neighbour | first answer of any candidate, `probe_after` after the search began or later | of all links: at least those of the link that was lost last |
+//! | without a neighbour | candidate heard again after a silence of more than `dead_after` | one more for its link |
+//! | without a neighbour | first answer of any candidate, `probe_after` after the search began or later | all links: at least those of the link that was lost last |
 //!
-//! The last row is a partition: no candidate answered, so that all links of the side were down together. If each link were counted alone,
-//! the chain would close over the second nearest node once the nearest one is held down, and every link would be forgiven two losses.
-//!
-//! A side forgets the losses of a link 32 times `dead_after` after the last one.
+//! The last row is a partition: all links of the side were down together. If each link were counted alone, the chain would close
+//! over the second nearest node once the nearest one is held down, and every link would be forgiven two losses. A side forgets
+//! the losses of a link 32 times `dead_after` after the last one.
 
 use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Doublings of the hold-down, and the longest one in `dead_after`.
+/// Maximum doublings of the hold-down, and its maximum in units of `dead_after`.
 const DOUBLINGS: u8 = 3;
 const LONGEST: u32 = 6;
 
-/// Losses after which a link is not one that comes and goes yet.
+/// Losses after which a link does not count as flapping yet.
 const FORGIVEN: u8 = 2;
 
-/// Least time from one loss of a link to the next, in `dead_after`, if the link comes and goes slowly.
+/// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
 const SLOW: u32 = 10;
 
-/// After so many times `dead_after` without another, a loss is forgotten.
+/// Time after the last loss at which losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
-/// A node that was heard again and again.
+/// Node that has been heard repeatedly.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     distance: u16,
@@ -42,7 +42,7 @@ struct Heard {
 }
 
 impl Heard {
-    /// Since when the node `distance` places away has been heard all through, as it is now.
+    /// Updates the record with a frame at `now`; a silence of more than `dead_after` or another node restarts it.
     fn again(known: Option<Self>, distance: u16, now: Instant, settings: &Settings) -> Self {
         let since = match known {
             Some(known)
@@ -127,7 +127,7 @@ impl Link {
 /// Losses of the links on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// A node that may be taken once it has been heard for long enough.
+    /// Node that may be selected once it has been heard for long enough.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -140,7 +140,7 @@ impl Damping {
         }
     }
 
-    /// Begins at `now`, in place: a copy on the stack would be the largest one of a start.
+    /// Starts at `now`, in place: a copy on the stack would be the largest one at start-up.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -155,10 +155,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// The node `distance` places away is lost: one more of a link that comes and goes, or the first one for long. Where many frames are
-    /// lost it is the channel that comes and goes, and the loss does not count, unless the link has come and gone before.
-    ///
-    /// Where another link on this side is one that comes and goes, so is this one: both lead across the same gap.
+    /// Records the loss of the node `distance` places away. `counts` is false if many frames are lost on the channel: the loss is
+    /// then added only if the link has flapped before. If another link on this side flaps, this link inherits its losses, because
+    /// both cross the same gap.
     pub(super) fn lose(&mut self, distance: u16, counts: bool, now: Instant, settings: &Settings) {
         let most = self.links.iter().map(|link| link.recent(now, settings));
         let most = most.max().filter(|most| *most > FORGIVEN).unwrap_or(0);
@@ -168,10 +167,8 @@ impl Damping {
         }
     }
 
-    /// Records a frame from the node `distance` places away.
-    ///
-    /// `asks` is the start of the search while the side has no neighbour. All candidates are asked during a search, so a candidate that has
-    /// answered and is then silent for longer than `dead_after` counts as lost.
+    /// Records a frame from the node `distance` places away. `asks` is the start of the search while the side has no neighbour: a
+    /// candidate that has answered the search and is then silent for longer than `dead_after` counts as lost.
     pub(super) fn hear(
         &mut self,
         distance: u16,
@@ -219,14 +216,14 @@ impl Damping {
         }
     }
 
-    /// Whether the link to the node `distance` places away is held down.
+    /// Returns true if the link to the node `distance` places away is held down.
     pub(super) fn holds(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let link = self.link(distance);
         link.is_some_and(|link| link.holds(now, settings))
     }
 
-    /// Returns true if a link on this side comes and goes slowly: it has been lost more often than is forgiven, and stays for long each time,
-    /// so that it is worth to notice early when it is lost again.
+    /// Returns true if a link on this side flaps slowly: then it is worth noticing its next loss early. Such a link has been lost
+    /// more often than is forgiven, and stays up for long each time.
     pub(super) fn is_slow(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW);
         let is_slow = |link: &Link| link.recent(now, settings) > FORGIVEN && link.apart >= slow;
@@ -238,19 +235,19 @@ impl Damping {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// The nodes whose links are held down: bit 0 is the nearest one.
+    /// Returns the nodes whose links are held down, as a bit mask: bit 0 is the nearest one.
     pub(super) fn held(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.holds(*distance, now, settings))
             .fold(0, |held, distance| held | mask(distance))
     }
 
-    /// No candidate is heard any more.
+    /// Removes the candidate.
     pub(super) const fn clear(&mut self) {
         self.candidate = None;
     }
 
-    /// Whether a candidate that is heard now has been for `probe_after`, or for `more`.
+    /// Returns true if the candidate, heard now, has been heard for `probe_after`, and for `more` if that is longer.
     pub(super) fn passes(
         &mut self,
         distance: u16,
@@ -258,7 +255,7 @@ impl Damping {
         now: Instant,
         settings: &Settings,
     ) -> bool {
-        // Of two that are heard in turn the nearer one counts: else neither would be heard all through.
+        // If two nodes are heard alternately the nearer one counts; otherwise neither would be heard without a gap.
         if let Some(known) = self.candidate
             && known.distance < distance
             && now.since(known.last) <= settings.dead_after
@@ -281,13 +278,13 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// The side at second 1 000.
+    /// Returns a new side at second 1 000.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())
     }
 
-    /// The link to the nearest node is lost; the side searches, and the nodes at `heard` answer during the whole outage of 40 s.
+    /// Simulates an outage of 40 s of the link to the nearest node; the nodes at `heard` answer the search.
     fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
         let search = *now;
         side.lose(1, true, search, settings);
@@ -341,7 +338,7 @@ mod tests {
         for second in 0..180 {
             now = now + seconds(1);
             side.hear(2, Some(search), now, &settings);
-            // Answers for 20 s, and is silent for 40 s.
+            // The nearest node answers for 20 s and is silent for 40 s.
             if second % 60 < 20 {
                 side.hear(1, Some(search), now, &settings);
             }

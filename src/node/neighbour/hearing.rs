@@ -1,22 +1,22 @@
-//! Nodes on one side that were heard lately, what held for each of them in a row, and the hellos that are owed to them.
+//! Nodes on one side: recently heard, consecutive events, and pending hellos.
 
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Nodes on one side that are sent a hello.
+/// Number of nodes on one side that are sent a hello.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// The time after which the same is told again.
+/// Interval after which the same report is repeated.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// How often something was so for each of the nearest nodes, in a row; the nearest first.
+/// Consecutive occurrences of an event for each of the nearest nodes, nearest first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InRow([u8; CANDIDATES as usize]);
 
 impl InRow {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// It was so once more, of the node `distance` nodes away, or it was not; whether it has been so `most` times just now.
+    /// Counts the event `so` for the node `distance` places away; returns true if it is exactly the `most`-th in a row.
     pub(super) fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
@@ -32,7 +32,7 @@ impl InRow {
     }
 }
 
-/// Which nodes on one side can be heard.
+/// Nodes on one side that can be heard.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hearing {
     since: Instant,
@@ -40,7 +40,7 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Which nodes on one side were told of lately: of each once a minute.
+/// Nodes on one side that were reported recently: each once a minute.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ToldOf {
     since: Instant,
@@ -53,7 +53,7 @@ impl ToldOf {
         nodes: 0,
     };
 
-    /// The node `distance` nodes away is to be told of; whether it was not yet.
+    /// Returns true if the node `distance` places away has not been reported in this minute, and marks it as reported.
     pub(super) fn tell(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {
@@ -67,7 +67,7 @@ impl ToldOf {
     }
 }
 
-/// The bit of the node `distance` places away.
+/// Returns the bit of the node `distance` places away.
 pub(super) const fn mask(distance: u16) -> u8 {
     if distance >= 1 && distance <= CANDIDATES {
         1 << (distance - 1)
@@ -90,13 +90,13 @@ impl Hearing {
         self.now |= mask(distance);
     }
 
-    /// Those of the last two spans.
+    /// Returns the nodes heard in the last two periods, as a bit mask.
     pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
         self.age(now, settings);
         self.now | self.before
     }
 
-    /// Forgets who was not heard for two spans of `probe_after`.
+    /// Forgets nodes that were not heard for two periods of `probe_after`.
     fn age(&mut self, now: Instant, settings: &Settings) {
         let span = now.since(self.since);
         if span < settings.probe_after {
@@ -109,7 +109,7 @@ impl Hearing {
     }
 }
 
-/// Candidates that are owed a hello, and those of them that are asked for one: bit 0 is the nearest node.
+/// Candidates with a pending hello, and those whose hello requests an answer: bit 0 is the nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     owed: u8,
@@ -119,7 +119,7 @@ pub(super) struct Hellos {
 impl Hellos {
     pub(super) const NONE: Self = Self { owed: 0, asks: 0 };
 
-    /// To the candidate `distance` nodes away, which may be one that asks.
+    /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
     pub(super) const fn owe(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.owed |= bit;
@@ -128,13 +128,13 @@ impl Hellos {
         }
     }
 
-    /// To all of them, all asked.
+    /// Schedules hellos that request an answer to all candidates.
     pub(super) const fn owe_all(&mut self) {
         self.owed = 0x0F;
         self.asks = 0x0F;
     }
 
-    /// The nearest candidate that is owed one: how many nodes away, and whether it is asked.
+    /// Returns the distance of the nearest candidate with a pending hello, and true if that requests an answer.
     pub(super) fn take(&mut self) -> Option<(u16, bool)> {
         let distance = (1..=CANDIDATES).find(|distance| self.owed & mask(*distance) != 0)?;
         let bit = mask(distance);

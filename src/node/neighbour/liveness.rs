@@ -1,42 +1,41 @@
-//! When a neighbour counts as lost.
+//! Liveness: detection of a lost neighbour.
 //!
-//! A sign of life answers something that this relay said: a heartbeat with the number of its question, what comes back of a pulse or of a
-//! pass, or the next one. It counts from when that was said, so what was recorded and is played later is none. After `Settings::probe_after` without one, or the time that a
-//! message takes through the whole chain and back where that is longer, the neighbour is asked again and again. It is lost once all of this holds:
+//! A sign of life is an answer to something that this relay sent: a heartbeat with the number of its question, the reply to a
+//! renewal or a pass, or the next of these. It counts from the time at which this relay sent, so a replayed recording proves
+//! nothing. After `Settings::probe_after` without a sign of life, or the round trip through the whole chain if that is longer,
+//! this relay sends questions until one is answered. The neighbour is lost once both conditions hold:
 //!
-//! | | lost not before | because |
-//! | --- | --- | --- |
-//! | 1 | `Settings::dead_after`, or the span of the lease where that is longer, since it was known to be there | - |
-//! | 2 | sixteen questions without an answer, or three times as many as there were before an answer lately | a run of lost frames is no death |
+//! | condition | reason |
+//! | --- | --- |
+//! | silence of `Settings::dead_after`, or of the lease's span if that is longer | - |
+//! | sixteen unanswered questions, and three times as many as before a recent answer | a run of lost frames is not a lost neighbour |
 //!
-//! and at the latest after eight times `dead_after`. From there on it is asked every `probe_after`.
-//!
-//! Relays of one view that choose their places jointly solve the same chain at the same time, and have nothing to say until they
-//! are done. So while a relay solves, the silence of a neighbour that it is in one view with is excused: both times count from the end
-//! of its own solving.
+//! It is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`. Relays of one view that
+//! choose their positions jointly compute at the same time and send nothing meanwhile. The silence of a neighbour in the same
+//! view therefore counts from the end of this relay's own computation.
 
 use crate::node::timing::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Questions that a neighbour has to leave open at least until it is lost.
+/// Minimum number of unanswered questions before a neighbour is lost.
 const QUESTIONS: u16 = 16;
 
-/// How many times as many as lately.
+/// Factor on the recent maximum of unanswered questions.
 const MARGIN: u16 = 3;
 
-/// How long after one question the next one is asked, while an answer is urgent: sixteen times or more within `dead_after`, as often as all
-/// of a chain of `all` relays can do on one channel.
+/// Returns the interval between urgent questions: sixteen or more fit before `dead_after`. It is as short as one channel allows
+/// for all of a chain of `all` relays.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, u64::from(QUESTIONS))
 }
 
-/// The same where many ask for long, as they share a channel and nothing has been agreed on yet: three times or more.
+/// Returns the interval between questions while many relays of a shared channel have no agreement yet: three or more fit.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, 3)
 }
 
-/// As long as a pass through the chain and back, but `least` times or more from `probe_after` to `dead_after`.
+/// Returns the round trip through the chain, shortened so that `least` intervals fit between `probe_after` and `dead_after`.
 fn paced(settings: &Settings, all: u16, least: u64) -> Duration {
     let span = settings
         .dead_after
@@ -51,43 +50,42 @@ fn paced(settings: &Settings, all: u16, least: u64) -> Duration {
     )
 }
 
-/// How long a sign of life is waited for until one is asked for: `Settings::probe_after`, or until what is sent onward can have gone through a
-/// chain of `all` relays and come back.
+/// Returns the silence after which a sign of life is requested. It is `Settings::probe_after`, or the round trip through a chain
+/// of `all` relays if that is longer.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Questions that may still be answered.
+/// Number of past questions whose answers are accepted.
 const OPEN: usize = 4;
 
-/// What is known of a neighbour's being alive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// When it is known to have been there, or when this relay was switched on.
+    /// Time of the last sign of life, or of this relay's start.
     heard: Instant,
     lost: bool,
-    /// Whether it has been heard at all.
+    /// True once a frame has been received since the start or the last loss.
     met: bool,
-    /// The last question, 0 before any, and when it and those before it were asked.
+    /// Number of the last question, 0 before any; then the times of the last questions, latest first.
     question: u16,
     asked: [Instant; OPEN],
-    /// Questions since it was known to be there, and the most of them before an answer lately.
+    /// Questions since the last sign of life, and the recent maximum before an answer.
     unanswered: u16,
     longest: u16,
 }
 
-/// What follows from a silence.
+/// Result of a silence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
-    /// Whether the neighbour counts as lost since this moment.
+    /// True if the neighbour is lost from this moment on.
     pub(crate) lost: bool,
-    /// When to look again, later than now.
+    /// Time of the next check, later than now.
     pub(crate) look_again: Instant,
 }
 
 impl Liveness {
-    /// Before anything was taken: zeros.
+    /// Value before the start: zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)
@@ -105,9 +103,9 @@ impl Liveness {
         }
     }
 
-    /// Begins anew with another node. The longest run of open questions is kept, with the one that has just ended: if that node was not lost
-    /// after all, so many questions were too few. If the link `was_down`, the run that has ended measures an outage of the link and not the
-    /// channel, and is dropped. If the link `flaps` slowly, the earlier runs are dropped, too.
+    /// Restarts with another node, and keeps the longest run of unanswered questions. That includes the run that has just ended:
+    /// if the previous node was not lost after all, the run was too short. If the link `was_down`, that run measures an outage
+    /// and not the channel, and is dropped. If the link `flaps` slowly, the earlier runs are dropped, too.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             QUESTIONS
@@ -123,37 +121,36 @@ impl Liveness {
         };
     }
 
-    /// When it is known to have been there, or when this relay was switched on.
     pub(crate) const fn heard(&self) -> Instant {
         self.heard
     }
 
-    /// Whether it has been heard and is not lost.
+    /// Returns true if the neighbour has been heard and is not lost.
     pub(crate) const fn is_there(&self) -> bool {
         self.met && !self.lost
     }
 
-    /// Whether it is lost, and nothing has come since.
+    /// Returns true if the neighbour is lost, and nothing has been received from it since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.lost && !self.met
     }
 
-    /// How long a run of lost frames may be, by what the channel has shown.
+    /// Returns the longest plausible run of lost frames on this channel.
     pub(crate) fn run(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
 
-    /// Whether few frames were lost on the channel lately.
+    /// Returns true if few frames were lost on the channel recently.
     pub(crate) const fn is_clear(&self) -> bool {
         self.longest <= QUESTIONS
     }
 
-    /// A frame has come.
+    /// Records a received frame.
     pub(crate) const fn met(&mut self) {
         self.met = true;
     }
 
-    /// It was there `at` that time or later; whether it had been lost until now.
+    /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
     pub(crate) fn confirmed(&mut self, at: Instant) -> bool {
         self.heard = self.heard.max(at);
         self.met = true;
@@ -163,7 +160,7 @@ impl Liveness {
         core::mem::take(&mut self.lost)
     }
 
-    /// The number of a new question.
+    /// Returns the number of a new question.
     pub(crate) const fn ask(&mut self, now: Instant) -> u16 {
         self.question = match self.question.wrapping_add(1) {
             0 => 1,
@@ -175,7 +172,7 @@ impl Liveness {
         self.question
     }
 
-    /// When a question of that number was asked, if it is one of the last few.
+    /// Returns the time at which question `number` was sent, if it is one of the last few.
     pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
         if number == 0 || self.question == 0 {
             return None;
@@ -184,7 +181,7 @@ impl Liveness {
         self.asked.get(usize::from(before)).copied()
     }
 
-    /// Its silence so far says nothing; whether it is not lost already.
+    /// Excuses the silence so far; returns true if the neighbour is not lost.
     pub(crate) const fn excuse(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.heard = now;
@@ -192,7 +189,7 @@ impl Liveness {
         !self.lost
     }
 
-    /// Nothing has come for a while. It does not count as lost before `dead`.
+    /// Checks a silence; the neighbour is not lost before `dead`.
     pub(crate) fn silent(
         &mut self,
         now: Instant,

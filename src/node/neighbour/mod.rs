@@ -1,11 +1,11 @@
-//! The neighbours of a relay: one on each side.
+//! Neighbours of a relay: one on each side.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`state`] | which node is taken for the neighbour on one side: its state table, what the nodes there say, and what they are owed |
-//! | [`hearing`] | which nodes were heard lately, and which hellos wait to be sent |
-//! | `damping` | links that come and go |
-//! | [`liveness`] | when a neighbour counts as lost |
+//! | [`state`] | selection of the neighbour on one side: state table, contents of received hellos, pending messages |
+//! | [`hearing`] | recently heard nodes, pending hellos |
+//! | `damping` | flapping links |
+//! | [`liveness`] | detection of a lost neighbour |
 
 mod damping;
 pub(crate) mod hearing;
@@ -19,7 +19,6 @@ use crate::time::Instant;
 
 use state::Neighbour;
 
-/// Both sides.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbours {
     upstream: Neighbour,
@@ -27,13 +26,13 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Before they have begun.
+    /// Value before the start.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,
     };
 
-    /// Of node `node` of a chain of `all`, from now on.
+    /// Starts node `node` of a chain of `all` relays at `now`.
     pub(crate) fn begin(
         &mut self,
         node: u16,
@@ -66,29 +65,29 @@ impl Neighbours {
         }
     }
 
-    /// The nodes taken, toward Tx and toward Rx.
+    /// Returns the neighbours toward Tx and toward Rx.
     pub(crate) fn nodes(&self) -> [Option<u16>; 2] {
         [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
     }
 
-    /// Whether somebody else is there than when a view was decided on last.
+    /// Returns true if a neighbour differs from the one at the last decision on a view.
     pub(crate) fn have_changed(&self, now: Instant) -> bool {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
 
-    /// Leaves the view: no neighbour is one of a view until the next one is agreed on.
+    /// Leaves the view: neither side has an agreed neighbour until the next agreement.
     pub(crate) const fn leave(&mut self) {
         self.upstream.leave();
         self.downstream.leave();
     }
 
-    /// A proposal was decided against.
+    /// Records that a proposal was refused.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();
     }
 
-    /// The next heartbeat that is owed: at which side, to which node, the number of its question and that of the one it answers.
+    /// Returns the next pending heartbeat: its side, node, question number, and number of the question that it answers.
     pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -1,30 +1,27 @@
-//! One side of a relay: which node it takes for its neighbour there, and what it does about silence.
+//! One side of a relay: selection of the neighbour, and reaction to its silence.
 //!
-//! | state | the node taken is lost | its hello does not name this relay | a hello comes from a node not taken that hears this relay | time passes |
+//! | state | neighbour lost | hello of the neighbour does not name this relay | hello received from another node that hears this relay | timer |
 //! | --- | --- | --- | --- | --- |
-//! | `Linked` | `Searching` on a shared channel, else it goes on asking | `Pairing` | taken instead after `probe_after`, if it is better and its link is not held down | without a quorum for three times `dead_after`, and every four times from then on, `Searching` |
-//! | `Pairing` | `Searching` | - | as above | after a span `Searching`; without a quorum as above |
-//! | `Searching` | - | - | taken unless its link is held down, a farther one not before nearer ones could be heard; one that was given up for want of a quorum after `probe_after` | after a span `NoPeer` |
-//! | `NoPeer` | - | - | taken unless its link is held down, if it takes this relay; else after `probe_after` | the four nearest nodes are sent a hello every `dead_after`, every half of `probe_after` once one was heard |
+//! | `Linked` | shared channel: `Searching`; otherwise continue to send questions | `Pairing` | selected instead after `probe_after`, if it is better and its link is not held down | without a quorum for three times `dead_after`, and every four times from then on: `Searching` |
+//! | `Pairing` | `Searching` | - | as above | after a span: `Searching`; without a quorum as above |
+//! | `Searching` | - | - | selected unless its link is held down; a farther one not before nearer ones could be heard, one that was given up for want of a quorum after `probe_after` | after a span: `NoPeer` |
+//! | `NoPeer` | - | - | selected unless its link is held down: at once if it has selected this relay, else after `probe_after` | hello to the four nearest nodes every `dead_after`, every half of `probe_after` once one was heard |
 //!
-//! A span is `dead_after` less `probe_after`, or as long as a run of lost frames may be by what the channel has shown. A node that has been
-//! taken is paired with until its hello names this relay and hears it, or anything else comes from it: then it is `Linked`. A hello of the
-//! linked one that names this relay but does not hear it ends nothing, since a run of lost frames is measured by silence.
-//! A node that takes another one is not taken. *Better* is a nearer node that has somebody beyond it who hears it, and a farther one by which more
-//! relays hang together, or all that the last view had beyond the node taken: then the link that is missing is on the other side of the node
-//! taken, and it is left out. Where two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other, neither of the two parts
-//! could go on: of them that of the node nearest to Rx is given up, 4 takes 3, and 2 is left out.
+//! A span is `dead_after` less `probe_after`, or the longest plausible run of lost frames on this channel if that is longer. A
+//! selected node is `Pairing` until its hello names this relay and reports hearing it, or any other message arrives from it: then
+//! it is `Linked`. A hello of the linked node that names this relay but does not report hearing it changes nothing, because a run
+//! of lost frames is measured by silence. A node that has selected another one is not selected.
 //!
-//! While it pairs or searches, it sends hellos that ask to the four nearest nodes there, the one taken among them: as many as three relays in
-//! a row may be lost at once. Where a node is taken after `probe_after` it has to be heard all through that; of several the nearest one counts.
-//! A link is held down after its third loss (`damping`): its node is not taken, and hellos do not report it as heard, until it
-//! has been heard for `dead_after`, and twice as long after every further loss up to six times, so that a flapping link disturbs
-//! the chain less and less. While the side has no neighbour, the loss of a candidate counts, too. If no candidate answers for `probe_after`,
-//! all links of the side share the losses of the link that was lost last. Losses are forgotten 32 times `dead_after` after the last one.
-//! To a neighbour that is lost, on wires, nothing but questions is sent until something comes from it. A node that has come back is a reason
-//! for a new view `probe_after` later: the other one beside it may be about to take it, too.
+//! *Better* is a nearer node that is heard by the node beyond it. A farther node is better if it leads to more relays than the
+//! neighbour, or to all relays that the last view had beyond the neighbour: then the link on the neighbour's other side is
+//! missing, and the neighbour is left out. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
+//! neither part of the chain could go on. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
 //!
-//! The side also holds what the nodes there say in their hellos, the nodes of the last view, and the heartbeats and hellos that are owed.
+//! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, the selected one among
+//! them: up to three relays in a row may be lost at once. A node that is selected after `probe_after` must be heard without a gap
+//! for that time; of several nodes the nearest one counts. Links that were lost repeatedly are held down (see
+//! [`damping`](super::damping)). On wires, only questions are sent to a lost neighbour until it answers. A node that returns
+//! causes a request for a new view `probe_after` later, because the node on its other side may be about to select it, too.
 
 use super::damping::Damping;
 use super::hearing::Hellos;
@@ -40,9 +37,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// The other node has taken this one, too, as far as it has said.
+    /// Selected node that has selected this relay, too, as far as it has reported.
     Linked,
-    /// It has not, or not any more.
+    /// Selected node that has not selected this relay, or no longer.
     Pairing {
         since: Instant,
     },
@@ -51,67 +48,67 @@ enum NeighbourState {
     },
 }
 
-/// One side.
+/// State of one side.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbour {
-    /// The node taken, 0 for none.
+    /// Selected node, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// A node that has come back is not counted before: the other side may be about to take it, too.
+    /// Time before which a returned node is no reason for a view: the node on its other side may be about to select it.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// The node that was taken when the links were given up; 0 for none.
+    /// Selected node at the time the links were given up; 0 for none.
     given_up: u16,
     /// Start of the last search.
     searches_since: Instant,
-    /// How far away the node taken is.
+    /// Distance to the selected node, in places.
     pub(super) distance: u16,
-    /// The nodes that have said that they hear this relay.
+    /// Nodes that have reported hearing this relay.
     pub(super) both_ways: Hearing,
-    /// Whom the nodes on this side take here, the nearest first; 0 for none.
+    /// Neighbour that each node on this side has selected toward this relay, nearest node first; 0 for none.
     pub(super) taken_by: [u16; CANDIDATES as usize],
-    /// When a node that is not taken was heard last.
+    /// Time of the last frame from a node that is not selected.
     near: Option<Instant>,
-    /// The nodes heard since `since`, and in the span before: bit 0 is the nearest one.
+    /// Nodes that were heard recently.
     pub(super) hearing: Hearing,
-    /// How often each of them said that it does not hear this relay.
+    /// Consecutive reports of each node that it does not hear this relay.
     pub(super) unheard: InRow,
-    /// Those that were told of as found since another one was linked, or lost: bit 0 is the nearest one.
+    /// Nodes reported as found since another node was linked or lost: bit 0 is the nearest one.
     found: u8,
-    /// Those of another mission.
+    /// Nodes of another mission.
     pub(super) strangers: ToldOf,
-    /// How often a handshake under its number was signed with another key.
+    /// Consecutive handshakes with each node's index that were signed with another key.
     #[cfg(feature = "auth")]
     pub(super) forged: InRow,
-    /// How long after one question the next one is asked.
+    /// Interval between questions.
     tick: Duration,
-    /// How long a sign of life is waited for until one is asked for.
+    /// Silence after which a sign of life is requested.
     patience: Duration,
     jitter: Jitter,
     pub(super) signs: Signs,
-    /// The newest mission that the node taken holds, as far as it has said.
+    /// Newest mission of the selected node, as far as it has reported.
     pub(crate) holds: Option<MissionId>,
-    /// The number of its last hello, which an offer to it answers; 0 before any.
+    /// Number of its last hello, which an offer of a mission answers; 0 before any.
     #[cfg(feature = "upload")]
     pub(crate) asked: u16,
-    /// Whether a newer one is to be offered to it.
+    /// True if a newer mission is to be offered to it.
     #[cfg(feature = "upload")]
     pub(crate) offer: bool,
-    /// Whether the ground at this side is owed a hello.
+    /// True if a hello to the ground station on this side is pending.
     #[cfg(feature = "upload")]
     pub(crate) ground: bool,
-    /// Number of the ground's hello that asks for the upload held here; 0 for none.
+    /// Number of the ground station's hello that requests the upload held here; 0 for none.
     #[cfg(feature = "upload")]
     pub(crate) ground_asks: u16,
-    /// When to look for a sign of life again.
+    /// Time of the next check for a sign of life.
     look_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
 
 impl Neighbour {
-    /// Before it has begun. All of it is zeros: nothing else could be made without a copy in flash.
+    /// Value before the start. It is all zeros; any other value would be copied from flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -148,7 +145,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// The side where `node` is taken to be, 0 for none, from now on.
+    /// Starts the side at `now` with neighbour `node`, 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -174,61 +171,60 @@ impl Neighbour {
         self.node = node;
         self.agreed = AgreedNodes::on(node);
         self.state = NeighbourState::Linked;
-        // Where others may have closed up since, it makes itself known soon.
+        // Other relays may have closed up since, so this relay announces itself soon.
         let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
         let wait = match settings.wiring {
-            // The first pass comes without being asked for.
+            // The first pass arrives without a request.
             Wiring::Pair => self.patience.max(first_pass(settings, all)),
             Wiring::Shared => soon,
         };
         self.look_at = Some(now + wait);
     }
 
-    /// The node taken, 0 for none.
     pub(crate) const fn node(&self) -> u16 {
         self.node
     }
 
-    /// Whether nobody is there, and nobody is sought any more.
+    /// Returns true if no neighbour is selected and the search is over.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Whether whoever is there has come back just now.
+    /// Returns true during the grace period after a node's return.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
 
-    /// Whether the node taken has been heard and is not lost.
+    /// Returns true if the selected node has been heard and is not lost.
     pub(crate) const fn is_there(&self) -> bool {
         self.liveness.is_there()
     }
 
-    /// Whether the node taken is lost, and nothing has come from it since.
+    /// Returns true if the selected node is lost, and nothing has been received from it since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.liveness.is_silent()
     }
 
-    /// The neighbour was there `at` that time or later; whether it had been lost until now.
+    /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
     pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.confirmed(at);
         if self.is_mutual() {
             let next = (self.liveness.heard() + self.patience).max(now + self.tick);
-            // What answers something said long ago is no reason to ask sooner.
+            // An answer to an old message does not advance the next check.
             let next = self.look_at.map_or(next, |at| at.max(next));
-            // Another node than before is to be counted once its grace is over.
+            // A new neighbour triggers a view request at the end of its grace period.
             let waits = self.node != self.agreed.counted() && now < self.grace;
             self.look_at = Some(if waits { next.min(self.grace) } else { next });
         }
         back
     }
 
-    /// Whether somebody is there, and takes this relay for its neighbour, too, as far as it has said.
+    /// Returns true if a node is selected and has selected this relay, too, as far as it has reported.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
 
-    /// The neighbour has said whether it takes this relay for its own; whether that is new.
+    /// Records whether the neighbour has selected this relay; returns true if that is a change.
     pub(crate) fn told(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -243,14 +239,14 @@ impl Neighbour {
         true
     }
 
-    /// Whoever is taken just now is to be told of, unless it was and nobody has been linked or lost since.
+    /// Returns true if the selected node is to be reported as found, and marks it as reported.
     pub(crate) const fn tells_found(&mut self) -> bool {
         let told = self.found;
         self.found |= mask(self.distance);
         self.found != told
     }
 
-    /// The silence so far of a neighbour of the same view is excused; whether there is one, and it is not lost.
+    /// Excuses the silence of a neighbour in the same view; returns true if there is one and it is not lost.
     pub(crate) fn excuse(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused =
             self.state == NeighbourState::Linked && self.is_agreed() && self.liveness.excuse(now);
@@ -260,7 +256,7 @@ impl Neighbour {
         excused
     }
 
-    /// Whether it is time to look for a sign of life.
+    /// Returns true if the check for a sign of life is due.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.look_at.is_some_and(|at| at <= now)
     }
@@ -269,9 +265,8 @@ impl Neighbour {
         self.look_at
     }
 
-    /// Nothing has come for a while; whether the neighbour counts as lost since this moment, as it does after `dead`. `searches` tells
-    /// whether others could be heard here. It is asked again after the
-    /// time of `asking`, where that is another than usual.
+    /// Handles a silence; returns true if the neighbour is lost from this moment on, which is not before `dead`. `searches` is
+    /// true if other nodes can be heard here. `asking` replaces the usual interval between questions.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -342,7 +337,7 @@ impl Neighbour {
             .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
-    /// A node that is not taken has been heard: where the chain has ended here so far, and nobody was near, it is looked after.
+    /// Records a frame of a node that is not selected. If the chain has ended here, the next check is soon.
     pub(crate) fn notice(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.is_near(now, settings) {
             self.look_at = Some(now + self.tick);
@@ -350,7 +345,7 @@ impl Neighbour {
         self.near = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour and asks all candidates.
+    /// Returns the start of the search while this side has no neighbour and sends requests to all candidates.
     pub(super) const fn asks_all(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -366,12 +361,12 @@ impl Neighbour {
         self.hellos.owe_all();
     }
 
-    /// Whether `node` was taken when the links were given up, and nobody else has been since.
+    /// Returns true if `node` was given up for want of a quorum and no other node has been selected since.
     const fn was_given_up(&self, node: u16) -> bool {
         node != 0 && self.given_up == node
     }
 
-    /// Whoever is taken is taken no more, and sought like any other: the part that is linked so has no quorum.
+    /// Releases the selected node and searches again, because the linked part of the chain has no quorum.
     pub(crate) fn give_up(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -383,9 +378,8 @@ impl Neighbour {
         }
     }
 
-    /// A node that is not taken has sent a hello: whether it is taken from now on.
-    ///
-    /// It is one that hears this relay, and takes it for its neighbour or nobody.
+    /// Considers a node that has sent a hello and is not selected; returns true if it is selected from now on. The candidate
+    /// hears this relay, and has selected this relay or none.
     pub(crate) fn consider(
         &mut self,
         candidate: Candidate,
@@ -395,13 +389,13 @@ impl Neighbour {
         let node = candidate.node;
         let none = Duration::from_micros(0);
         let distance = candidate.distance;
-        // A link that comes and goes has to stay for a while first.
+        // A flapping link must first stay up for a while.
         if self.damping.holds(distance, now, settings) {
             return false;
         }
         let takes = match self.state {
             NeighbourState::Searching { since } => {
-                // One that is nearer may be about to be heard, or anybody else than the one that led nowhere.
+                // A nearer node may be heard soon, or any other node than the one that was given up.
                 let wait = if self.was_given_up(node) {
                     settings.probe_after
                 } else {
@@ -413,7 +407,7 @@ impl Neighbour {
                 candidate.pairs || self.damping.passes(distance, none, now, settings)
             }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
-                // Of two that could leave somebody out the one nearer to Rx does, unless it takes long.
+                // If two relays could each leave out a node, the one nearer to Rx does, unless that takes long.
                 let waits = !candidate.nearer && candidate.downstream;
                 let more = if waits {
                     settings.dead_after.times(2)
@@ -443,7 +437,7 @@ impl Neighbour {
     }
 }
 
-/// A node that is not taken, and hears this relay.
+/// Node that is not selected and hears this relay.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "four things that its hello says"
@@ -451,77 +445,77 @@ impl Neighbour {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// How many places away it is, and whether toward Rx.
+    /// Distance in places; `downstream` is true if the node is toward Rx.
     pub(crate) distance: u16,
     pub(crate) downstream: bool,
-    /// Whether it takes this relay for its neighbour.
+    /// True if the node has selected this relay.
     pub(crate) pairs: bool,
-    /// Whether it is nearer than the one taken.
+    /// True if the node is nearer than the selected one.
     pub(crate) nearer: bool,
-    /// Whether it has somebody beyond it.
+    /// True if the node is heard by the node beyond it.
     pub(crate) ready: bool,
-    /// Whether more relays hang together by it than by the one taken.
+    /// True if more relays are connected through this node than through the selected one.
     pub(crate) longer: bool,
 }
 
 impl Candidate {
-    /// How many nodes there may be between it and the one that was lost.
+    /// Returns the number of nodes that may be between the candidate and the lost node.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
 
-    /// Whether it is to take the place of another one.
+    /// Returns true if the candidate is to replace the selected node.
     pub(super) const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }
 }
 
 impl Neighbour {
-    /// Whether it is certain who is there, and somebody else than when a proposal was decided last.
+    /// Returns true if the neighbour is certain and differs from the one at the last decision on a proposal.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Whether it is who was there when the view was agreed on.
+    /// Returns true if the neighbour is the one of the agreed view.
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
 
-    /// A proposal has come from whoever is there, or begins here: then nobody is to be before this relay.
+    /// Records the proposer. `Itself` means that this relay proposed and has no predecessor.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// The proposal that came from this side was granted.
+    /// Records that the proposal received from this side was granted.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: nobody is here in it.
+    /// Leaves the view: this side has no agreed neighbour.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
 
-    /// It was not granted: there is nothing to ask again until somebody else is there.
+    /// Records a refusal: there is no further request until the neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// The proposal that was granted goes on to whoever is there, or ends here.
+    /// Records that the proposal was granted and forwarded to the neighbour, or ended here.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// The nodes on one side by what was decided on views, 0 for none.
+/// Nodes on one side according to the decisions on views; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
-    /// The node that was there when the view was agreed on.
+    /// Neighbour in the agreed view.
     in_view: u16,
-    /// The node that was there when a proposal was decided last, granted or not.
+    /// Neighbour at the last decision on a proposal, granted or refused.
     counted: u16,
-    /// The node that the last proposal came from.
+    /// Node that sent the last proposal.
     proposer: u16,
 }
 
@@ -534,17 +528,14 @@ impl AgreedNodes {
         }
     }
 
-    /// The node that was there when the view was agreed on.
     pub(super) const fn node(self) -> u16 {
         self.in_view
     }
 
-    /// The node that was there when a proposal was decided last, granted or not.
     pub(super) const fn counted(self) -> u16 {
         self.counted
     }
 
-    /// A proposal has come from `node`, which is there, or begins here: then nobody is to be before this relay.
     pub(super) const fn proposed_by(&mut self, proposer: Proposer, node: u16) {
         self.proposer = match proposer {
             Proposer::Itself => 0,
@@ -552,29 +543,28 @@ impl AgreedNodes {
         };
     }
 
-    /// The proposal that came from this side was granted.
+    /// Records that the proposal received from this side was granted.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
 
-    /// A proposal was granted with `node` on this side.
+    /// Records that a proposal was granted with neighbour `node`.
     pub(super) const fn agree(&mut self, node: u16) {
         self.in_view = node;
         self.counted = node;
     }
 
-    /// It was not granted: there is nothing to ask again until somebody else than `node` is there.
     pub(super) const fn refuse(&mut self, node: u16) {
         self.counted = node;
     }
 }
 
-/// What waits to be sent to the neighbour, apart from passes and what comes back of them.
+/// Pending heartbeat of the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
-    /// A question whether it is there.
+    /// True if a question is pending.
     pub(super) ask: bool,
-    /// The answer to its question of that number, 0 for none.
+    /// Number of the neighbour's question to answer, 0 for none.
     pub(super) answer: u16,
 }
 
@@ -585,10 +575,10 @@ impl Signs {
     };
 }
 
-/// So many times in a row a node has to say that it does not hear this relay: an answer or two may be lost.
+/// Consecutive reports of a node that it does not hear this relay: an answer or two may be lost.
 const UNHEARD: u8 = 8;
 
-/// Handshakes in a row under a node's number that are signed with another key.
+/// Consecutive handshakes with a node's index that are signed with another key.
 #[cfg(feature = "auth")]
 const FORGED: u8 = 3;
 
@@ -600,17 +590,17 @@ impl Neighbour {
         known || self.is_mutual() && self.distance == distance && self.liveness.is_there()
     }
 
-    /// Whether the neighbour here is linked, and less than `distance` places away.
+    /// Returns true if the neighbour here is linked, and less than `distance` places away.
     pub(crate) fn comes_along(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_there() && self.distance < distance
     }
 
-    /// Whether the neighbour here is linked, and more than `distance` places away.
+    /// Returns true if the neighbour here is linked, and more than `distance` places away.
     pub(crate) fn goes_past(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_there() && self.distance > distance
     }
 
-    /// Node `distance` places away has said which one it takes on this side, and whether it hears this relay.
+    /// Records a hello of node `distance` places away: the neighbour it has selected, and whether it hears this relay.
     pub(crate) fn says(
         &mut self,
         distance: u16,
@@ -627,13 +617,13 @@ impl Neighbour {
         }
     }
 
-    /// The node that the one `distance` places away takes on this side, as it said last; 0 for none.
+    /// Returns the neighbour that the node `distance` places away has selected toward this relay; 0 for none.
     pub(crate) fn taken_by(&self, distance: u16) -> u16 {
         let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
-    /// An intact frame from the node `distance` nodes away, which is the one `taken` or not.
+    /// Records an intact frame of the node `distance` places away; `taken` is true if that is the selected node.
     pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
         self.hearing.add(distance, now, settings);
         self.damping.hear(distance, self.asks_all(), now, settings);
@@ -642,29 +632,29 @@ impl Neighbour {
         }
     }
 
-    /// The nodes that were heard lately, without one whose link is held down: bit 0 is the nearest one.
+    /// Returns the nodes heard recently whose links are not held down, as a bit mask: bit 0 is the nearest one.
     pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
-    /// The node `distance` nodes away has said whether it hears this relay; whether it does not, for the last of so many times in a row.
+    /// Counts the reports of a node that it does not hear this relay; returns true at the last of [`UNHEARD`] in a row.
     pub(crate) fn says_it_hears(&mut self, distance: u16, heard: bool) -> bool {
         self.unheard.count(distance, !heard, UNHEARD)
     }
 
-    /// The node `distance` nodes away is of another mission; whether that is to be told.
+    /// Returns true if the node `distance` places away, which has another mission, is to be reported.
     pub(crate) fn is_stranger(&mut self, distance: u16, now: Instant) -> bool {
         self.strangers.tell(distance, now)
     }
 
-    /// A handshake under the number of the node `distance` nodes away was signed with another key; whether that is certain now.
+    /// Counts a handshake that was signed with another key; returns true at the last of [`FORGED`] in a row.
     #[cfg(feature = "auth")]
     pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
 
-    /// The node `distance` nodes away has the key.
+    /// Resets the count: the node `distance` places away has the key.
     #[cfg(feature = "auth")]
     pub(crate) fn is_signed_right(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
@@ -672,19 +662,19 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// The neighbour asks for a sign of life, with a question of that number.
+    /// Records the neighbour's question with this number.
     pub(crate) const fn asked(&mut self, number: u16) {
         if number != 0 {
             self.signs.answer = number;
         }
     }
 
-    /// The neighbour has answered the question of that number: when that was asked.
+    /// Returns the time at which the answered question `number` was sent.
     pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
         self.liveness.answered(number)
     }
 
-    /// A heartbeat that is owed: to which node, the number of its question and that of the one it answers.
+    /// Returns the pending heartbeat: its node, question number, and number of the question that it answers.
     pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let Signs { ask, answer } = core::mem::take(&mut self.signs);
         if !(ask || answer != 0) || self.node == 0 {
@@ -694,12 +684,12 @@ impl Neighbour {
         Some((self.node, question, answer))
     }
 
-    /// Owes a hello to the candidate `distance` nodes away, which may be one that asks.
+    /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
     pub(crate) const fn owe(&mut self, distance: u16, ask: bool) {
         self.hellos.owe(distance, ask);
     }
 
-    /// The nearest candidate that is owed a hello: how many nodes away, and whether it is asked.
+    /// Returns the distance of the nearest candidate with a pending hello, and true if that requests an answer.
     pub(crate) fn take_hello(&mut self) -> Option<(u16, bool)> {
         self.hellos.take()
     }

@@ -1,7 +1,7 @@
-//! What a relay holds while it does its share of an algorithm: the pass that is under way, its place, its targets.
+//! State of a relay's part in a round of agreement: the current pass, its position and its target.
 //!
-//! The leader has a task besides: which pass comes next, and what it works out before it begins one: its prediction, the targets or
-//! altitudes to try.
+//! The leader also has a task: the choice of the next pass, and the computation before it (prediction, targets or altitudes to
+//! try).
 
 use super::gathering::Seats;
 use super::sense::{SENSING, Sense, Sensing};
@@ -22,14 +22,14 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Answer, Message, Moved, Roster, Sweep, Token};
 
-/// Places weighed in one call of `work` in Algorithm 2, and a row of 24 more at most.
+/// Positions evaluated per call of [`Computation::work`] in Algorithm 2; a row of up to 24 more may be added.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
 
-/// Whether this crate was built with the methods beyond Algorithm 1. Without one, none of its code is reached.
+/// True with the features for the methods beyond Algorithm 1; without them their code is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
-/// What the current pass carries.
+/// Current pass with its data.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(Sweeping),
@@ -38,46 +38,46 @@ pub(super) enum PassKind {
     Turn(Turning),
 }
 
-/// Where the joint method has a relay.
+/// Solution of the joint method for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chosen {
-    /// Across the line.
+    /// Cross-section: position across the line.
     pub(super) at: CrossSection,
-    /// And no farther along it, m.
+    /// Maximum x, m.
     pub(super) end_m: f32,
-    /// Whether nobody holds back there.
+    /// True for a plain pass, in which no relay holds back.
     pub(super) plain: bool,
 }
 
-/// A relay's share of the algorithms.
+/// State of a relay's part in the algorithms.
 #[derive(Clone, Debug)]
 pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
     pub(super) sweeps: u32,
-    /// What this relay was given.
+    /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
-    /// What the relays of this view bring along.
+    /// Profiles of the relays of this view.
     pub(super) seats: Seats,
-    /// Where the joint method has it in this view, once that is known.
+    /// Solution of the joint method in this view, once it is computed.
     pub(super) chosen: Option<Chosen>,
-    /// Where it is to be across the line.
+    /// Cross-section of the setpoint.
     pub(super) at: CrossSection,
-    /// Where the neighbour toward Rx stands, as far as it has said.
+    /// Last reported position of the neighbour toward Rx.
     pub(super) after: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
-    /// What it measures there.
+    /// Measured interference at the setpoint, in a field.
     pub(super) meter: Meter,
-    /// What it hears of the interference.
+    /// Measurements of the interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// At the leader, what no chain can have.
+    /// Upper bound of the target SIR of any chain; known at the leader only.
     pub(super) bound: Option<f32>,
 }
 
 impl Computation {
-    /// A relay that has just been switched on. The leader numbers its passes from `number` on, and has work to do.
+    /// Creates the state after a start. `number` is the start of the leader's pass numbers; the leader has work at once.
     pub(crate) const fn new(
         leader: bool,
         number: u16,
@@ -103,13 +103,12 @@ impl Computation {
         }
     }
 
-    /// Whether it has just been made.
+    /// Returns true until the first task, pass or setpoint.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::No) && self.setpoint.is_none()
     }
 
-    /// Another mission is flown from now on, in which this relay is given `profile`. It stays where it is.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.profile = profile;
         self.chosen = None;
@@ -120,28 +119,26 @@ impl Computation {
         }
     }
 
-    /// Discards the agreed place, and that of the neighbour.
     pub(crate) const fn discard_place(&mut self) {
         self.setpoint = None;
         self.after = None;
     }
 
-    /// The leader begins from the start: with Algorithm 1 or 4, at the altitudes the relays were given.
+    /// Starts the leader's search again: Algorithm 1 or 4 at the configured altitudes.
     pub(crate) fn restart(&mut self) {
         self.task.rest();
-        // Solved once more, the chain is tried at the same targets as the first time.
+        // A new solution makes the leader try the same targets as the first time.
         self.chosen = None;
         self.state.plan();
     }
 
-    /// A view is proposed: what was under way is over.
     pub(crate) fn suspend(&mut self) {
         self.task.rest();
         self.pass = PassKind::Sweep(Sweeping::new(Ladder::single(1.0)));
         self.state.answer();
     }
 
-    /// The new view is in force: everybody's first pass in it is still to come.
+    /// Starts a new view, in which no pass has been received yet.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.rest();
         self.after = None;
@@ -151,12 +148,12 @@ impl Computation {
         self.state.renew(leads);
     }
 
-    /// It is to be at `place` from now on, and keeps to `at` across the line.
+    /// Sets the setpoint to `place` and the cross-section to `at`.
     #[inline(never)]
     pub(super) fn stand_at(&mut self, place: Placement, at: CrossSection) {
         self.setpoint = Some(place);
         self.at = at;
-        // What is measured from now on is measured elsewhere.
+        // Samples of the previous position do not count.
         self.meter.restart();
     }
 
@@ -165,10 +162,10 @@ impl Computation {
         Action::Infeasible
     }
 
-    /// Goes on with a computation: the relay's own share of the current pass, or the leader's next pass.
+    /// Continues this relay's part in the current pass, or the leader's preparation of the next one.
     ///
-    /// Bounded by 12 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint method,
-    /// or 624 places of Algorithm 2.
+    /// Bounded by 12 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint
+    /// method, or 624 positions of Algorithm 2.
     pub(crate) fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {
@@ -193,7 +190,7 @@ impl Computation {
         }
     }
 
-    /// What to hand onward, while an answer is awaited.
+    /// Returns the message to forward to the next relay, while the pass is outstanding.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
             return None;
@@ -227,7 +224,7 @@ impl Computation {
         }
     }
 
-    /// Whether the current pass is one on which relays compute for a while.
+    /// Returns true if relays compute before they forward the current pass.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -236,7 +233,7 @@ impl Computation {
         }
     }
 
-    /// What to hand back, once it is known.
+    /// Returns the result of the pass for the previous relay, once it is known.
     pub(crate) fn back(&self, context: &Context<'_>) -> Option<Message> {
         if !self.state.is_answered() {
             return None;
@@ -265,7 +262,6 @@ impl Computation {
         }
     }
 
-    /// The number of the current pass.
     pub(crate) const fn number(&self) -> u16 {
         self.state.number()
     }
@@ -274,7 +270,6 @@ impl Computation {
         self.state.phase()
     }
 
-    /// What this relay holds.
     pub(crate) const fn profile(&self) -> Profile {
         Profile {
             altitude_m: self.at.altitude_m,
@@ -282,7 +277,7 @@ impl Computation {
         }
     }
 
-    /// What it is on a sweep: of the joint method, or where it was given to be.
+    /// Returns this relay's station on a sweep: the joint method's if `chosen`, else the configured one.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -291,7 +286,7 @@ impl Computation {
         }
     }
 
-    /// Rounds of Algorithm 2 that are over and the SIR of the chain after the last one, at the leader while it adjusts.
+    /// Returns the completed rounds of Algorithm 2 and the SIR after the last one; `None` except at the leader.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
             LeaderTask::Adjusting(rounds) => Some((rounds.done(), rounds.sir)),
@@ -300,10 +295,10 @@ impl Computation {
     }
 }
 
-/// A chain being solved by the joint method.
+/// Solver of the joint method for a whole chain.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
-/// What the leader is at.
+/// Current task of the leader.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -313,32 +308,32 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 )]
 #[derive(Clone, Debug)]
 pub(crate) enum LeaderTask {
-    /// Not the leader, or nothing begun yet, or all done.
+    /// Idle: not the leader, not started, or finished.
     No,
-    /// Solving the chain from the mission.
+    /// Prediction of the chain's solution from the mission.
     Predicting(Planner),
-    /// The same by the joint method: every relay does that, not the leader alone.
+    /// Solution of the chain by the joint method; all relays compute it, not only the leader.
     Solving(ChainSolver),
-    /// Trying targets at the altitudes held; whether the chain settles with what is agreed.
+    /// Search for the highest target at the current cross-sections.
     Searching {
         search: Search,
-        /// Nothing comes after it.
+        /// True if no other algorithm follows the search.
         last: bool,
-        /// Of the places that the relays were given, though others were chosen.
+        /// True for a search at the configured altitudes, after one at the joint method's failed.
         given: bool,
     },
-    /// Algorithm 2.
+    /// Rounds of Algorithm 2.
     Adjusting(Rounds),
 }
 
-/// Where Algorithm 2 is.
+/// Progress of Algorithm 2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
-    /// Rounds that are over; the first pass, which only looks, is not one.
+    /// Completed rounds; the first pass, in which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
-    /// SIR of the chain after the last round.
+    /// SIR of the chain after the last round, linear.
     pub(crate) sir: f32,
 }
 
@@ -352,17 +347,15 @@ impl Rounds {
         }
     }
 
-    /// What the next pass is for.
     pub(crate) const fn turn(&self) -> AdjustStep {
         self.turn
     }
 
-    /// How many rounds are over.
     pub(crate) const fn done(&self) -> u16 {
         self.done
     }
 
-    /// Takes what came of a pass; whether that was the last one.
+    /// Records the result of a pass; returns true if it was the last one.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -386,22 +379,19 @@ impl Rounds {
 }
 
 impl LeaderTask {
-    /// Nothing is left to do.
     pub(crate) fn rest(&mut self) {
         *self = Self::No;
     }
 
-    /// Solves the chain from the mission.
     pub(crate) fn predict(&mut self, planner: Planner) {
         *self = Self::Predicting(planner);
     }
 
-    /// The same by the joint method.
     pub(crate) fn solve(&mut self, chain: ChainSolver) {
         *self = Self::Solving(chain);
     }
 
-    /// Tries targets: the `last` thing to do, and of the places `given`, or not.
+    /// Starts a search of targets; see [`Searching`](Self::Searching) for `last` and `given`.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -410,20 +400,19 @@ impl LeaderTask {
         };
     }
 
-    /// Begins Algorithm 2.
     pub(crate) fn adjust(&mut self, adjust: Adjust) {
         *self = Self::Adjusting(Rounds::new(adjust));
     }
 }
 
-/// Hops of the prediction in one call of `work`, 16 reaches each. In an uneven field a part of one.
+/// Hops of the prediction per call of [`Computation::work`], 16 reaches each; in an uneven field a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
-/// The same in an even field, where a reach takes twice the work.
+/// Hops per call in an even field, where a reach costs twice as much.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Computation {
-    /// Goes on with the leader's computation; whether the next pass can begin.
+    /// Continues the leader's computation; returns true if the next pass can start.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.has_to_tell(context) || self.gathers(context) {
             return Ok(true);
@@ -442,7 +431,7 @@ impl Computation {
                 Ok(false)
             }
             LeaderTask::Predicting(planner) => {
-                // The leader knows its own profile; of the others it can only assume what the mission has in common.
+                // The leader knows only its own profile, and assumes the mission's common one for the other relays.
                 let profile_of = |index| {
                     if index == context.index() {
                         profile
@@ -458,7 +447,7 @@ impl Computation {
                 let ladder = match planner.step(mission, profile_of, hops) {
                     Ok(None) => return Ok(false),
                     Ok(Some(agreed)) => Some(agreed.ladder),
-                    // The others may hold something else: let their answers decide.
+                    // Other relays may have other profiles, so the search decides.
                     Err(Infeasible) => None,
                 };
                 let last = context.settings().method == Method::Align;
@@ -469,7 +458,6 @@ impl Computation {
         }
     }
 
-    /// What the leader begins with: its prediction, if it may, or the search itself.
     #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
     fn begin_task(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         let Settings {
@@ -489,7 +477,7 @@ impl Computation {
         )
     }
 
-    /// Goes over to trying targets, with `ladder` first if there is one.
+    /// Starts the search of targets, with `ladder` as the first one if it is given.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -499,7 +487,7 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// The leader goes back to the places that the relays were given: nothing can be met at those chosen.
+    /// Starts the search at the configured cross-sections, because the joint method's are infeasible.
     pub(super) fn search_given(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
@@ -521,7 +509,7 @@ impl Computation {
         Ok(())
     }
 
-    /// The leader begins the pass it has planned.
+    /// Starts the pass that the leader has planned.
     pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
         if self.has_to_tell(context) {

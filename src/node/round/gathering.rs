@@ -1,9 +1,9 @@
-//! The gathering of the joint method: where relays bring along what the mission does not say, everybody comes to know it from all.
+//! Collection of the relays' profiles for the joint method.
 //!
-//! A pass has room for a few relays. Each that differs adds itself while there is room, and what came of the pass tells all of them. Where
-//! a roster is full, the next pass goes on after the last relay in it.
+//! A roster has room for a few relays. A relay whose profile differs from the mission's common one appends it while there is
+//! room, and the result of the pass informs all relays. After a full roster the next pass continues behind its last relay.
 //!
-//! Then each relay solves the chain by itself, and takes its own place of the solution.
+//! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
 
 use super::computation::{ChainSolver, LeaderTask};
 use super::computation::{Chosen, Computation, PassKind};
@@ -18,18 +18,18 @@ use crate::wire::message::{OwnSeat, OwnSeats, Roster};
 use core::task::Poll;
 
 impl Computation {
-    /// What this relay brings along.
+    /// Returns this relay's allowed cross-sections and power.
     pub(super) fn seat(&self, context: &Context<'_>) -> Seat {
         let holds = context.settings().hold_altitude;
         Seat::of(context.mission(), self.profile, holds)
     }
 
-    /// Whether that is something else than the mission says of all.
+    /// Returns true if this relay's profile differs from the mission's common one.
     pub(super) fn differs(&self, context: &Context<'_>) -> bool {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Whether this relay leads, and its next pass is to gather what relays bring along: one differs, and not all of it is known.
+    /// Returns true at a leader whose next pass collects profiles: some differ, and not all are known.
     pub(super) fn gathers(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.own);
         let leads = context.index() == context.mission().leader();
@@ -41,13 +41,13 @@ impl Computation {
             }
     }
 
-    /// The leader begins such a pass.
+    /// Starts a pass that collects profiles, at the leader.
     pub(super) fn begin_gathering(&mut self, context: &Context<'_>) -> Action {
         let after = self.seats.known.unwrap_or(0);
         self.gather(context, after, OwnSeats::new())
     }
 
-    /// One from the relay before.
+    /// Handles a collecting pass from the previous relay.
     pub(crate) fn on_gather(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let own = context.index();
         let same = matches!(&self.pass, PassKind::Gather(known) if known.after == roster.after
@@ -61,7 +61,7 @@ impl Computation {
             return Action::Stale;
         }
         if roster.after > 0 && self.seats.known != Some(roster.after) {
-            // It was not there when the relays before that were named.
+            // This relay missed the pass with the earlier profiles.
             return Action::Foreign;
         }
         self.state.take(roster.number);
@@ -71,13 +71,13 @@ impl Computation {
     fn gather(&mut self, context: &Context<'_>, after: u16, mut seats: OwnSeats) -> Action {
         let index = context.index();
         if after == 0 {
-            // Till the answer comes nothing is known, whatever was before.
+            // All profiles are unknown until the result arrives.
             self.seats = Seats::UNKNOWN;
             self.seats.known = Some(0);
         }
         if index > after && self.differs(context) {
             let holds = context.settings().hold_altitude;
-            // Where there is no room, the next pass asks again.
+            // If the roster is full, the next pass continues with this relay.
             _ = seats.push(OwnSeat {
                 index,
                 held_m: if holds { self.profile.altitude_m } else { 0.0 },
@@ -97,7 +97,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// What came of it, from the relay after.
+    /// Handles the result of the pass from the next relay.
     pub(crate) fn on_gathered(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let relays = context.mission().relays();
         if let PassKind::Gather(known) = &mut self.pass
@@ -118,7 +118,7 @@ impl Computation {
         };
         self.state.answer();
         if self.seats.take(roster, context.mission().relays()) {
-            // The chain is solved anew, as it is.
+            // The chain has to be solved again with the complete profiles.
             self.task.rest();
             self.chosen = None;
         }
@@ -129,23 +129,22 @@ impl Computation {
     }
 }
 
-/// What the relays of the view bring along, as far as it is known.
+/// Known profiles of the relays of the view.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
-    /// Relays that are known, from Tx on; `None` before anybody has asked.
+    /// Number of known relays, counted from Tx; `None` before the first collecting pass.
     pub(super) known: Option<u16>,
-    /// The altitude that a relay keeps to, m, or 0; its power, W, or 0 where the mission says all.
+    /// Fixed altitude of each relay, m, or 0, and its power, W, or 0 for the mission's common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
 
 impl Seats {
-    /// Nobody has asked.
     pub(super) const UNKNOWN: Self = Self {
         known: None,
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// What relay `index` brings along: what the mission says where nobody has asked.
+    /// Returns the profile of relay `index`, or the common one if the relay has not reported its own.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);
@@ -161,12 +160,12 @@ impl Seats {
         }
     }
 
-    /// Whether it is known of some of `relays` alone.
+    /// Returns true if the profiles of some, but not of all `relays` are known.
     pub(super) fn is_partial(&self, relays: u16) -> bool {
         self.known.is_some_and(|known| known < relays)
     }
 
-    /// Takes what came of a pass along `relays`; whether that is all.
+    /// Stores the result of a pass along `relays`; returns true if all profiles are known.
     pub(super) fn take(&mut self, roster: &Roster, relays: u16) -> bool {
         for seat in &roster.seats {
             let at = usize::from(seat.index).wrapping_sub(1);
@@ -181,13 +180,13 @@ impl Seats {
 }
 
 impl Computation {
-    /// Whether it has still to find out where it is to be.
+    /// Returns true while this relay has to compute its solution by the joint method.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Goes on with the chain's solution while there is nothing else to do.
+    /// Continues the joint solution while nothing else is to be done.
     pub(super) fn think(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -196,7 +195,6 @@ impl Computation {
         Action::Nothing
     }
 
-    /// What this relay is on a sweep.
     pub(super) fn link<'a>(&self, context: &Context<'a>, chosen: bool) -> Link<'a> {
         let there = self.chosen.filter(|_| chosen);
         Link {
@@ -210,10 +208,9 @@ impl Computation {
         }
     }
 
-    /// Solves some more of the chain, of relays that bring along what is known; the target, linear SIR, once this relay knows where it is
-    /// to be.
+    /// Continues the joint solution with the known profiles; returns its target, linear SIR, when it is complete.
     ///
-    /// Where that is not to be had, it stays where it was given to be, and the target says nothing.
+    /// Without a solution this relay keeps its configured position, and the target is 0.
     #[inline(never)]
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
@@ -233,7 +230,7 @@ impl Computation {
         let target = if let Ok(target) = solved {
             let end_m = chain.end_m(mission, &seat_of, index);
             let (at, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
-            // Before it has been asked, the others do not know what it holds.
+            // The solver used the common profile, if this relay's own has not been collected yet.
             let at = self.seat(context).room.nearest(at);
             self.chosen = Some(Chosen { at, end_m, plain });
             target
@@ -245,7 +242,7 @@ impl Computation {
         Some(target)
     }
 
-    /// Whether the chain can be solved.
+    /// Starts the solver; returns false if the chain cannot be solved.
     #[inline(never)] // a solver is built here once
     fn begin_solving(&mut self, mission: &Mission) -> bool {
         let Some(chain) = ChainSolver::new(mission) else {
@@ -263,7 +260,7 @@ impl Computation {
         });
     }
 
-    /// The leader goes over to sweeps at the places chosen, about `target` if that is known.
+    /// Starts the search at the joint method's cross-sections, around `target` if it is known.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

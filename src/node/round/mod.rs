@@ -1,17 +1,18 @@
-//! A round of agreement: one pass along the chain and what comes back of it, for every algorithm.
+//! Rounds of agreement: passes along the chain and their results, for all algorithms.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`state`] | the state table of a pass, and its number |
-//! | `computation` | what a relay holds while it does its share, and which pass the leader begins |
-//! | `sweep` | a sweep of targets (Algorithms 1 and 4) and its verdict |
-//! | `gathering` | the joint method: the pass that gathers what a relay has to know of the others, and its own solution of the chain |
-//! | `turn` | a turn of Algorithm 2 |
-//! | `sense` | the pass that adds up what is heard, and what a relay keeps of that |
+//! | [`state`] | state table of a pass, and pass numbers |
+//! | `computation` | state of a relay's part in a round, and the leader's choice of the next pass |
+//! | `sweep` | sweep of targets (Algorithms 1 and 4) and its verdict |
+//! | `gathering` | joint method: collection of profiles, and the relay's own solution of the chain |
+//! | `turn` | token of Algorithm 2 |
+//! | `sense` | collection of interference measurements, and the estimate |
 //!
-//! What answers a relay is a sign of life, from when the relay said what is answered: what came of a pass, by the neighbour onward, as of
-//! when the pass was first handed on; the next pass, by the neighbour back, as of when what came of the last one was first handed back. A
-//! leader whose firmware has it begin again does not wait for that: then the sign is too new by one pass at most.
+//! A reply proves that the neighbour was alive after this relay sent the message that it answers. The result of a pass proves it
+//! for the next relay, from the time at which the pass was first forwarded. The next pass proves it for the previous relay, from
+//! the time at which the last result was first sent. A leader that is restarted by its firmware does not wait for that result;
+//! the time is then too late by at most one pass.
 
 mod computation;
 mod gathering;
@@ -36,7 +37,6 @@ use computation::{ADJUST, ALTITUDE, Computation};
 use sense::{Findings, SENSING, Sensing};
 use state::{Action, Phase};
 
-/// The rounds of one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Round {
     circulation: Circulation,
@@ -45,7 +45,7 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// A relay that has just been switched on. The leader numbers its passes from `number` on, and has work to do.
+    /// Creates the state after a start. `number` is the start of the leader's pass numbers; the leader has work at once.
     pub(crate) const fn new(
         leads: bool,
         number: u16,
@@ -61,7 +61,7 @@ impl Round {
         }
     }
 
-    /// A message of the mission and the view that this relay is in, from the neighbour that has it to say. Bounded by 16 reaches.
+    /// Handles a message of the current mission and view from the neighbour that may send it. Bounded by 16 reaches.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;
@@ -96,7 +96,7 @@ impl Round {
         }
     }
 
-    /// Does what is due. Bounded by one portion of a computation.
+    /// Handles expired timers. Bounded by one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
@@ -131,7 +131,7 @@ impl Round {
         }
     }
 
-    /// As [`proceed`](Self::proceed), and says what has been found since `before`.
+    /// Calls [`proceed`](Self::proceed), and adds changed sensing results since `before` to the effects.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -147,14 +147,12 @@ impl Round {
         }
     }
 
-    /// Does what the relay's share asks for.
     fn proceed(&mut self, context: &Context<'_>, next: Action) -> Effects {
         match next {
             Action::Nothing => Effects::NONE,
             Action::Foreign => Effects::FOREIGN,
             Action::Stale => Effects::STALE,
             Action::Work => {
-                // Messages of the pass before would be stale.
                 self.circulation.withdraw();
                 self.work_soon(context.now);
                 Effects::NONE
@@ -176,7 +174,7 @@ impl Round {
             Action::Answer { agreed } => {
                 let path = context.path_to_leader();
                 self.circulation.complete(context.now, path);
-                // Now that it knows what the others bring along it may have the chain to solve.
+                // With the collected profiles the joint solution can start.
                 self.work_at = None;
                 if self.computation.is_solving(context) {
                     self.work_soon(context.now);
@@ -200,7 +198,7 @@ impl Round {
         }
     }
 
-    /// One measurement, by a relay that measures; whether it was of use.
+    /// Handles a measurement; returns true if it was accepted.
     pub(crate) fn handle_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         if sample.is_heard() {
             return SENSING
@@ -211,25 +209,24 @@ impl Round {
         self.computation.meter.take(&member.mission, at, sample)
     }
 
-    /// Goes on with a computation after a pause, so that a caller's loop gets its turn.
+    /// Schedules the next portion of a computation after a pause, so that the caller's loop can run.
     pub(crate) fn work_soon(&mut self, now: Instant) {
         self.work_at = Some(now + PAUSE);
     }
 
-    /// The leader begins again from the start.
     pub(crate) fn restart(&mut self, context: &Context<'_>) -> Effects {
         self.computation.restart();
         self.proceed(context, Action::Work)
     }
 
-    /// A view is proposed: what was under way is over.
+    /// Stops the current pass, because a new view is proposed.
     pub(crate) fn suspend(&mut self) {
         self.computation.suspend();
         self.circulation.cancel();
         self.work_at = None;
     }
 
-    /// The new view is in force, in which this relay `leads` or not, and has something to work out at once or not.
+    /// Starts a new view. `leads` is true at the leader, `works` at a relay that computes at once.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -237,22 +234,22 @@ impl Round {
         }
     }
 
-    /// Another mission is flown from now on, in which this relay is given `profile`. It stays where it is.
+    /// Loads another mission, in which this relay has `profile`. The setpoint stays.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.computation.load(profile);
     }
 
-    /// Discards the agreed place: the relay has none until the chain agrees anew.
+    /// Discards the agreed position until the next agreement.
     pub(crate) const fn discard_place(&mut self) {
         self.computation.discard_place();
     }
 
-    /// What could not be said to the neighbour after can be now.
+    /// Schedules an outstanding pass once more: the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// What is to be sent onward. It is taken for sent; nothing goes out without a neighbour, and comes again.
+    /// Returns the pending pass and starts its retransmission timer; `None` if the next relay is not `reachable`.
     pub(crate) fn take_onward(
         &mut self,
         context: &Context<'_>,
@@ -265,7 +262,7 @@ impl Round {
         reachable.then_some(message)
     }
 
-    /// What is to be sent back; it is taken for sent then.
+    /// Returns the pending reply and marks it as sent; `None` if the previous relay is not `reachable`.
     pub(crate) fn take_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),
@@ -291,32 +288,28 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Whether no pass and no view has been taken part in yet.
+    /// Returns true until the first pass or view.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }
 
-    /// Whether it has still to find out where it is to be by the joint method, and is at that.
     pub(crate) fn is_solving(&self, context: &Context<'_>) -> bool {
         self.work_at.is_some() && self.computation.is_solving(context)
     }
 
-    /// Whether it has just been made.
     pub(crate) const fn is_untouched(&self) -> bool {
         self.computation.is_untouched()
     }
 
-    /// Where to be in the end.
+    /// Returns the agreed position, before the guard limits it.
     pub(crate) const fn setpoint(&self) -> Option<Placement> {
         self.computation.setpoint
     }
 
-    /// What it has measured.
     pub(crate) const fn meter(&self) -> &Meter {
         &self.computation.meter
     }
 
-    /// What it hears and believes of the interference.
     pub(crate) const fn sensing(&self) -> &Sensing {
         &self.computation.sensing
     }

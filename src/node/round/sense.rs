@@ -1,16 +1,16 @@
-//! The pass on which the relays add up what they hear, and tell each other what they believe of it.
+//! Sensing pass: it collects the relays' interference measurements, and distributes the leader's interference estimate.
 //!
-//! | the leader | what follows |
+//! | event at the leader | action |
 //! | --- | --- |
-//! | a view is new, or it was switched on | a pass tells all what it believes; then the places are agreed on |
-//! | the chain has agreed, and its time has come | a pass; what comes back is reviewed |
-//! | nobody hears enough, and all three spreads were tried | the same, and the next pass comes after twice the time |
-//! | another belief is better | its number is one higher; a pass tells all; then new places are agreed on |
-//! | what comes back does not fit together | passes of which one relay after the other is left out, see [`doubt`](crate::sensing) |
-//! | none is | all hold their places; the next pass comes after twice the time, up to 64 times [`Listen::every`](crate::settings::Listen) |
+//! | new view, or start | send the estimate in a pass; then agree on positions |
+//! | positions agreed, and sensing timer expired | collect measurements in a pass; review the estimate |
+//! | too few measurements, and all three spreads tried | start again with the even spread; double the period |
+//! | better estimate found | increment its number; send it in a pass; then agree on new positions |
+//! | inconsistent measurements | start passes that exclude one relay after the other, see [`doubt`](crate::sensing) |
+//! | estimate unchanged in four passes | hold positions; double the period, up to 64 times [`Listen::every`](crate::settings::Listen) |
 //!
-//! A relay that has missed such a pass can take no part in the next one: its number is not the one that follows. So whoever agrees on
-//! places believes what all do.
+//! A relay that has missed a sensing pass cannot join the next pass, because the numbers are not consecutive. So all relays that
+//! agree on positions have the same estimate.
 
 use super::computation::{Computation, PassKind};
 use super::state::{Action, Phase};
@@ -30,38 +30,38 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// The time between passes grows up to so many times the least.
+/// Maximum of the sensing period, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// and doubles when so many passes in a row have changed nothing.
+/// Passes without a change after which the period doubles.
 const PATIENCE: u8 = 4;
 
-/// Passes of a search for who is wrong in the least time between two usual ones.
+/// Passes per `Listen::every` in a search for the faulty relay.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Measurements of nothing in a row after which a relay may be deaf.
+/// Measurements in a row without interference after which the receiver may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
-    /// Whether the chain finds its interferer by itself.
+    /// Returns true if the relays estimate the interference by measurements.
     pub(super) fn senses(context: &Context<'_>) -> bool {
         SENSING && context.settings().listen.is_some() && context.mission().field().is_none()
     }
 
-    /// Whether the leader has to tell what it believes before anything else.
+    /// Returns true if the leader must distribute its estimate before any other pass.
     pub(super) fn has_to_tell(&self, context: &Context<'_>) -> bool {
         Self::senses(context)
             && context.leads()
             && self.sensing.ear().is_some_and(|ear| !ear.has_told)
     }
 
-    /// Whether nothing else is under way.
+    /// Returns true at a leader that may start a sensing pass: no other pass is due.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::senses(context) && context.leads() && settled
     }
 
-    /// The leader plans its next look, if it holds a place.
+    /// Starts the timer of the next sensing pass, if one may follow.
     pub(super) fn plan_to_sense(&mut self, context: &Context<'_>) {
         if let Some(listen) = context.settings().listen
             && self.may_sense(context)
@@ -72,7 +72,7 @@ impl Computation {
         }
     }
 
-    /// The leader begins such a pass.
+    /// Starts a sensing pass at the leader.
     pub(super) fn begin_sense(&mut self, context: &Context<'_>) -> Action {
         let Some(ear) = self.sensing.ear_mut() else {
             return Action::Nothing;
@@ -92,7 +92,7 @@ impl Computation {
         self.sense(context, hearing, holds)
     }
 
-    /// One from the relay before.
+    /// Handles a sensing pass from the previous relay.
     pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         let same = matches!(&self.pass, PassKind::Sense(known)
             if known.hearing.told == hearing.told && known.from == hearing.sums);
@@ -113,13 +113,13 @@ impl Computation {
             return Action::Stale;
         };
         if hearing.told != ear.told || !holds {
-            // Where all are to be follows from it.
+            // Another estimate means other positions.
             ear.told = hearing.told;
             self.task.rest();
             self.chosen = None;
         }
         let mission = context.mission();
-        // Who is left out twice is left out for good.
+        // The second exclusion in a row is final.
         let twice = hearing.off == ear.left_out;
         ear.named = if twice { hearing.off } else { 0 };
         ear.left_out = hearing.off;
@@ -154,7 +154,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// What came of it, from the relay after.
+    /// Handles the result of a sensing pass from the next relay.
     pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         if let (PassKind::Sense(known), Some(ear)) = (&mut self.pass, self.sensing.ear_mut())
             && self.state.awaits(hearing.number)
@@ -200,7 +200,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Whether the leader goes on with a search for who is wrong: then what came back counts for nothing else.
+    /// Evaluates a search for the faulty relay; returns true if it continues, and the result is not used.
     fn tries(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
             return false;
@@ -217,7 +217,7 @@ impl Computation {
         next == Next::Again
     }
 
-    /// Whether the leader believes something else from now on.
+    /// Reviews the estimate with the result of a pass; returns true if it has changed.
     fn reconsiders(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
             return false;
@@ -252,7 +252,7 @@ impl Computation {
         ear.has_told = false;
         ear.kept = 0;
         ear.wait = match belief {
-            // All three spreads in vain: relays that cannot learn anything fly about less and less often.
+            // All three spreads have failed; relays that learn nothing shall move less and less often.
             Belief::Unknown(Spread::Even) => (2 * ear.wait).min(RAREST),
             Belief::Unknown(_) => ear.wait,
             _ => 1,
@@ -262,8 +262,10 @@ impl Computation {
         true
     }
 
-    /// Adds this relay's share to what those after it hear. One that has left itself out looks whether it fits the others again; one that has
-    /// never heard anything, where the others say that there is much to hear, names itself.
+    /// Adds this relay's sums to those of the relays after it, and checks its receiver against the others.
+    ///
+    /// A relay that is excluded checks if it fits again. One whose measurement is absurd excludes itself; one that measures
+    /// nothing where the others measure much reports itself.
     fn doubt(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(ear), PassKind::Sense(sense)) = (
             context.settings().listen,
@@ -280,7 +282,7 @@ impl Computation {
         let expected = place.and_then(|place| expected_at(mission)(&place.terms));
         let error = listen.relative_error;
         if ear.off {
-            // What it heard elsewhere while it was off is nothing to go by.
+            // Measurements at earlier positions may be faulty too.
             ear.listener.forget_past();
             ear.off = place.is_some_and(|place| is_off(&others, &place, expected, error));
         } else if place.is_some_and(|place| is_absurd(&others, &place, expected, error)) {
@@ -305,53 +307,53 @@ impl Computation {
     }
 }
 
-/// Whether this crate was built to listen. If not, none of its code is reached.
+/// True with the feature `sensing`; without it the sensing code is unreachable.
 pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
-/// A relay hears nothing of its line from farther away than so many times the distance.
+/// Maximum distance of a measurement from Tx in each coordinate, as a multiple of D.
 const FARTHEST: f32 = 100.0;
 
-/// What a relay hears, and what it believes of it: nothing, and no room for it, where this crate was built without `sensing`.
+/// Sensing state of a relay; empty without the feature `sensing`.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing([Ear; SENSING as usize]);
 
-/// What a relay that listens hears, and what it believes of it.
+/// Measurements of a relay, its interference estimate, and its knowledge of faulty receivers.
 #[expect(clippy::struct_excessive_bools, reason = "each for itself")]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ear {
     pub(super) listener: Listener,
     pub(super) told: Told,
-    /// What the transmitter and the receiver hear, as far as they have told this relay.
+    /// Levels that the ground transmitter and receiver have reported to this relay.
     pub(super) transmitter: Average,
     pub(super) receiver: Average,
-    /// Whether this relay hears something else than all the others, and leaves itself out.
+    /// True while this relay excludes its own measurements, because they do not fit the others.
     pub(super) off: bool,
-    /// Who was left out of the last pass, and of the last two; 0 for nobody.
+    /// Node excluded from the last pass, and node known to be faulty; 0 for none.
     pub(super) left_out: u16,
     pub(super) named: u16,
-    /// At the leader: the search for who is wrong, and the ends that are.
+    /// Leader only: search for the faulty relay, and ground ends whose measurements do not fit.
     pub(super) trial: Trial,
     pub(super) ends: EndsOff,
-    /// Whether what came back last does not fit together, and nobody knows who is wrong.
+    /// True if the last result was inconsistent, and the faulty relay is unknown.
     pub(super) contradicted: bool,
-    /// Whether it hears nothing where the others say that there is much to hear.
+    /// True if this relay measures nothing although the others' sums predict interference.
     pub(super) deaf: bool,
-    /// Measurements in a row that were nothing above the noise, of a relay that has not heard anything yet, and where the last one was.
+    /// Measurements in a row at or below the noise, and the position of the last one.
     pub(super) silent: u8,
     pub(super) silent_at: Placement,
-    /// At the leader: whether it has told the relays of the view what it believes.
+    /// Leader only: true if the relays of the view have received the estimate.
     pub(super) has_told: bool,
-    /// How much was known when that was taken up.
+    /// Information at the time at which the estimate was adopted.
     pub(super) known: Knowledge,
-    /// Why nothing was made of the last sums.
+    /// Reason why the last sums gave no estimate.
     pub(super) unfit: Option<Unfit>,
-    /// How long to wait for the next pass, and until when.
+    /// Sensing period in multiples of `Listen::every`, passes without a change, and end of the period.
     pub(super) wait: u32,
     pub(super) kept: u8,
     pub(super) at: Option<Instant>,
 }
 
-/// What is believed before anything is found.
+/// Initial estimate: the interference of the mission.
 const AS_LOADED: Told = Told {
     number: 0,
     belief: Belief::Mission,
@@ -397,7 +399,7 @@ impl Sensing {
         ears.first_mut()
     }
 
-    /// A new view: the leader tells what it believes before anything is agreed on.
+    /// Starts a new view: the leader distributes its estimate before the first agreement.
     pub(super) const fn renew(&mut self) {
         if let Some(ear) = self.ear_mut() {
             ear.has_told = false;
@@ -406,12 +408,12 @@ impl Sensing {
         }
     }
 
-    /// Another mission is flown.
+    /// Loads another mission, and uses its interference.
     pub(super) const fn load(&mut self) {
         if let Some(ear) = self.ear_mut() {
             ear.told.belief = Belief::Mission;
             ear.told.number = ear.told.number.wrapping_add(1);
-            // The ends may stand elsewhere.
+            // Its ground ends may be at other places.
             ear.transmitter = Average::NONE;
             ear.receiver = Average::NONE;
             ear.known = Knowledge::NOTHING;
@@ -424,13 +426,12 @@ impl Sensing {
         self.ear()?.at
     }
 
-    /// Whether its time has come; once.
+    /// Returns true once when the timer has expired.
     pub(super) fn take_due(&mut self, now: Instant) -> bool {
         self.ear_mut()
             .is_some_and(|ear| ear.at.take_if(|at| *at <= now).is_some())
     }
 
-    /// What it believes.
     pub(crate) const fn told(&self) -> Told {
         match self.ear() {
             Some(ear) => ear.told,
@@ -438,7 +439,7 @@ impl Sensing {
         }
     }
 
-    /// At the leader: why nothing was made of what was heard last.
+    /// Returns the reason why the last sums gave no estimate; leader only.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.ear() {
             Some(ear) => ear.unfit,
@@ -446,7 +447,7 @@ impl Sensing {
         }
     }
 
-    /// What the end at `side` has told this relay, W; `None` before it has.
+    /// Returns the level that the ground end at `side` has reported, W; `None` without a report.
     pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
         let ear = self.ear()?;
         let level_w = match side {
@@ -456,7 +457,6 @@ impl Sensing {
         (level_w > 0.0).then_some(level_w)
     }
 
-    /// What has come of it so far.
     pub(super) fn found(&self) -> Findings {
         Findings {
             told: self.told(),
@@ -467,7 +467,6 @@ impl Sensing {
         }
     }
 
-    /// One measurement; whether it was of use.
     pub(super) fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         self.ear_mut()
             .is_some_and(|ear| ear.take(now, member, sample))
@@ -475,7 +474,7 @@ impl Sensing {
 }
 
 impl Ear {
-    /// What an end hears of which this is the average.
+    /// Returns the level of a ground end from its `average`, with its weight faded to `now`.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -484,10 +483,9 @@ impl Ear {
         }
     }
 
-    /// One measurement; whether it was of use.
     fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         let noise_w = member.mission.config().noise_w;
-        // What is left above the receiver's own noise.
+        // Subtracts the receiver's noise; `None` if the rest is out of range.
         let heard = |power_w: f32| {
             let heard_w = power_w - noise_w;
             is_level(heard_w).then_some(heard_w)
@@ -520,31 +518,30 @@ impl Ear {
     }
 }
 
-/// A pass on which relays add up what they hear, as one of them sees it.
+/// State of a sensing pass at one relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// What came from the relay before.
+    /// Sums received from the previous relay.
     pub(super) from: Sums,
-    /// Its own share.
     pub(super) own: Sums,
-    /// Whether places were agreed on by what is believed.
+    /// True if the positions in use were agreed on with this estimate.
     pub(super) holds: bool,
 }
 
-/// What has come of listening so far.
+/// Results of sensing, of which changes are reported.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Findings {
     pub(super) told: Told,
     pub(super) unfit: Option<Unfit>,
-    /// Who hears something else than all the others, as of the last pass.
+    /// Node whose measurements do not fit, as of the last pass; 0 for none.
     pub(super) off: u16,
     pub(super) ends: EndsOff,
     pub(super) deaf: bool,
 }
 
 impl Findings {
-    /// The node whose measurements are off, and were not `before`, as node `own` of `all` sees it; the ends of the line are 0 and `all` + 1.
+    /// Returns the node found faulty since `before`; 0 is the transmitter, `all` + 1 the receiver.
     pub(super) fn newly_off(&self, before: &Self, own: u16, all: u16) -> Option<u16> {
         if self.off != before.off && self.off != 0 {
             return Some(self.off);
@@ -559,7 +556,7 @@ impl Findings {
     }
 }
 
-/// Takes what an end hears, if that is anything above the noise; whether it is.
+/// Adds a measurement of a ground end to `average`; returns false if it is not above the noise.
 fn take_level(
     average: &mut Average,
     now: Instant,
@@ -572,7 +569,7 @@ fn take_level(
     heard_w.is_some()
 }
 
-/// Whether what is heard there says anything of the line: within so many times its length of Tx in each coordinate.
+/// Returns true if a measurement at `at` is within [`FARTHEST`] times D of Tx in each coordinate.
 fn is_near(at: Placement, distance_m: f32) -> bool {
     let far_m = FARTHEST * distance_m;
     [at.x_m, at.y_m, at.altitude_m]

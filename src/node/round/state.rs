@@ -1,86 +1,84 @@
-//! The state table of a pass and what comes back of it: one for every algorithm.
+//! State table of a pass and of its result, for all algorithms.
 //!
-//! Every algorithm is made of passes: the leader (relay 1, in a field relay N) begins one, each relay works out its share
-//! and hands it *onward*, the last one knows what came of it, and that travels *back* through all of them.
+//! An algorithm is a sequence of passes. The leader (relay 1, in a field relay N) starts a pass; each relay computes its part and
+//! forwards it *onward*. The last relay knows the result, which travels *back* through all relays.
 //!
-//! | phase | a new pass comes | the same pass again | what came of it comes | work is due |
+//! | phase | new pass received | duplicate received | result received | work due |
 //! | --- | --- | --- | --- | --- |
-//! | `Idle` | share, hand on: `Waiting` | - | stale | - |
-//! | `Planning` (leader) | - | - | stale | compute on; then begin a pass: `Waiting` |
-//! | `Waiting` | share, hand on | say busy | agreement: take the place, hand back, `Holding`; else hand back, `Answered` | go on with the share, then hand on |
-//! | `Answered` | share, hand on: `Waiting` | hand back again | stale | (leader) begin a pass: `Waiting` |
-//! | `Holding` | share, hand on: `Waiting` | hand back again | stale | - |
-//! | `Infeasible` (leader) | - | - | stale | - |
+//! | `Idle` | compute, forward; `Waiting` | - | ignore as stale | - |
+//! | `Planning` (leader) | - | - | ignore as stale | compute; then start a pass; `Waiting` |
+//! | `Waiting` | compute, forward | reply that it is in progress | agreement: set the setpoint, reply; `Holding`. Else reply; `Answered` | continue, then forward |
+//! | `Answered` | compute, forward; `Waiting` | reply again | ignore as stale | leader: start a pass; `Waiting` |
+//! | `Holding` | compute, forward; `Waiting` | reply again | ignore as stale | - |
+//! | `Infeasible` (leader) | - | - | ignore as stale | - |
 //!
-//! The last relay knows what came of it by itself and skips `Waiting`, but for the time its share takes. The leader has
-//! nobody to hand back to: without an agreement it has work to do. A pass whose number is just behind the current one is
-//! stale wherever it comes. Only an agreement, or a turn of Algorithm 2, moves the setpoint: a relay holds its place
-//! through everything else.
+//! The last relay is `Waiting` only while it computes its own part. The leader has no previous relay to reply to, and without an
+//! agreement it has work to do. A pass with a number just below the current one is stale in every phase. Only an agreement or a
+//! turn of Algorithm 2 changes the setpoint. In `Holding` and `Infeasible` the leader may still start a sensing pass.
 
 use crate::node::numbering::Stragglers;
 
-/// Where a relay is in the protocol.
+/// State of a relay in the protocol.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
-    /// No pass has come yet.
+    /// Idle: this relay has not received a pass yet.
     Idle,
-    /// The leader is computing what to begin with.
+    /// The leader computes its first targets.
     Planning,
-    /// A pass or a proposal is under way onward, and what came of it has not come back.
+    /// A pass or a proposal has been forwarded, and its result is not known yet.
     Waiting,
-    /// What came of the last pass was no agreement.
+    /// The last pass has completed without an agreement.
     Answered,
-    /// The chain has agreed; the relay holds its place.
+    /// The chain has agreed; the relay holds its position.
     Holding,
-    /// The leader has found that no target can be met. Every relay stays where it is.
+    /// The leader has found that no target is feasible. All relays keep their positions.
     Infeasible,
-    /// A new view is proposed, and the decision awaited: no pass goes on.
+    /// A new view is proposed; passes wait for its decision.
     ViewChange,
-    /// The leader of this part of the chain has found that too few relays can be reached: the part holds its places.
+    /// Missing quorum: too few relays are reachable, and this part of the chain holds its positions.
     NoQuorum,
 }
 
-/// What the node has to do now.
+/// Next action of the node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
-    /// Nothing at all.
     Nothing,
-    /// Count a message of a pass that is over.
+    /// Count a stale message.
     Stale,
-    /// Call `work` after a pause.
+    /// Discard pending messages; call `work` after a pause.
     Work,
-    /// Call `work` after a pause; what there is to say stays.
+    /// Call `work` after a pause; pending messages stay.
     Think,
-    /// Hand the pass onward, and again until something comes back.
+    /// Forward the pass, with retransmission.
     Forward,
     /// Reply to a duplicate.
     Repeat,
-    /// What came of the pass is known: hand it back.
+    /// Send the result to the previous relay.
     Answer {
-        /// Whether the chain has agreed with it.
+        /// True if the chain has agreed.
         agreed: bool,
     },
-    /// What came of the pass is known to the leader, which has no other one to begin.
+    /// Complete the pass at the leader, which has no next pass to start.
     Settled,
-    /// No target can be met.
+    /// Report that no target is feasible.
     Infeasible,
-    /// Ask for a new view: this pass cannot be taken part in.
+    /// Request a new view, because this pass cannot be joined.
     Foreign,
 }
 
-/// What a pass that has come in is to a relay.
+/// Classification of a received pass.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Of another incarnation of its leader, or one that comes after others which were missed.
+    /// Pass of a restarted leader, or one that follows missed passes.
     Foreign,
 }
 
 impl Arrival {
-    /// What to do about one that is not taken up.
+    /// Returns the action for a pass that is not new.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -91,25 +89,23 @@ impl Arrival {
     }
 }
 
-/// A pass that is this many numbers or fewer behind the current one is a straggler; one that is farther off, or ahead but not
-/// next, is of another incarnation of its leader, or the relay has missed something.
+/// Maximum distance behind the current number of a late pass. Other numbers except the next one are foreign.
 const STRAGGLERS: u16 = 32;
 
-/// The first pass that a leader begins has a number divisible by this, and no later one has.
+/// Divisor of a pass number: the first pass of a leader has a multiple of it, and no later pass has.
 const INCARNATION: u16 = 64;
 
-/// Which pass is under way, and how far.
+/// Phase and number of the current pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// Whether a pass has come since the relay was switched on, or since the view.
+    /// True once a pass was started or received in this view, or since the start.
     begun: bool,
     stragglers: Stragglers,
 }
 
 impl RoundState {
-    /// The leader's `number` is a random one.
     pub(crate) const fn new(phase: Phase, number: u16) -> Self {
         Self {
             phase,
@@ -127,32 +123,27 @@ impl RoundState {
         self.number
     }
 
-    /// The leader has to compute what to begin with.
     pub(crate) const fn plan(&mut self) {
         self.phase = Phase::Planning;
     }
 
-    /// A pass is under way onward.
     pub(crate) const fn wait(&mut self) {
         self.phase = Phase::Waiting;
     }
 
-    /// What came of the pass was no agreement, or there is no pass any more.
+    /// Sets the phase to `Answered`: the pass has completed without an agreement, or was given up.
     pub(crate) const fn answer(&mut self) {
         self.phase = Phase::Answered;
     }
 
-    /// The chain has agreed.
     pub(crate) const fn hold(&mut self) {
         self.phase = Phase::Holding;
     }
 
-    /// No target can be met.
     pub(crate) const fn give_up(&mut self) {
         self.phase = Phase::Infeasible;
     }
 
-    /// Nothing has come yet in a new view, in which this relay `leads` or not.
     pub(crate) const fn renew(&mut self, leads: bool) {
         if leads {
             self.plan();
@@ -163,18 +154,16 @@ impl RoundState {
         self.stragglers = Stragglers::NONE;
     }
 
-    /// The leader numbers its next pass.
+    /// Increments the number for a new pass of the leader.
     pub(crate) const fn begin(&mut self) {
         self.number = if self.begun {
             self.next()
         } else {
-            // The next one that is a first one.
             self.number.wrapping_add(INCARNATION) & !(INCARNATION - 1)
         };
         self.begun = true;
     }
 
-    /// The number of the pass that its leader begins after the current one.
     const fn next(self) -> u16 {
         let next = self.number.wrapping_add(1);
         if next.is_multiple_of(INCARNATION) {
@@ -184,17 +173,17 @@ impl RoundState {
         }
     }
 
-    /// A pass of `number` is under way.
+    /// Accepts a new pass with `number`.
     pub(crate) const fn take(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
         self.stragglers = Stragglers::NONE;
     }
 
-    /// What a pass of `number` is; `same` tells whether it is the current one in everything else.
+    /// Classifies a pass with `number`; `same` is true if its content equals that of the current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
-            // What it missed it cannot take part in: it can ask for another beginning.
+            // A relay that has missed the first pass cannot join later ones; it requests a new view.
             return if number.is_multiple_of(INCARNATION) {
                 Arrival::New
             } else {
@@ -210,7 +199,7 @@ impl RoundState {
         }
     }
 
-    /// One more pass that should be over.
+    /// Counts a late pass; too many in a row are foreign.
     const fn straggler(&mut self) -> Arrival {
         if self.stragglers.one_more() {
             Arrival::Foreign
@@ -219,23 +208,23 @@ impl RoundState {
         }
     }
 
-    /// Whether what came of pass `number` is awaited.
+    /// Returns true if the result of pass `number` is outstanding.
     pub(crate) fn awaits(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Whether what came of the pass of `before` has come since.
+    /// Returns true if the result of the pass of `before` has been received since.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number
     }
 
-    /// Whether the next pass has come since `before`, whose own had been answered.
+    /// Returns true if the next pass has been received since `before`, in which a reply was sent.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }
 
-    /// Whether something can be handed back.
+    /// Returns true if a result is available for a reply.
     pub(crate) fn is_answered(self) -> bool {
         matches!(self.phase, Phase::Answered | Phase::Holding)
     }
@@ -246,7 +235,7 @@ mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::numbering::SUSPICIOUS;
 
-    /// One that has taken part in pass 200.
+    /// Returns a state after pass 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
         state.take(200);
@@ -269,7 +258,7 @@ mod tests {
     #[test]
     fn the_next_pass_alone_is_new_and_those_beyond_are_foreign() {
         for last in [192, 200, 254, 255, u16::MAX - 1, u16::MAX] {
-            // The leader leaves first numbers out: after 255 comes 257.
+            // The leader skips first numbers: after 255 comes 257.
             let next = match last {
                 255 => 257,
                 u16::MAX => 1,

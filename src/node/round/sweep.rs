@@ -1,4 +1,4 @@
-//! A relay's share of a sweep (Algorithms 1 and 4), and of its verdict.
+//! Relay's part in a sweep of targets (Algorithms 1 and 4) and in its verdict.
 
 use super::computation::LeaderTask;
 use super::computation::{ADJUST, ALTITUDE, Computation, PassKind};
@@ -15,7 +15,7 @@ use crate::settings::Method;
 use crate::wire::message::{Answer, Sweep};
 
 impl Computation {
-    /// A sweep from the relay before.
+    /// Handles a sweep from the previous relay.
     pub(crate) fn on_sweep(&mut self, context: &Context<'_>, sweep: &Sweep) -> Action {
         let behind = Behind {
             relay: sweep.relay,
@@ -34,7 +34,7 @@ impl Computation {
             return Action::Stale;
         }
         if sweep.chosen && self.seats.is_partial(context.mission().relays()) {
-            // It was not there when the rest was told.
+            // This relay missed the pass with the profiles.
             return Action::Foreign;
         }
         self.state.take(sweep.number);
@@ -47,7 +47,7 @@ impl Computation {
         )
     }
 
-    /// Works out this relay's share of a sweep.
+    /// Starts this relay's part in a sweep. `from` are the reaches of the previous relay, m.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -69,11 +69,11 @@ impl Computation {
         self.go_on_with_sweep(context)
     }
 
-    /// Goes on with this relay's share of a sweep, as far as one call may.
+    /// Continues this relay's part in a sweep by one portion.
     pub(super) fn go_on_with_sweep(&mut self, context: &Context<'_>) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
-            // First it has to find out where it is to be.
+            // The relay first needs its joint solution.
             return Action::Work;
         }
         let link = self.link(context, is_chosen);
@@ -90,7 +90,7 @@ impl Computation {
         }
     }
 
-    /// A verdict from the relay after.
+    /// Handles a verdict from the next relay.
     pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &Answer) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
         let link = self.link(context, is_chosen);
@@ -103,7 +103,7 @@ impl Computation {
         Action::Stale
     }
 
-    /// The verdict on the current sweep is known.
+    /// Handles the known verdict: sets the setpoint if a target is committed, else continues the search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweeping) = &self.pass else {
             return Action::Stale;
@@ -111,7 +111,7 @@ impl Computation {
         if let Some((x_m, target)) = sweeping.agreed() {
             let chosen = sweeping.chosen;
             if let LeaderTask::Searching { search, given, .. } = &self.task {
-                // Of places that may be chosen otherwise it says nothing.
+                // A sweep at some cross-sections is no bound for chains with other ones.
                 let most = search.most(&sweeping.verdict.slacks);
                 self.bound = most.filter(|_| !chosen && !given);
             }
@@ -150,7 +150,7 @@ impl Computation {
         Action::Work
     }
 
-    /// The chain has agreed on a target. The leader may have more in mind.
+    /// Completes the agreement on a target, unless another algorithm of the leader follows.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
         self.state.hold();
         if let LeaderTask::Searching { last: false, .. } = self.task {
@@ -172,27 +172,27 @@ impl Computation {
     }
 }
 
-/// A sweep, as one relay sees it.
+/// State of a sweep at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Sweeping {
     pub(crate) ladder: Ladder,
-    /// What it came with, as [`fingerprint`] sums it up.
+    /// Checksum of the received sweep, see [`fingerprint`].
     pub(crate) fingerprint: u32,
-    /// Whether it is of relays where the joint method has them across the line.
+    /// True if relays use the joint method's cross-sections.
     pub(crate) chosen: bool,
-    /// Whether a relay after this one differs from what the mission says of all.
+    /// True if a relay after this one has a profile of its own.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// The reaches of the relay before.
+    /// Reaches of the previous relay, m.
     from: PerTarget,
-    /// This relay's reach for each target.
+    /// Reach of this relay for each target, m.
     pub(crate) reaches: PerTarget,
-    /// Whether these are all.
+    /// True once all reaches are computed.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// Where this relay goes by the verdict, m along x.
+    /// Position of this relay by the verdict, m along x.
     place: Option<f32>,
-    /// Where the relay before is to.
+    /// Required position of the previous relay, m; `None` for its own reach.
     stand: Option<f32>,
 }
 
@@ -216,7 +216,7 @@ impl Sweeping {
         }
     }
 
-    /// A sweep has come from the relay before, or begins.
+    /// Starts a sweep: `behind` and `from` are the previous relay and its reaches.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -228,7 +228,7 @@ impl Sweeping {
         self.stand = None;
     }
 
-    /// Works out this relay's reaches, as many as one call may, and whether that is all; at the last relay, the verdict too.
+    /// Computes a portion of the reaches, and at the last relay the verdict; returns true when all are computed.
     ///
     /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&mut self, link: Link<'_>) -> bool {
@@ -245,7 +245,7 @@ impl Sweeping {
         self.done
     }
 
-    /// Takes a verdict that has come back, if it fits: what is committed must be met, by a target this relay has a place for.
+    /// Accepts a verdict if its committed target is met and this relay can take a position for it.
     pub(crate) fn take(&mut self, link: Link<'_>, answer: &Answer) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
@@ -272,7 +272,7 @@ impl Sweeping {
         true
     }
 
-    /// Goes to `place` by the verdict, if from there the relay before can be told where to be; else nothing is committed.
+    /// Sets this relay's position by the verdict; revokes the commit if the previous relay then has none.
     fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
         let Some(commit) = self.verdict.commit else {
             return;
@@ -294,7 +294,7 @@ impl Sweeping {
         }
     }
 
-    /// The target that is committed, and this relay's reach for it.
+    /// Returns the committed target and this relay's reach for it, m.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((
@@ -303,17 +303,15 @@ impl Sweeping {
         ))
     }
 
-    /// The place that this relay takes by the verdict, m along x, and the target it is for.
+    /// Returns this relay's agreed position, m along x, and the committed target.
     pub(crate) fn agreed(&self) -> Option<(f32, f32)> {
         Some((self.place?, self.committed()?.0))
     }
 
-    /// Where the relay before is to stand; `None` at its reach.
     pub(crate) const fn stand(&self) -> Option<f32> {
         self.stand
     }
 
-    /// Whether all of its share has been worked out.
     pub(crate) const fn is_done(&self) -> bool {
         self.done
     }
@@ -327,7 +325,7 @@ impl Sweeping {
     }
 }
 
-/// What the relay before says of itself, summed up: it says the same whenever it says the same pass, unless it was rebooted.
+/// Returns a checksum of the previous relay's sweep data, equal in duplicates unless it has restarted.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let held = behind.map_or([0.0; 3], |behind| {
         let Station { at, power_w } = behind.relay;

@@ -1,4 +1,4 @@
-//! What of a round is a sign of life.
+//! Tests of rounds with three relays: proofs that a neighbour is alive, and outstanding messages.
 
 extern crate std;
 
@@ -18,7 +18,7 @@ use std::vec::Vec;
 
 const RELAYS: u16 = 3;
 
-/// Three relays in a line that try one target a sweep, and a clock that runs on with each step.
+/// Chain of three relays with one target per sweep, and a clock that advances by 1 ms per step.
 struct Line {
     members: [Member; RELAYS as usize],
     rounds: [Round; RELAYS as usize],
@@ -85,7 +85,7 @@ impl Line {
     }
 }
 
-/// Has all relays exchange what they have, in turn, until `ends`; returns the messages.
+/// Exchanges all messages until `ends` returns true; returns the messages.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {
@@ -107,7 +107,7 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     panic!("it does not end: {all:?}");
 }
 
-/// What came of a pass is known: the leader awaits no answer to it any more, so nothing tells it that frames get lost.
+/// After the result the leader awaits no reply, so no retransmission may be scheduled.
 #[test]
 #[cfg(feature = "sensing")]
 fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
@@ -125,7 +125,7 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
     assert_eq!(line.rounds[0].circulation.next_timeout(), None);
 }
 
-/// A relay that searches does not know its place yet, so it has no token to hand on, whoever its neighbour is.
+/// A relay that is still searching has no position to report, so it must not forward the token.
 #[test]
 #[cfg(feature = "adjust")]
 fn a_relay_that_still_searches_hands_on_no_token() {
@@ -150,7 +150,7 @@ fn heard(effects: Effects) -> [Option<Instant>; 2] {
 #[test]
 fn an_answer_counts_from_when_what_it_answers_was_said_and_nothing_that_comes_again_counts() {
     let mut line = Line::new();
-    // When relay 2 handed back what came of the last sweep.
+    // Time at which relay 2 sent the result of the last sweep.
     let mut handed_back = None;
     let (mut old_sweep, mut old_verdict) = (None, None);
     for sweep in 0..5 {
@@ -169,7 +169,7 @@ fn an_answer_counts_from_when_what_it_answers_was_said_and_nothing_that_comes_ag
         }
         let on = line.onward(1);
         line.hear(2, &on);
-        // It is said once more. Which of the two is answered is not known: the first one counts.
+        // A retransmission: a reply counts from the first transmission, as it does not show which one it answers.
         line.step(1, |round, _| round.resend());
         line.onward(1);
         let verdict = line.back(2);

@@ -1,9 +1,8 @@
-//! A relay's turn in Algorithm 2, and what comes back of the turns after its own.
+//! Relay's turn in Algorithm 2, and the result of the turns after it.
 //!
-//! A token goes from relay to relay; whoever has it looks for a better place and tells both neighbours.
-//!
-//! The token brings the place of the relay before, what comes back brings that of the relay after: the first pass is for
-//! looking alone. On the way back the worst SIR is gathered, so that the leader knows that of the chain after every round.
+//! The relay that has the token searches for a better position, and reports its own to the next relay with the token and to the
+//! previous one with the result. In the first pass no relay moves, so that all learn their neighbours' positions. The result also
+//! collects the worst SIR, which the leader needs after every round.
 
 use super::computation::LeaderTask;
 use super::computation::{Computation, PLACES_AT_ONCE, PassKind};
@@ -17,7 +16,7 @@ use crate::wire::message::{AdjustStep, Moved, Token};
 use core::task::Poll;
 
 impl Computation {
-    /// The token, from the relay before.
+    /// Handles the token from the previous relay.
     pub(crate) fn on_token(&mut self, context: &Context<'_>, token: &Token) -> Action {
         let same = matches!(&self.pass, PassKind::Turn(turning) if turning.turn == token.turn);
         let arrival = self.state.arrival(token.number, same);
@@ -25,11 +24,11 @@ impl Computation {
             return next;
         }
         if self.setpoint.is_none() {
-            // It has none to tell: it was not there when the places were agreed on.
+            // This relay missed the agreement on positions, so it has none to report.
             return Action::Foreign;
         }
         if context.mission().interferer().is_none() || !context.is_between(token.place) {
-            // Nobody stands beyond Rx.
+            // No relay is beyond Tx or Rx.
             return Action::Stale;
         }
         self.state.take(token.number);
@@ -41,7 +40,7 @@ impl Computation {
         self.take_turn(context, Turning::new(token.turn, token.sir, before, gain))
     }
 
-    /// The token is here.
+    /// Starts this relay's turn.
     pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turning: Turning) -> Action {
         self.state.wait();
         let mut searching = false;
@@ -66,7 +65,7 @@ impl Computation {
         }
     }
 
-    /// Weighs some more places.
+    /// Continues the search of this relay's turn by one portion.
     pub(super) fn go_on_with_turn(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Turn(turning) = &mut self.pass else {
             return Action::Stale;
@@ -88,7 +87,7 @@ impl Computation {
         self.conclude_turn(context, f32::MAX)
     }
 
-    /// What a turn came to, from the relay after.
+    /// Handles the result of a turn from the next relay.
     pub(crate) fn on_moved(&mut self, context: &Context<'_>, moved: &Moved) -> Action {
         if let PassKind::Turn(turning) = &mut self.pass
             && !turning.is_searching()
@@ -102,7 +101,7 @@ impl Computation {
         Action::Stale
     }
 
-    /// What the current turn came to is known; `worst` is the worst SIR beyond the next hop.
+    /// Completes the current turn; `worst` is the worst SIR beyond the next hop.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turning), Some(at), Some(interferer)) = (
             &mut self.pass,
@@ -138,17 +137,17 @@ impl Computation {
     }
 }
 
-/// A token, as one relay sees it.
+/// State of the token at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct Turning {
-    /// What this pass is for, and the SIR of the chain before it.
+    /// Action of this pass, and the SIR of the chain before it.
     pub(crate) turn: AdjustStep,
     pub(crate) sir: f32,
-    /// The node before this relay, and what its power is worth.
+    /// Node before this relay, and its gain.
     pub(crate) before: HopEnd,
     pub(crate) gain_in: PowerRatio,
     search: Option<LocalSearch>,
-    /// Whether this relay or one after it has moved; the worst SIR from here on.
+    /// True if this relay or one after it has moved; the worst SIR from this relay on.
     pub(crate) any: bool,
     pub(crate) worst: f32,
 }
@@ -171,7 +170,7 @@ impl Turning {
         }
     }
 
-    /// The hops of a relay of `power_w` watts, with its neighbour toward Rx at `after`; `None` for relay N.
+    /// Returns the hops of a relay of `power_w` watts; `after` is its neighbour toward Rx, `None` for relay N.
     pub(crate) fn hops(
         &self,
         mission: &Mission,
@@ -193,7 +192,7 @@ impl Turning {
         )
     }
 
-    /// Begins to look for a better place than `at`, within `band`, m; whether this turn is one to move.
+    /// Starts a search around `at` within the altitudes `band`, m; returns false if this pass moves no relay.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -201,7 +200,7 @@ impl Turning {
         self.search.is_some()
     }
 
-    /// Looks on, for at most `budget` evaluations and a row: ready when it is over, with the better place.
+    /// Continues the search by at most `budget` evaluations and a row; ready with the better position, if any.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);
@@ -214,7 +213,6 @@ impl Turning {
         Poll::Ready(found)
     }
 
-    /// Whether the search is still on.
     pub(crate) const fn is_searching(&self) -> bool {
         self.search.is_some()
     }

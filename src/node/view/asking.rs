@@ -1,24 +1,24 @@
-//! When a relay asks for a new view: at once at first, then less and less often.
+//! Timing of view requests: at once at first, then less and less often.
 
 use crate::jitter::Jitter;
 use crate::node::timing::PAUSE;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Whether this relay asks for a new view, and when it asks next.
+/// State of this relay's view request, and the time of the next one.
 #[derive(Clone, Debug)]
 pub(crate) struct Asking {
     asks: bool,
-    /// How often it has since.
+    /// Number of requests so far.
     tries: u8,
     at: Option<Instant>,
-    /// After a refusal: how often in a row, and when to ask again as soon as anything is new.
+    /// Consecutive refusals, and the earliest time of the next request if anything changes.
     refusals: u8,
     soon: Option<Instant>,
     jitter: Jitter,
 }
 
-/// Doublings of the wait after one refusal after the other.
+/// Maximum doublings of the wait after consecutive refusals.
 const DOUBLINGS: u8 = 3;
 
 impl Asking {
@@ -33,12 +33,11 @@ impl Asking {
         }
     }
 
-    /// Whether this relay asks for a new view.
     pub(crate) const fn asks(&self) -> bool {
         self.asks
     }
 
-    /// Asks for a new view, from now on until it comes.
+    /// Requests a view until it comes. After a refusal, a change shortens the wait.
     pub(crate) fn ask(&mut self, now: Instant) {
         if !self.asks {
             self.ask_anew(now);
@@ -49,7 +48,7 @@ impl Asking {
         }
     }
 
-    /// The same at once, however often it has asked in vain: something new has come to be known.
+    /// Requests a view at once and resets all waits, because new information is available.
     #[inline(never)] // called from many places
     pub(crate) fn ask_anew(&mut self, now: Instant) {
         self.asks = true;
@@ -59,14 +58,14 @@ impl Asking {
         self.at = Some(now + PAUSE);
     }
 
-    /// Something has come to be certain: if it asks, it asks anew at once.
+    /// Repeats a pending request at once, because the neighbours are now certain.
     pub(crate) fn hasten(&mut self, now: Instant) {
         if self.asks {
             self.ask_anew(now);
         }
     }
 
-    /// Asks after about `wait`, the more so the more often it was refused; after `wait` once anything is new.
+    /// Requests a view after about `wait`, doubled up to three times by consecutive refusals; after `wait` if anything changes.
     pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
         self.asks = true;
         let wait = self.jitter.spread(wait);
@@ -75,24 +74,24 @@ impl Asking {
         self.refusals = self.refusals.saturating_add(1);
     }
 
-    /// What was asked for has come.
+    /// Ends the request: a view has come.
     pub(super) const fn stop(&mut self) {
         self.asks = false;
         self.at = None;
         self.soon = None;
     }
 
-    /// The first pass should have come by `at`; if it has not, a view is asked for.
+    /// Expects the first pass by `at`; without it, a view is requested.
     pub(crate) const fn await_first(&mut self, at: Instant) {
         self.at = Some(at);
     }
 
-    /// Whether it is time to ask.
+    /// Returns true if the request timer has expired.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Whether it asks now that this is due; from now on it does where nothing has come since it was switched on (`fresh`).
+    /// Handles the expired timer; returns true if a request is due. `fresh`: nothing was received since start-up, so one is due.
     pub(super) fn take_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.asks {
@@ -107,7 +106,7 @@ impl Asking {
         true
     }
 
-    /// How long to wait before asking again: twice as long each time, up to `probe_after`.
+    /// Returns the wait until the next request, doubled each time, up to `probe_after`.
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(12));
         self.tries = self.tries.saturating_add(1);
@@ -118,7 +117,7 @@ impl Asking {
         self.at
     }
 
-    /// One that asks, and is due `at` that time.
+    /// Creates a pending request that is due at `at`.
     #[cfg(test)]
     pub(super) const fn due(at: Instant) -> Self {
         Self {

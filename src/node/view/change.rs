@@ -1,18 +1,17 @@
-//! The states of the view change on one relay: a proposal comes, is handed on, and is decided.
+//! View change at one relay: a proposal is received, forwarded and decided.
 //!
-//! A proposal travels as [`Circulation`] describes; what is particular to it:
+//! A proposal travels as [`Circulation`] describes, with these additions:
 //!
-//! | stage | newer proposal received | decision received | no neighbour after this relay, and not forwarded to any |
+//! | stage | newer proposal received | decision received | no neighbour after this relay, proposal not forwarded |
 //! | --- | --- | --- | --- |
 //! | `Idle` | vote, forward it: `Outstanding` | stale | - |
 //! | `Outstanding` | vote, forward it | reply with it: `Completed` | decide: `Completed` |
 //! | `Completed` | vote, forward it: `Outstanding` | stale | - |
 //!
-//! While a view is proposed no pass goes on. One that was refused leaves the places where they are; its leader proposes again after
-//! `probe_after` or later ([`Asking`]), and alone not before its own vote would suffice. A proposal that was handed on stays with the node that it was handed to: once another one, or nobody, is there, a
-//! later one is asked for.
-//!
-//! The proposal is sent onward and the decision back. What is due later is to send one of them again, or to ask for a view.
+//! No pass is forwarded while a proposal is outstanding. A refused proposal leaves the positions unchanged; its leader proposes
+//! again after `probe_after` or later ([`Asking`]), and a leader without neighbours only if its own vote would suffice. A
+//! proposal is bound to the node that it was forwarded to: if that neighbour is lost or replaced, this relay requests a later
+//! view.
 
 use super::asking::Asking;
 use super::electorate;
@@ -27,26 +26,26 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// How much later than all it has heard of before a relay takes a view to be on one hearing.
+/// Maximum advance of the latest known view by one message, in view numbers.
 const LEAP: u32 = 256;
 
-/// The view change, as one relay takes part in it.
+/// State of the view change at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
     /// `Outstanding` while the decision on a proposal is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
-    /// The latest view heard of.
+    /// Latest known view.
     pub(super) newest: ViewId,
     pub(crate) asking: Asking,
-    /// Whether the last decision was that too few are there.
+    /// True if the last decision was that there is no quorum.
     pub(super) refused: bool,
     pub(super) stragglers: Stragglers,
 }
 
 impl ViewChange {
-    /// Of a chain of so many relays, led by node `elder`.
+    /// Creates the state for a chain of `relays` relays whose initial leader is node `elder`.
     pub(crate) const fn new(relays: u16, elder: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, elder),
@@ -59,17 +58,18 @@ impl ViewChange {
         }
     }
 
-    /// What it has said, as a relay of the mission with digest `base`.
+    /// Returns the acceptor state to persist; `base` is the digest of the loaded mission.
     pub(crate) const fn record(&self, base: u16) -> ViewRecord {
         ViewRecord::new(base, self.electorate)
     }
 
-    /// Whether nothing was said or heard of a view since this relay was switched on.
+    /// Returns true until the first view-change message since start-up is sent or received.
     pub(crate) fn is_untouched(&self) -> bool {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
-    /// A relay that has just been switched on, `untouched` or not, has said what is in `record`. It asks for a view.
+    /// Restores the acceptor state of a relay that was just switched on, and requests a view. `untouched` is true if no other
+    /// layer has started. Returns an error if this relay has started, or has another mission.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -93,48 +93,47 @@ impl ViewChange {
         Ok(())
     }
 
-    /// The latest view heard of.
     pub(crate) const fn newest(&self) -> ViewId {
         self.newest
     }
 
-    /// Somebody knows that view. Toward one far ahead it goes step by step: a single one could be the last there can be, and
-    /// whoever was apart for long says it again and again.
+    /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message. One message could otherwise
+    /// use up all view numbers; a relay that was away for long repeats its view often enough.
     pub(crate) fn heard_of(&mut self, view: ViewId) {
         if view > self.newest {
             self.newest = self.newest.toward(view, LEAP);
         }
     }
 
-    /// What was agreed on in `view`, the one accepted last, has come: all have accepted it.
+    /// Records that all members have accepted `view`, if it is the last accepted one, because an agreement in it was received.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
         }
     }
 
-    /// The proposal whose decision is awaited.
+    /// Returns the outstanding proposal.
     pub(crate) fn awaited(&self) -> Option<Proposed> {
         self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
-    /// The last proposal that was taken part in.
+    /// Returns the last proposal that this relay has voted on.
     pub(crate) const fn proposed(&self) -> Option<Proposed> {
         self.proposed
     }
 
-    /// This relay's place from the leader on, from 1, and how many there are, as it was counted last.
+    /// Returns this relay's place from the leader, from 1, and the number of relays, as of the last proposal.
     pub(crate) fn counted(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.place, proposed.there.max(proposed.place)))
     }
 
-    /// Whether this relay is in a part of the chain that is too small.
+    /// Returns true while this relay's part of the chain has no quorum.
     pub(crate) const fn has_no_quorum(&self) -> bool {
         self.refused
     }
 
-    /// The relay that the proposal was handed on to is not there any more: what comes of it can not be known. A later one can be.
+    /// Requests a view later than `proposal`, whose decision cannot arrive because the next relay is lost.
     pub(super) fn abandon(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
@@ -144,22 +143,22 @@ impl ViewChange {
         self.asking.ask_anew(context.now);
     }
 
-    /// Gives up the proposal under way and asks for a view, as after a restart with the record.
+    /// Drops the outstanding proposal and requests a view, as after a restart with the record.
     pub(crate) fn leave(&mut self, now: Instant) {
         self.proposed = None;
         self.circulation.withdraw();
         self.asking.ask_anew(now);
     }
 
-    /// A proposal or a decision from the neighbour before or after, of a mission that this relay holds.
+    /// Handles a proposal or decision from a neighbour, for a mission that this relay holds.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
         match message {
-            // A chain has no more relays than its mission.
+            // A chain has at most the relays of its mission.
             Message::Proposal(proposal) if proposal.place < all => {
                 self.on_proposal(context, proposal)
             }
-            // What is decided on follows its base, and this relay has proposed nothing later.
+            // The decided view follows its base, and this relay has made no later proposal.
             Message::Decision(decision)
                 if decision.view.is_none_or(|view| {
                     let is_own = view.id.proposer() == context.member.node;
@@ -206,9 +205,9 @@ impl ViewChange {
                 ..effects
             };
         }
-        // Late, or from a leader that has missed something.
+        // The proposal is late, or its leader has missed a later one.
         if self.stragglers.one_more() {
-            // Whoever proposes has to take a later one.
+            // The proposer must use a later number.
             if let Some(later) = self.newest.next_by(context.member.node) {
                 self.heard_of(later);
             }
@@ -223,7 +222,7 @@ impl ViewChange {
         }
     }
 
-    /// A proposal has come through `place` relays before this one; `None` if a later one has.
+    /// Votes on a proposal that `place` relays have forwarded; `None` if this relay has promised a later one.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -234,7 +233,7 @@ impl ViewChange {
     ) -> Option<Effects> {
         let node = context.member.node;
         let poll = self.electorate.vote(node, view, told, context.held)?;
-        // However far ahead it is, this relay has had part in it.
+        // No limit on the advance here, because this relay has voted on the view.
         self.newest = self.newest.max(view);
         self.stragglers = Stragglers::NONE;
         self.proposed = Some(Proposed {
@@ -260,7 +259,7 @@ impl ViewChange {
         })
     }
 
-    /// The chain ends here: if a proposal has come so far, everybody is counted.
+    /// Decides the outstanding proposal: the chain ends here, so every reachable relay has voted.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.awaited() else {
             return Effects::NONE;
@@ -298,7 +297,7 @@ impl ViewChange {
         self.conclude(context, conclusion)
     }
 
-    /// Somebody may be back who could not be heard.
+    /// Schedules a proposal after a refusal, because unreachable relays may return.
     pub(super) fn wait_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.asking.ask_after_refusal(context.now, wait);
@@ -339,12 +338,12 @@ impl ViewChange {
         };
         let holds = [context.latest, context.member.active].contains(&proposed.mission_id);
         if !holds {
-            // A newer mission has taken its place since: the others come to hold that one, too.
+            // This relay has replaced the proposed mission by a newer one, which the other relays will receive.
             return Effects::FOREIGN;
         }
         let proposal = proposed.view;
         if !self.electorate.accept(proposal, base, decided) {
-            // It is the decision on a proposal of the same number by another node with the number of the proposer.
+            // Decision on a proposal with the same identifier, made by another node that uses the proposer's index.
             self.abandon(context, proposal);
             return Effects::STALE;
         }
@@ -355,7 +354,7 @@ impl ViewChange {
         proposed.lease_left = lease_left;
         let leads = proposed.place == 1;
         if leads && decided.is_some() {
-            // So have all the others.
+            // All other members have accepted it before.
             self.electorate.commit();
         }
         self.refused = decided.is_none();
@@ -363,7 +362,7 @@ impl ViewChange {
         self.circulation.complete(context.now, path);
         self.asking.stop();
         if leads && decided.is_none() {
-            // Who has heard of a newer view only now has a voice at once.
+            // Relays that have learned of a newer view by this decision can vote on the next proposal at once.
             if taught {
                 self.asking.ask_anew(context.now);
             } else {
@@ -386,12 +385,12 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// What could not be said to the neighbour after can be now.
+    /// Forwards the outstanding proposal again: the next relay has become reachable.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// Whether the proposal is to be sent onward, to node `to`; it is taken for sent then.
+    /// Returns the proposal to forward to node `to`, if one is pending, and marks it as sent.
     pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
         let proposal = self.awaited()?.view;
         if !self.circulation.poll_forward() {
@@ -413,7 +412,7 @@ impl ViewChange {
         }))
     }
 
-    /// What is to be sent back; it is taken for sent then.
+    /// Returns the reply to the proposal, if one is pending, and marks it as sent.
     pub(crate) fn take_back(&mut self) -> Option<Message> {
         let proposed = self.proposed?;
         Some(match self.circulation.poll_reply()? {
@@ -432,7 +431,7 @@ impl ViewChange {
         })
     }
 
-    /// A message is said to have arrived: whether it is the proposal.
+    /// Handles an "in progress" reply; returns true if message `number` is the outstanding proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .awaited()
@@ -446,7 +445,7 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// `leads` tells whether nobody is before this relay, `fresh` whether nothing has come to it since it was switched on.
+    /// Handles retransmission and view requests. `leads`: there is no neighbour toward the leader; `fresh`: nothing received yet.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -463,7 +462,7 @@ impl ViewChange {
         Effects { resent, ..effects }
     }
 
-    /// It has not come yet, or it is time to ask for a place in the chain.
+    /// Requests a view from the neighbour toward the leader, or proposes one if this relay leads.
     fn ask_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
         if !self.asking.take_due(context.now, fresh, settings) {
@@ -483,7 +482,7 @@ impl ViewChange {
         let Some(view) = next.filter(|_| !under_way) else {
             return Effects::NONE;
         };
-        // A number is spent where something may come of it.
+        // Without a chance of success no proposal is made, because each one uses up a view number.
         let Member { node, all, .. } = *context.member;
         let alone = self.refused && context.end && context.settings().quorum;
         if alone
@@ -510,34 +509,31 @@ impl ViewChange {
     }
 }
 
-/// A proposal, as one relay sees it.
+/// A proposal at one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
-    /// The new view.
     pub(crate) view: ViewId,
-    /// The mission that it is to fly.
+    /// Mission of the view.
     pub(crate) mission_id: MissionId,
-    /// This relay's place in it, from 1 at the leader.
+    /// Place of this relay on the proposal's path, from 1 at the leader.
     pub(crate) place: u16,
-    /// What it has gathered, this relay's voice included.
+    /// Poll including this relay's vote.
     pub(super) poll: Poll,
-    /// The one node that it was handed on to: were it handed to another one, too, two views could bear its name.
+    /// Node that the proposal was forwarded to. With a second one, two views with the same identifier would be possible.
     pub(super) handed_to: Option<u16>,
-    /// The view that the decision follows, once that is known.
+    /// View that the decision follows, once decided.
     pub(crate) base: View,
-    /// How many have taken part in it, once that is known.
+    /// Number of relays that the proposal has reached, once decided.
     pub(super) there: u16,
-    /// What was decided on, once that is known; `None` if too few are there.
+    /// Decided view; `None` before the decision and without a quorum.
     pub(super) decided: Option<View>,
     pub(super) lease_left: u16,
 }
 
-/// What came of a proposal.
+/// Decision on a proposal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conclusion {
-    /// How many have taken part.
     pub(super) there: u16,
-    /// The view that is followed.
     pub(super) base: View,
     pub(super) view: Option<View>,
     pub(super) lease_left: u16,

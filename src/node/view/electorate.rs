@@ -1,68 +1,72 @@
-//! Who may decide on the next view, and what keeps two parts of a chain from deciding on one each.
+//! Rules of voting on views: acceptor state, quorums, and the decision on a proposal.
 //!
-//! Every view has at most one successor. It is agreed on as a value is in Paxos (Lamport, "Paxos made simple", 2001), by the members of
-//! the view that it follows; the size of that electorate changes from view to view as in dynamic voting (Jajodia and Mutchler, 1990).
+//! Every view has at most one successor. It is chosen by Paxos (Lamport, "Paxos made simple", 2001) among the members of the view
+//! that it follows. This electorate changes from view to view as in dynamic voting (Jajodia and Mutchler, 1990).
 //!
-//! | step | on the way | what a relay does | kept |
+//! | message | direction | action of a relay | state |
 //! | --- | --- | --- | --- |
-//! | proposal | onward | promises to accept no earlier proposal, and says what it accepted before | `promised`, `voted` |
-//! | decision | back | accepts the view that was decided on, unless it has promised more since | `accepted` |
-//! | a pass of that view | onward | knows that all accepted it | `agreed` |
+//! | proposal | toward the last relay | promise to accept no earlier proposal; report the view accepted before | `promised`, `voted` |
+//! | decision | toward the leader | accept the decided view, unless a later proposal was promised | `accepted` |
+//! | pass of that view | toward the last relay | record that all members have accepted it | `agreed` |
 //!
-//! A decision names the view that it follows, also one that refuses: those before who did not know it had no voice, and have one next time.
+//! Every decision, also a refusal, names the view that it follows. Relays that did not know that view could not vote; they can
+//! vote on the next proposal.
 //!
-//! The last relay decides by what the proposal has gathered, the poll:
+//! The last relay decides by the poll in the proposal:
 //!
-//! | the poll of the newest view that anybody there knows to be agreed on | decision |
+//! | poll among the members of the newest view known to be agreed on | decision |
 //! | --- | --- |
-//! | all relays of the mission are there, members or not | a view of them all: nobody else could hold anything |
-//! | not more than half of its members, nor half with the one that proposed it | refused |
-//! | enough, and a member has accepted a successor that may have been agreed on | that one again, of the latest proposal; the leader proposes anew from there |
-//! | enough otherwise | a view of all that are there |
+//! | all relays of the mission have been polled, members or not | a view of all: no other relay can hold an agreement |
+//! | fewer than half of the members, or exactly half without the view's proposer | refused |
+//! | a quorum, and a member has accepted a successor that may have been agreed on | the successor with the latest proposal; the leader then proposes anew from it |
+//! | a quorum otherwise | a view of all polled relays |
 //!
-//! *Why there are no two.* Two decisions on the successor of one view have a member of it in common. The later proposal comes to that
-//! member after it has accepted the earlier decision, and is told of it; or before, and then the member accepts that decision no more, so that
-//! the leader who waits for it never hears that all have. A relay that was no member has no voice.
+//! # Safety
+//! Two decisions on the successor of one view have a member of that view in common. If the member accepts the earlier decision
+//! before the later proposal arrives, it reports that decision with its vote. Otherwise it has promised the later proposal and no
+//! longer accepts the earlier decision, so the earlier leader never learns that all members have accepted it. Only members vote.
 //!
-//! *Who is a member.* A proposal is handed on by each relay to one other alone, so it goes one way, and who has taken part in it is in the
-//! view that may come of it, whether or not it hears the decision. Of the proposals that it has heard no decision of a relay remembers
-//! [`VOTES`], the earliest and the latest. One that is in a view and has forgotten so is safe, and has no voice until the next one.
+//! # Membership
+//! Each relay forwards a proposal to only one other, so a proposal takes one route, and every relay that has voted on it is a
+//! member of the view that may result, whether or not it receives the decision. A relay remembers [`VOTES`] proposals without a
+//! known decision, the earliest and the latest. If it has forgotten its vote for a view it cannot vote in that view, but may in
+//! the next one; this is safe.
 //!
-//! *What it takes.* Who has been switched on without the [`ViewRecord`](crate::ViewRecord) that it left belongs to the chain as it was
-//! loaded, and to nothing that came after. So no promise holds that it gave: those who know of no view but the first must not be a
-//! quorum of that, those who have forgotten among them. In a chain of five, where three fly on, one that forgets is enough, with the two
-//! that were left behind: they decide beside the two of three that remember. One that forgets in the midst of a proposal may also hand the
-//! same one on another way.
+//! # Requirement
+//! A relay that restarts without its [`ViewRecord`](crate::ViewRecord) is a member of the initial view only, and its promises are
+//! lost. Therefore relays that know no later view, including those without their records, must not form a quorum of the initial
+//! view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it decides beside
+//! the two that remember. A relay that loses its record during a proposal may also forward the proposal on a second route.
 
 use crate::node::timing::tenths;
 use crate::time::Duration;
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// How many proposals of which it has not heard the decision a relay remembers.
+/// Number of proposals without a known decision that a relay remembers.
 pub(super) const VOTES: usize = 8;
 
-/// What one relay has said in the votes on views, and knows of them.
+/// Acceptor state of one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Electorate {
-    /// The newest view that it knows to be agreed on, and whether it is a member.
+    /// Newest view that is known to be agreed on, and true if this relay is a member of it.
     pub(super) agreed: View,
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// A view that it has accepted, and does not know to be agreed on.
+    /// Accepted view that is not known to be agreed on.
     pub(super) accepted: Option<Successor>,
-    /// Proposals that it has taken part in, and that may become views: then it is a member. The latest first.
+    /// Proposals voted on that may become views with this relay as a member, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// The node whose half of the chain as it was loaded is the larger.
+    /// Leader of the initial view; the half of the initial chain with this node counts as the larger one.
     pub(super) elder: u16,
 }
 
-/// For how long what was agreed on may be held elsewhere.
+/// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Held {
-    /// By members of its view that rely on this relay.
+    /// Longest lease of members of this relay's view that rely on this relay.
     pub(crate) lease_left: Duration,
-    /// By members of views before `view`; `None` as long as they may not have accepted that.
+    /// Accepted view, and the longest lease of members of earlier views; `None` if a member may not have accepted `view`.
     pub(crate) view: ViewId,
     pub(crate) rest: Option<Duration>,
 }
@@ -85,7 +89,7 @@ impl Held {
     }
 }
 
-/// What the last relay decides.
+/// Decision of the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Outcome {
     Refused,
@@ -93,7 +97,7 @@ pub(crate) enum Outcome {
 }
 
 impl Electorate {
-    /// Of a chain of so many relays, led by `elder`, that nothing has happened to.
+    /// Creates the initial state for a chain of `relays` relays whose initial leader is node `elder`.
     pub(crate) const fn new(relays: u16, elder: u16) -> Self {
         Self {
             agreed: View {
@@ -108,20 +112,19 @@ impl Electorate {
         }
     }
 
-    /// The largest proposal that it has taken part in.
+    /// Returns the latest proposal that this relay has promised.
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
     }
 
-    /// The newest view that it knows to be agreed on.
+    /// Returns the newest view that is known to be agreed on.
     #[cfg(test)]
     pub(crate) const fn agreed(&self) -> View {
         self.agreed
     }
 
-    /// Takes part in `proposal`, which has gathered `told` so far, if it has promised no later one; what is gathered with it.
-    ///
-    /// `held` is for how long what was agreed on may be held elsewhere, as far as this relay knows.
+    /// Votes on `proposal` and returns the poll with this vote; `None` if a later one, or this one, was promised before. `told`
+    /// is the poll so far (`None` at the proposer), `held` the remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -140,7 +143,7 @@ impl Electorate {
         }
         let newer = self.agreed.id > told.agreed.id;
         let before = if newer {
-            // Who has voted so far was no member, as far as it knows.
+            // Earlier voters were not members of the newer view, as far as they know.
             Poll::of(self.agreed)
         } else {
             told
@@ -158,7 +161,7 @@ impl Electorate {
             ..before
         };
         if self.member {
-            // No more than there are, whatever was told: nobody would read that.
+            // A poll with more votes than members would be rejected by its receivers.
             poll.votes = poll.votes.saturating_add(1).min(poll.agreed.relays);
             poll.proposer |= proposer == node;
             poll.lease_left = poll.lease_left.min(tenths(held.lease_left));
@@ -167,7 +170,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Whether `proposal` of relay `node` would be refused, were it alone of `all`. Nothing is said by asking.
+    /// Returns true if `proposal` of `node` would be refused with this relay's vote alone. Does not vote.
     pub(super) fn is_refused_alone(
         &self,
         node: u16,
@@ -180,8 +183,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all) == Outcome::Refused)
     }
 
-    /// It has taken part in `proposal`. Where there is no room for more the earliest ones stay: once some have accepted a view, the
-    /// later proposals that come to them bring that one again.
+    /// Records the vote on `proposal`. If the list is full, its earlier half is kept: once relays have accepted a view, later
+    /// proposals that reach them decide on that view again.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -191,7 +194,7 @@ impl Electorate {
         }
     }
 
-    /// `view` is known to be agreed on.
+    /// Records that `view` is agreed on.
     fn learn(&mut self, view: View) {
         self.member = self.voted.contains(&view.id);
         self.agreed = view;
@@ -199,7 +202,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Forgets that it has taken part in proposals that will be no views any more.
+    /// Removes votes on proposals that can no longer become views.
     fn forget(&mut self, over: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !over(**voted));
@@ -209,8 +212,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts what was decided on `proposal`, a view that follows `base` or none, unless this relay has promised more since; whether
-    /// it has.
+    /// Accepts the decision on `proposal`, unless a later one was promised; returns true if it was accepted. `view` is the
+    /// decided view, which follows `base`, or `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -222,34 +225,35 @@ impl Electorate {
             self.accepted = Some(Successor { proposal, view });
         }
         if view.is_none_or(|view| view.id != proposal) {
-            // Nothing new has come of it, and nothing will.
+            // The proposal itself can no longer become a view.
             self.forget(|voted| voted == proposal);
         }
         true
     }
 
-    /// What it has accepted last is known to be accepted by all.
+    /// Records that all members have accepted the view accepted last.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
             self.learn(accepted.view);
         }
     }
 
-    /// Whether it has accepted `view`, and does not know that all have.
+    /// Returns true if `view` is accepted and not known to be agreed on.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
             .is_some_and(|accepted| accepted.view.id == view)
     }
 }
 
-/// How long the places of a view that follows are not to be taken, in tenths of a second; `most` where nobody knows.
+/// Returns the time until positions of the next view may be used, in tenths of a second, at most `most`. An unknown time counts
+/// as `most`.
 pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
     poll.rest.max(lease_left).min(most)
 }
 
-/// The decision on `proposal`, which has come through `relays` of `all`, by the `poll` of them.
+/// Returns the decision on `proposal`, which has reached `relays` of `all` relays with this `poll`.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Outcome {
     let whole = View {
         id: proposal,
@@ -258,7 +262,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Ou
     if relays == all {
         return Outcome::View(whole);
     }
-    // Of two halves the one with the proposer is the larger.
+    // Of two equal halves, the one with the view's proposer counts as the larger.
     let there = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
     if there <= u32::from(poll.agreed.relays) {
         return Outcome::Refused;
@@ -269,13 +273,13 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Ou
 
 #[cfg(test)]
 impl Electorate {
-    /// As it was before there was an electorate: what is decided on is agreed on, and whoever is there has a voice.
+    /// Removes the quorum rule, for the model: every decision counts as agreed on, and every relay votes.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;
     }
 
-    /// Whether it has taken part in `proposal`, which may become a view.
+    /// Returns true if this relay has voted on `proposal`, which may become a view.
     pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
         self.voted.contains(&proposal)
     }

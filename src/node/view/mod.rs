@@ -1,34 +1,34 @@
-//! The view change: how the chain comes to a new view of who is in it.
+//! View change: agreement on the members of the chain.
 //!
-//! A *view* is the chain as it was agreed on last: how many relays there are, and the place of each. View 0 is the chain as the
-//! mission has it. Every pass bears its view in its digest, so none is taken up in another view. When a relay finds
-//! somebody else beside it than in its view, or gets a pass that it cannot take part in, it asks toward the leader for a new
-//! one, hop by hop, until it comes. The leader is whoever has nobody before it: it proposes the view, the proposal goes onward and
-//! counts who is there, and the decision travels back.
+//! A *view* is an agreed membership: the number of relays and the place of each. View 0 is the chain as configured in the
+//! mission. The digest of every pass includes the view, so a pass is ignored in any other view. A relay whose neighbours differ
+//! from its view, or that receives a pass it cannot take part in, requests a new view from its neighbour toward the leader, hop
+//! by hop, until a view comes. The leader, which has no such neighbour, proposes the view; the proposal is forwarded to the last
+//! relay and collects votes on the way, and the decision travels back.
 //!
-//! | what a relay finds | what it does |
+//! | event | action |
 //! | --- | --- |
-//! | another node beside it than agreed on, which has taken it, too; or nobody | asks for a view |
-//! | a pass of another view, of another incarnation of its leader, or one that comes after others which it missed | asks for a view |
-//! | no pass for a while after it was switched on | asks for a view |
-//! | a hello that asks, of a neighbour that knows as new a view, or has just been switched on | asks for a view |
-//! | a newer mission than the one it flies | asks for a view, which flies it if all hold it |
-//! | a proposal, when it is the last | decides, by the rules of [`electorate`] |
-//! | a pulse of its view, in which it has agreed on no place | asks for a view |
-//! | a decision on its proposal that follows an older view than it knows to be agreed on: another node has the proposer's number | asks for a later one |
-//! | it becomes active again after another node had its number | leaves the view, and asks for one |
-//! | the lease of its view has run out | asks for a view, less and less often |
-//! | a view was refused | asks for one after `probe_after` as soon as anything is new, else after up to eight times that; alone it asks itself first, and proposes where it would not be refused |
-//! | a view far ahead of all that it has heard of | takes in 256 numbers of the way to it on each hearing |
-//! | no quorum for three times `dead_after` | gives its links up and searches anew, on a shared channel |
+//! | neighbour differs from the view's and has selected this relay, too; or no neighbour | request a view |
+//! | pass received of another view, from a restarted leader, or after missed passes | request a view |
+//! | no pass for a while after start-up | request a view |
+//! | hello received that requests a view, from a neighbour whose latest view is as new, or that has just started | request a view |
+//! | mission received that is newer than the active one | request a view, which flies it if all members hold it |
+//! | proposal received by the last relay | decide, by the rules of [`electorate`] |
+//! | lease renewal received, but no position agreed on in this view | request a view |
+//! | decision received that follows an older view than the newest one known to be agreed on: another node uses the proposer's index | request a later view |
+//! | active again after another node used this relay's index | leave the view, request a view |
+//! | lease expired | request a view, less and less often |
+//! | view refused | request one after `probe_after` once anything has changed, else after up to eight times that; a relay that is alone proposes only if its own vote would suffice |
+//! | view number received that is far ahead of all known ones | advance the latest known view by at most 256 numbers per message |
+//! | no quorum for three times `dead_after` | on a shared channel: give up the links and search again |
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | [`change`] | the states of a proposal and of the decision on it, what is sent of it, and what is due |
-//! | [`asking`] | when this relay asks for a view |
-//! | [`electorate`] | who may decide, and what a relay has said in the votes |
-//! | [`record`] | that, as it is stored |
-//! | `model` | a test: all that can happen to a chain of three or four |
+//! | [`change`] | states of a proposal and its decision, their messages and timers |
+//! | [`asking`] | timing of view requests |
+//! | [`electorate`] | rules of voting and acceptor state |
+//! | [`record`] | persistent acceptor state |
+//! | `model` | test: exhaustive search of the events in a chain of three or four |
 
 pub(crate) mod asking;
 pub(crate) mod change;

@@ -1,39 +1,40 @@
-//! What a relay has said in the votes on views, as it is stored: a promise that is forgotten is none.
+//! Persistent acceptor state: without it a restarted relay breaks its promises.
 
 use super::electorate::{Electorate, VOTES};
 use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::message::Successor;
 
-/// Of what is stored; another format has another number.
+/// Format number of the stored record.
 const FORMAT: u32 = 1;
 
-/// What has to survive a reboot, so that two parts of a chain never decide on one view each: what a relay has promised and accepted, and
-/// which view it knows to be agreed on.
+/// Acceptor state that must survive a reboot in flight.
 ///
-/// | step | a firmware |
+/// Without it a restarted relay could vote twice, and two parts of a chain could each decide on a view.
+///
+/// | event | action of the firmware |
 /// | --- | --- |
-/// | after every input, before `Relay::poll_transmit` | compares `Relay::view_record` with what it has stored last, and stores it if it has changed |
-/// | the relay is switched on in flight | hands it to `Relay::resume_view` right after `Relay::new` |
-/// | the relay is switched on before another flight | forgets it |
+/// | after every input, before `Relay::poll_transmit` | store `Relay::view_record` if it differs from the stored record |
+/// | the relay is switched on in flight | pass the record to `Relay::resume_view` right after `Relay::new` |
+/// | the relay is switched on before another flight | delete the record |
 ///
-/// What is said to others must be stored before. It changes a few times in a view change, and never else.
+/// The record must be stored before the relay transmits. It changes a few times in a view change, and never otherwise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ViewRecord {
-    /// The digest of the mission that was loaded before flight.
+    /// Digest of the mission that was loaded before flight.
     base: u16,
-    /// Checked; whose half is the larger one is not part of it.
+    /// Checked acceptor state; its `elder` is not stored.
     electorate: Electorate,
 }
 
-/// Why a record was refused.
+/// Reason why a record was rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RecordError {
-    /// It is of a relay that was loaded with another mission.
+    /// The record belongs to a relay that was loaded with another mission.
     Base,
-    /// The relay has begun already.
+    /// The relay has already started.
     Begun,
 }
 
@@ -48,8 +49,8 @@ impl core::fmt::Display for RecordError {
 
 impl core::error::Error for RecordError {}
 
-/// Bytes in their order, as numbers of one, two or four, the lowest byte first. Two functions that are called for every number take
-/// a third of the flash that an iterator over all of them does.
+/// Writes numbers of one, two or four bytes, least significant byte first. Two functions that are called for every number need a
+/// third of the flash of an iterator over all bytes.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -69,7 +70,7 @@ impl RecordWriter<'_> {
     }
 }
 
-/// The same bytes, read.
+/// Reads the numbers that [`RecordWriter`] writes.
 #[derive(Debug)]
 struct Reader<'a>(core::slice::Iter<'a, u8>);
 
@@ -105,7 +106,7 @@ impl Reader<'_> {
 }
 
 impl ViewRecord {
-    /// Bytes of a record.
+    /// Length of a record, bytes.
     pub const LENGTH: usize = 25 + 4 * VOTES;
 
     pub(crate) const fn new(base: u16, electorate: Electorate) -> Self {
@@ -118,7 +119,7 @@ impl ViewRecord {
         }
     }
 
-    /// What was said, by a relay of the mission with digest `base` and `relays` relays, of which `elder` leads.
+    /// Returns the acceptor state, if the record is of the mission with digest `base` and `relays` relays. Node `elder` leads it.
     pub(super) fn electorate(&self, base: u16, relays: u16, elder: u16) -> Option<Electorate> {
         let Electorate { agreed, .. } = self.electorate;
         let fits = agreed.relays == relays || agreed.id > ViewId::LOADED && agreed.relays < relays;
@@ -128,7 +129,7 @@ impl ViewRecord {
         })
     }
 
-    /// As it is to be stored. There is no checksum in it.
+    /// Encodes the record for storage, without a checksum.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let said = &self.electorate;
         let accepted = said.accepted.unwrap_or(nothing_after(said.agreed));
@@ -148,7 +149,7 @@ impl ViewRecord {
         stored
     }
 
-    /// What was stored, if it is of this format and could have been said.
+    /// Decodes a stored record; `None` if its format or its content is invalid.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         if bytes.len() != Self::LENGTH {
             return None;
@@ -181,7 +182,7 @@ impl ViewRecord {
     }
 }
 
-/// What stands for a successor of `agreed` where none was accepted.
+/// Returns the encoding of "no successor of `agreed` accepted".
 const fn nothing_after(agreed: View) -> Successor {
     Successor {
         proposal: ViewId::LOADED,
@@ -189,7 +190,7 @@ const fn nothing_after(agreed: View) -> Successor {
     }
 }
 
-/// Whether a relay can have said that.
+/// Returns true if a relay can have reached this state.
 fn is_sound(kept: &Electorate) -> bool {
     let Electorate {
         agreed, promised, ..
@@ -229,7 +230,7 @@ mod tests {
         ViewId::from_bits(number << 10 | node)
     }
 
-    /// After a view that it has accepted, and two proposals that it has heard no more of.
+    /// Returns a state with an accepted view and two votes on proposals without a known decision.
     fn busy() -> Electorate {
         let mut electorate = Electorate::new(3, 1);
         let first = view(1, 1);
@@ -272,7 +273,7 @@ mod tests {
         assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
     }
 
-    /// Of every byte with every other value: what is taken is stored again as it was.
+    /// Tries every byte with every other value: a record that is accepted encodes to the same bytes.
     #[test]
     fn nothing_is_read_that_could_not_have_been_said() {
         let mut taken = 0;
@@ -337,7 +338,7 @@ mod tests {
             twice.resume_view(Instant::ZERO, &busy),
             Err(RecordError::Begun)
         );
-        // The leader of a chain begins by itself.
+        // A leader starts by itself.
         let mission = *relay(3).mission();
         let identity = Identity {
             network: 1,

@@ -1,97 +1,92 @@
-//! From iteration to iteration: how far the target is raised, which part of the step is taken, whom to believe.
+//! Step control of an ascent: the target's increase, the fraction of the step, and the trust region.
 //!
-//! A pass back gives the slack's slope by ln gamma and what the steps should gain. A pass forward tries them with the target that they
-//! should just allow. It is taken if the target at which the slack would be zero is higher than before; else a smaller part of the step
-//! is tried, and in the end a smaller region in which the derivatives are trusted.
+//! A backward pass gives the slack's derivative by ln gamma and the expected gain of the steps. A forward pass tries the steps
+//! with the target that they should just allow. The trial is accepted if its zero-slack target is higher than before. Otherwise a
+//! smaller fraction of the step is tried, and after the last one a smaller trust region.
 
 use super::outlook::Outlook;
 
-/// Parts of the step that are tried, one after the other.
+/// Fractions of the step, in the order in which they are tried.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// What is trusted at first, of a relay's distance from the interferer and of ln gamma.
+/// Initial trust region, relative to a relay's distance from the interferer, and in ln gamma.
 const TRUST: f32 = 0.5;
 
-/// Trust below which a step says little about what is to come.
+/// Trust region below which a step does not predict the result of the ascent.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust below which nothing is gained any more.
+/// Trust region below which the ascent ends.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Hops as long as D in all lose half of it for each e-fold of the target: less than that is a chain that does not feel it yet.
+/// Minimum slope of the slack by ln gamma, in units of D: hops of a total length D lose half of it per e-fold of the target.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// By how much the target is above the ceiling when a chain is probed again, in ln gamma, at first.
+/// Initial distance of the target above the ceiling for a repeated probe, in ln gamma.
 const EXCESS: f32 = 0.03;
 
-/// How much of the slack counts where it would outweigh a penalty, in parts of D: at first, and what is not made less.
+/// Initial and minimum limit of the slack that counts where it would outweigh a penalty, in units of D.
 const SPARE: f32 = 3e-3;
 const LEAST_SPARE: f32 = 4e-5;
 
-/// What slack that is missing is worth against such that is left over.
+/// Weight of negative slack relative to positive slack.
 const SHORT: f32 = 2.0;
 
-/// How close to the optimum is close enough, in ln gamma.
+/// Convergence tolerance, in ln gamma.
 const CLOSE: f32 = 3e-6;
 
-/// What a step has to promise, in ln gamma, where it is the last that is worth while.
+/// Expected gain below which an ascent ends, in ln gamma.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// What is so little to gain, in ln gamma, that where an ascent ends is known.
+/// Expected gain below which the ascent's result is predictable, in ln gamma.
 const FORESEEN: f32 = 1e-4;
 
-/// Iterations after which an ascent has come near its target, and the slack that is missing, in parts of D, where it will not.
+/// Iterations after which a negative slack below `ASTRAY`, in units of D, ends an ascent.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// The same where an ascent is over: less slack is made up for.
+/// Limit of the negative slack at the end of an ascent, in units of D: the judge makes up for less.
 const ASTRAY_AT_END: f32 = 0.1;
 
-/// Iterations after which what there is has to do.
 const ITERATIONS: u8 = 40;
 
-/// What to do next.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try this part of the step with this target, in ln gamma.
+    /// Try this fraction of the step with this target, in ln gamma.
     Try { share: f32, sigma: f32 },
-    /// Raise the target as far as the chain goes as it stands.
+    /// Raise the target as far as the unchanged chain allows.
     Raise,
-    /// Work out the steps anew.
+    /// Compute the steps again.
     Again,
-    /// It is over.
+    /// End the ascent.
     Over,
 }
 
-/// The state of an ascent.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// The target of the nominal chain, in ln gamma, and its slack, m.
+    /// Target of the nominal chain, in ln gamma, and its slack, m.
     pub(crate) sigma: f32,
     pub(crate) slack: f32,
-    /// The least target that may be tried.
     floor: f32,
-    /// The most that is tried before the chain is probed, in ln gamma, and by how much that is raised next.
+    /// Maximum target until the chain is probed, in ln gamma, and its next increase.
     limit: f32,
     excess: f32,
-    /// How much of the slack counts, in parts of D: less and less where it would outweigh a penalty.
+    /// Limit of the slack that counts, in units of D; it is reduced where slack would outweigh a penalty.
     spare: f32,
-    /// The nominal chain's penalty, m.
+    /// Penalty of the nominal chain, m.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// The slack's slope by ln gamma, m.
+    /// Derivative of the slack by ln gamma, m.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
     pub(crate) trust: f32,
-    /// Which of the shares is tried.
     share: u8,
     iterations: u8,
     idle: u8,
 }
 
 impl Ascent {
-    /// From a chain that has `slack` for the target `sigma`.
+    /// Creates an ascent of a chain that has `slack` for the target `sigma`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -112,7 +107,7 @@ impl Ascent {
         }
     }
 
-    /// The same, to be probed at `limit` first.
+    /// Returns the ascent with a first probe at `limit`.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -121,22 +116,21 @@ impl Ascent {
         }
     }
 
-    /// The highest target for now.
     pub(crate) const fn limit(&self) -> f32 {
         self.limit
     }
 
-    /// How much of the slack counts, m.
+    /// Returns the limit of the slack that counts, m.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would.
+    /// Returns true if [`tighten`](Self::tighten) would reduce the limit.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Whether less of the slack is to count from now on: where there is a penalty.
+    /// Reduces the limit of the slack that counts if there is a penalty; returns true if it did.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -145,7 +139,7 @@ impl Ascent {
         true
     }
 
-    /// The nominal chain's slack is that.
+    /// Continues with the slack of the nominal chain under the reduced limit.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -153,12 +147,12 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Whether there is no higher one for now.
+    /// Returns true if the nominal chain meets the current maximum target.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// The probe came to nothing: the chain has to have more to spare.
+    /// Raises the maximum target after a failed probe: the chain needs more spare slack.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -166,19 +160,18 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// A pass back begins.
     pub(crate) const fn look_back(&mut self) {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// A part of the chain has been looked through.
+    /// Adds the value function of a segment to the totals of the backward pass.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// The pass back has come to the leader.
+    /// Returns the next step after a complete backward pass.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -192,30 +185,30 @@ impl Ascent {
         if self.is_within(SETTLED) {
             return AscentStep::Over;
         }
-        // More than enough, and no use for it but a higher target.
+        // Slack that can only be used by a higher target.
         if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
             return AscentStep::Raise;
         }
         self.attempt()
     }
 
-    /// Whether neither the slack nor the step is worth more than `by`, in ln gamma.
+    /// Returns true if neither the slack nor the step is worth more than `by`, in ln gamma.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Whether it goes up a slope that leads nowhere: the target rises, and the chain does not follow.
+    /// Returns true if the ascent diverges: the target rises and the chain does not follow.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Whether a chain that is not improved any more may yet meet its target.
+    /// Returns true if a chain after its last step may still meet the target.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Whether it is about to end, as `turn` has it, no higher than `sigma`. Where there is a penalty nobody can tell.
+    /// Returns true if the ascent, with `turn` next, will end no higher than `sigma`; false if there is a penalty.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -226,7 +219,7 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// The target for each part of the step.
+    /// Returns the target for a fraction of the step.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -245,12 +238,12 @@ impl Ascent {
         }
     }
 
-    /// What a chain is worth that has `slack` for `sigma`: slack that is missing costs more than that which is left over gains.
+    /// Returns the value of a chain that has `slack` for `sigma`; negative slack has a higher weight than positive slack.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Whether a trial that has `slack` for `sigma` is better than the nominal chain.
+    /// Returns true if a trial that has `slack` for `sigma` is better than the nominal chain.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -259,7 +252,7 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// The current trial came to nothing: the next part, or less trust.
+    /// Returns the next step after a failed trial: the next fraction, or a smaller trust region.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -272,7 +265,7 @@ impl Ascent {
         turn
     }
 
-    /// The trial with `share` is the nominal chain from now on.
+    /// Makes the trial with `share` the nominal chain.
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -291,7 +284,7 @@ impl Ascent {
         }
     }
 
-    /// The target has been raised as far as the chain goes.
+    /// Continues after the target has been raised as far as the unchanged chain allows.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

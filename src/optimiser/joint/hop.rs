@@ -1,48 +1,48 @@
-//! How far a hop reaches when everything it depends on is moved a little: the reach with its first and second derivatives.
+//! Reach of a hop with its first and second derivatives.
 //!
-//! A hop leads from p to p', with c = gamma / A, the target against the sender's gain, and the interferer at m. Where it is as
-//! long as it may be,
+//! A hop leads from p to p', with c = gamma / A, the ratio of target and sender's gain, and the interferer at m. At its maximum
+//! length
 //!
 //! ```text
 //! 2 F = q(|p' - m|^2) - c |p' - p|^2 = 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
-//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2, w_3).
-//! With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, its derivatives by p' are F_i = q' v_i - c (p' - p)_i and
-//! F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; by p they are c (p' - p)_i and -c [i = j], by one of each c [i = j]. Without noise q' is 1 and
-//! q'' is 0: F is quadratic. Those of R follow by differentiating F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 =
-//! -q' v_1 + c (p' - p)_1:
+//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2,
+//! w_3). With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, the derivatives of F by p' are F_i = q' v_i - c (p' -
+//! p)_i and F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; those by p are c (p' - p)_i and -c [i = j], and the mixed ones c [i = j].
+//! Without noise q' is 1 and q'' is 0, so F is quadratic. Those of R follow by differentiating F(R(z), z) = 0 once and twice,
+//! with a = -dF/dp'_1 = -q' v_1 + c (p' - p)_1:
 //!
 //! ```text
 //! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + F_11 R_z R_z') / a
 //! ```
 //!
-//! and by ln gamma R = -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` holds the chains that come of
-//! these against an independent optimiser.
+//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares them with an independent
+//! optimiser.
 //!
 //! # Coordinates
 //!
-//! Where a hop may end is a surface, the outside of which hears too little. Along most of a chain x is a smooth function of y and h
-//! on it; where the chain climbs straight up, or steps straight aside, it is h or y that is one of the other two.
+//! The possible ends of a hop form a surface; beyond it the signal is too weak. Along most of a chain x is a smooth function of y
+//! and h on it; where the chain climbs vertically, or goes sideways, h or y is the dependent coordinate.
 //!
 //! # Noise
 //!
-//! With noise a hop is replaced by one without that equals it next to one distance from the interferer.
+//! With noise a hop is replaced by a noise-free hop that equals it near one distance from the interferer.
 //!
-//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t lies above it: q(s) <= (s + nu t^2) / w^2. By it
+//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t is above it: q(s) <= (s + nu t^2) / w^2. Hence
 //!
 //! ```text
 //! q(s) >= c l   =>   s + nu t^2 >= c w^2 l
 //! ```
 //!
-//! and the right side is a hop without noise for the target c' = c w^2, with nu t^2 to spare: what it reaches is a ball for c' > 1, and a
-//! coordinate of its end follows from the other two by a square root. The ball holds all that is met, and touches its surface where
-//! s = t; found there again, it is Newton's rule in s.
+//! and the right side is a noise-free hop for the target c' = c w^2 with the margin nu t^2. For c' > 1 its reach is a ball, and
+//! one coordinate of the end follows from the other two by a square root. The ball contains all valid ends, and touches their
+//! surface where s = t; iterating t is Newton's method in s.
 
 use crate::place::Placement;
 use crate::sir::square;
 
-/// A reach's derivatives, by where the hop begins, three coordinates, p, and by the two that are free of where it ends, w.
+/// Derivatives of a reach by the hop's start p (three coordinates) and by the two free coordinates w of its end.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -52,16 +52,16 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// By each of w, and p.
+    /// Mixed, by each of w and by p.
     pub(super) by_wp: [Triple; 2],
-    /// By the first of w twice, by both, by the second twice.
+    /// Second derivatives by w: first twice, mixed, second twice.
     pub(super) by_ww: [f32; 3],
-    /// By ln gamma, m.
+    /// Derivative by ln gamma, m.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// That of a hop that ends where it ends, whatever is moved.
+    /// Reach of a hop whose end does not depend on anything.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -71,10 +71,8 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Of the hop `from` - `to`, with the interferer at `source` and the coordinate first that follows. [`Reach::FIXED`] where none
-    /// does: at the very rim of what can be reached.
-    ///
-    /// `noise` is nu, 1/m^2.
+    /// Returns the derivatives for the hop `from` - `to`, with the dependent coordinate first in each triple. `noise` is nu,
+    /// 1/m^2. Returns [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -91,7 +89,7 @@ impl Reach {
         let [p, p1, p2] = by_p;
         let [w1, w2] = by_w;
         let k = q - c;
-        // F_11, and by the first with each of w, which are 0 without noise.
+        // F_11, and the mixed derivatives by the first coordinate and each of w, which are 0 without noise.
         let k1 = k + bent * square(away);
         let [f1, f2] = [bent * away * aside, bent * away * above];
         let by_x = |r: f32| (c * r + k1 * p * r) / a;
@@ -123,7 +121,7 @@ impl Reach {
     }
 }
 
-/// How much is heard of the interference s m^2 away, with noise: q'(s) and 2 q''(s).
+/// Derivatives q'(s) and 2 q''(s) of the inverse interference at s m^2 from the interferer, with noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -144,7 +142,6 @@ impl Bend {
     }
 }
 
-/// A coordinate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Coordinate {
     #[default]
@@ -153,11 +150,11 @@ pub(crate) enum Coordinate {
     H,
 }
 
-/// (x, y, h), or any three numbers of which each belongs to one coordinate.
+/// (x, y, h), or three numbers that each belong to one coordinate.
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
-    /// This coordinate first, then the other two in their order.
+    /// Returns this coordinate first, then the other two in their order.
     #[inline(never)] // called from many places
     pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
         match self {
@@ -167,7 +164,7 @@ impl Coordinate {
         }
     }
 
-    /// (x, y, h) again.
+    /// Inverts [`Coordinate::first`].
     #[inline(never)] // called from many places
     pub(crate) const fn back(self, [first, second, third]: Triple) -> Triple {
         match self {
@@ -177,12 +174,12 @@ impl Coordinate {
         }
     }
 
-    /// A symmetric matrix with this coordinate first.
+    /// Returns a symmetric matrix with this coordinate first.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.first_row(bend).map(|row| self.first(row))
     }
 
-    /// The matrix by (x, y, h) again.
+    /// Inverts [`Coordinate::first_of`].
     pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         let [a, b, c] = bend.map(|row| self.back(row));
         match self {
@@ -201,17 +198,15 @@ impl Coordinate {
     }
 }
 
-/// The coordinates of a place.
 pub(super) const fn triple(place: Placement) -> Triple {
     [place.x_m, place.y_m, place.altitude_m]
 }
 
-/// One place as seen from another.
 pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// A hop as a quadratic: s + spare >= c l.
+/// Hop as a quadratic: s + spare >= c l.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
@@ -222,12 +217,11 @@ pub(super) struct Tangent {
 }
 
 impl Tangent {
-    /// Without noise.
     pub(super) const fn free(c: f32, e: f32) -> Self {
         Self { c, e, spare: 0.0 }
     }
 
-    /// With noise of nu = `noise`, 1/m^2, at `s` m^2 from the interferer.
+    /// Returns the tangent for nu = `noise`, 1/m^2, at `s` m^2 from the interferer.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

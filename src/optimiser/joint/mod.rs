@@ -1,18 +1,19 @@
-//! Places, sides and altitudes together: the chain whose worst hop is as good as it can be, by differential dynamic programming.
+//! Joint optimum of x, y and altitude that maximises the worst SIR, by differential dynamic programming.
 //!
-//! For a target gamma every hop but the last is as long as it may be, and so each relay's place follows from that of the one before it
-//! and from two numbers that are to be chosen within its room: where it flies across the line. What is to be made as large as can be
-//! is the slack at the end, by how much the chain overshoots Rx; and gamma is raised until that is zero.
+//! For a target gamma every hop but the last has its maximum length. So each relay's position follows from that of the relay
+//! before it and from two free numbers within its room, its position across the line. The objective is the slack at the end, by
+//! which the chain overshoots Rx; gamma is raised until the slack is zero.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `hop` | how a hop's end moves with everything it depends on, with noise and without, and which coordinate of it follows from the other two |
-//! | `outlook` | what the rest of the chain is worth, as the relay before it sees it |
-//! | `policy` | a relay's step, and how it follows what changed before it |
-//! | `site`, `weigh` | one relay and the hop into it: one relay's worth of the pass forward, and of the pass back; the room of a relay across the line |
-//! | `ascent` | how far the target is raised, and what is taken of a step |
-//! | `starts` | where an ascent begins, and at which target |
-//! | [`solver`] | a whole chain without a message |
+//! | `hop` | the reach of a hop with its derivatives, with and without noise, and the choice of the dependent coordinate |
+//! | `outlook` | the value function: the slack as a quadratic in a relay's position |
+//! | `policy` | a relay's step, and its feedback on changes of the relay before it |
+//! | `site`, `weigh` | one relay and the hop to it: its part of the forward pass and of the backward pass; its room across the
+//! line |
+//! | `ascent` | step control: the increase of the target, and the accepted fraction of the step |
+//! | `starts` | initial chains and initial targets of the ascents |
+//! | [`solver`] | the solution of a whole chain without messages |
 
 mod ascent;
 mod hop;
@@ -26,5 +27,5 @@ mod weigh;
 pub use site::Room;
 pub use solver::{Seat, Solver};
 
-/// The most relays of a chain that relays solve by the joint method; without the feature `altitude` they solve none.
+/// Maximum number of relays of a chain for the joint method; 0 without the feature `altitude`.
 pub const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };

@@ -1,9 +1,8 @@
-//! What the rest of a chain is worth, as the relay before it sees it: a quadratic in where that relay is.
+//! Value function: the slack of the rest of a chain as a quadratic in the position of the relay before it.
 //!
-//! The slack, by how much the chain overshoots Rx for a target, is what all relays have in common to make as large as can be. Its
-//! first and second derivatives by a relay's place are all that the relays before it have to know of those after it: Bellman's
-//! principle, and with second derivatives differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard
-//! and Todorov 2014).
+//! The slack is the length by which the chain overshoots Rx for a target; all relays maximise it. Its first and second
+//! derivatives by a relay's position are all that the relays before need to know of those after (Bellman's principle). With the
+//! second, this is differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard and Todorov 2014).
 
 use super::hop::Reach;
 use super::hop::{Coordinate, Triple};
@@ -12,24 +11,24 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// The slack about a nominal chain, as a relay's place changes.
+/// Derivatives of the slack about a nominal chain by a relay's position.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// By x, y and h, m per m.
+    /// First derivatives by x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// By two of them, 1/m; symmetric.
+    /// Second derivatives by x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// By the logarithm of the target, m.
+    /// Derivative by the logarithm of the target, m.
     pub(crate) by_target: f32,
-    /// What the steps of all relays after it are expected to gain, m of slack: this, in proportion to their share of the step,
+    /// Expected gain of slack by the steps of all relays after it, m: the part proportional to the fraction of the step,
     pub(crate) linear: f32,
-    /// and this, in proportion to its square.
+    /// and the part proportional to the square of the fraction.
     pub(crate) square: f32,
 }
 
 impl Outlook {
-    /// The slack of a last relay at `at`, m, and its outlook, when Rx, `distance_m` from Tx, is heard as far as `reach_m`: how much farther
-    /// from Rx it could be. Beyond Rx along x is as good as right above it.
+    /// Returns the slack of a last relay at `at`, m, and its derivatives; the last hop is at most `reach_m` long. The slack is
+    /// the spare length of that hop. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -52,7 +51,7 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Takes off what a relay costs that is too near the interferer: half `weight` near^2, with the slopes of `near`.
+    /// Subtracts the penalty of a relay too close to the interferer: half `weight` near^2, with the slopes of `near`.
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -66,8 +65,8 @@ impl Outlook {
         }
     }
 
-    /// Becomes what the relay before sees of it through a hop, whose relay steps by the policy that is best within `low` to `high`, m
-    /// from where it is, by the two coordinates that do not follow.
+    /// Propagates the value function through a hop to the relay before, and returns the optimal policy. The step of the two free
+    /// coordinates is limited to `low` to `high`, m, relative to the current position.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -78,7 +77,7 @@ impl Outlook {
         let [vx, vy, vh] = axis.first(self.slope);
         let p = hop.by_p;
         let [rwy, rwh] = hop.by_w;
-        // The slack as a function of z: first derivatives by w, second ones by all.
+        // Derivatives of the slack as a function of z: first ones by w, second ones by all.
         let (gy, gh) = (vx * rwy + vy, vx * rwh + vh);
         let [(mp, [my, mh]), (yp, [ymy, ymh]), (hp, [_, hmh])] = axis
             .first_of(self.bend)
@@ -92,7 +91,7 @@ impl Outlook {
         let hh = hmh + mh * rwh + by_hh * vx;
         let policy = Policy::best([gy, gh], [yy, yh, hh], [ay, ah], low, high);
         let ([ky, kh], [fy, fh]) = (policy.step, policy.follow);
-        // And with w stepping as it does, by p alone.
+        // Derivatives by p alone, with w following the policy.
         let (py, ph) = (gy + yy * ky + yh * kh, gh + yh * ky + hh * kh);
         let mut slope = p.map(|r| vx * r);
         for ((((cell, ay), ah), fy), fh) in slope.iter_mut().zip(ay).zip(ah).zip(fy).zip(fh) {

@@ -1,27 +1,26 @@
-//! What a relay does in one iteration of the joint method: its step, and how it follows what changed before it.
+//! Policy of a relay in one iteration of the joint method: its step, and its feedback on changes before it.
 
 use super::hop::{Coordinate, Triple};
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// A relay's step, by the two coordinates that do not follow from the hop.
+/// Step of a relay in the two free coordinates of its hop.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
-    /// The coordinate that does.
     pub(super) axis: Coordinate,
-    /// Whether it is the larger one of the two that the hop allows.
+    /// True for the larger of the two values that the hop allows for the dependent coordinate.
     pub(super) rising: bool,
-    /// Where nothing before has changed, m.
+    /// Step without a change before, m.
     pub(super) step: [f32; 2],
-    /// And by the change in (x, y, h) of the relay before.
+    /// Feedback on a change in (x, y, h) of the relay before.
     pub(super) follow: [Triple; 2],
 }
 
-/// The least curvature that a step is divided by, relative to the largest: what is flatter is noise.
+/// Minimum curvature that a step is divided by, relative to the largest one; flatter directions are noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// The step within the box that gains most by a concave quadratic: `slope`, and `bend` (yy, yh, hh) turned concave.
+    /// Returns the step within the box that maximises the quadratic of `slope` and `bend` (yy, yh, hh), made concave.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -36,7 +35,7 @@ impl Policy {
         let free_y = uy > ly;
         let free_h = uh > lh;
         let cut = |v: f32, l: f32, u: f32| v.max(l).min(u);
-        // One coordinate alone, the other given.
+        // Optimum of one coordinate for a given value of the other.
         let along_y = |h: f32| cut(-(gy + yh * h) / yy, ly, uy);
         let along_h = |y: f32| cut(-(gh + yh * y) / hh, lh, uh);
         let det = yy * hh - yh * yh;
@@ -58,7 +57,7 @@ impl Policy {
                 };
             }
         }
-        // On the edges of the box.
+        // Optimum on the edges of the box.
         let value = |y: f32, h: f32| gy * y + gh * h + 0.5 * (yy * y * y + hh * h * h) + yh * y * h;
         let mut best = (f32::NEG_INFINITY, 0.0, 0.0);
         for (y, h) in [
@@ -92,7 +91,7 @@ impl Policy {
         }
     }
 
-    /// The change of the two coordinates for `share` of the step, when the place before has changed by `change`.
+    /// Returns the change of the free coordinates for `share` of the step, after a change of the relay before by `change`.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;
@@ -101,7 +100,7 @@ impl Policy {
     }
 }
 
-/// The symmetric matrix (yy, yh, hh) with each eigenvalue turned below zero.
+/// Returns the symmetric matrix (yy, yh, hh) with each eigenvalue made negative.
 fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     let (mean, half) = (0.5 * (yy + hh), 0.5 * (yy - hh));
     let root = sqrt(square(half) + square(yh));
@@ -121,7 +120,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// A [`Policy`] as it is kept for a while: how a step follows needs no more than three digits.
+/// Compressed [`Policy`]: feedback with three digits is sufficient.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct Brief {
     axis: Coordinate,
@@ -157,7 +156,6 @@ impl Brief {
     }
 }
 
-/// The upper half of an f32's bits, rounded.
 const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

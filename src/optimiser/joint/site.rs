@@ -1,7 +1,7 @@
-//! One relay of a chain under trial, with the hop into it: where it goes.
+//! Position of one relay of a trial chain, given the hop to it.
 //!
-//! Places across the line are kept in six bytes each, and limited by the room that a relay has there.
-//! The first and the last hop have a ceiling, and the last one a slack at Rx.
+//! Positions across the line are stored in six bytes each, and are limited to the relay's room. The first and the last hop have a
+//! ceiling, and the last one a slack at Rx.
 
 use super::hop::{Coordinate, Tangent, Triple, triple};
 use super::outlook::Outlook;
@@ -12,19 +12,19 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// How near the rim of what a hop reaches a relay goes, in squares.
+/// Maximum fraction of the squared reach that is used.
 const RIM: f32 = 0.999_99;
 
-/// The least separation is taken for that much larger, so that what is left missing is none.
+/// Factor on the minimum separation, so that a small violation remains above the required one.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// How often what is met is taken anew by its tangent.
+/// Iterations of the tangent for a hop with noise.
 const TANGENTS: u8 = 3;
 
-/// Halvings of a way that is not reached to its end.
+/// Bisection steps on a path whose end is out of reach.
 const HALVINGS: u8 = 12;
 
-/// A relay, as its place is chosen.
+/// Relay whose position is computed, with the hop to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
@@ -33,14 +33,12 @@ pub(crate) struct Site<'a> {
     pub(super) sender: Sender,
     pub(super) room: Room,
     pub(super) distance_m: f32,
-    /// The least distance to the sender, m.
     pub(super) apart_m: f32,
-    /// No hop meets more.
     pub(super) most: f32,
 }
 
 impl<'a> Site<'a> {
-    /// The relay that `sender` feeds and `room` is left to; `first` if that is Tx, from which it may stand as near as it likes.
+    /// Returns the relay that receives from `sender` and is limited to `room`; `first` if the sender is Tx.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -68,7 +66,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// The same as near to its sender as it likes, too.
+    /// Returns the same relay without a minimum distance to its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -76,8 +74,8 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// The place at `wanted`, or as far toward it as the hop goes, for `target`, with the sender at `from_m` along x; `None` where no
-    /// hop meets it. Beyond Rx nobody goes.
+    /// Returns the position at `wanted`, or as close to it as the hop reaches, for `target` and a sender at `from_m` along x.
+    /// `None` if no hop meets the target. x is at most that of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -88,7 +86,7 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// The end of the hop at `at` across the line.
+    /// Returns the end of the hop at `at` across the line.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -100,11 +98,9 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// `wanted`, or what of the room lies on the way there, from where a hop gets on best, and is reached without going back along x;
-    /// `None` where there is none.
-    ///
-    /// What a hop reaches for c > 1 is a ball: its middle is (p - m) / (c - 1) beyond the sender's place p, its radius sqrt(c) |p - m| /
-    /// (c - 1).
+    /// Returns `wanted`, or the reachable cross-section closest to it on the line from the best cross-section in the room.
+    /// Reachable means without a step back along x; `None` if nothing is. For c > 1 the reach of a hop is a ball: its centre is
+    /// (p - m) / (c - 1) from the sender's position p, its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -117,7 +113,7 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// The middle and the squared radius of what a hop reaches for c > 1 at `x_m` or beyond; with noise, as it is about `wanted`.
+    /// Returns centre and squared radius of the reach at `x_m` or beyond for c > 1; with noise, linearised near `wanted`.
     fn disk(
         &self,
         target: f32,
@@ -138,7 +134,7 @@ impl<'a> Site<'a> {
             let tangent = Tangent::new(self.noise, c, e, s);
             disk = self.disk_by(&tangent, from_m, x_m);
             let (middle, rim) = disk?;
-            // Where it ends toward what is wanted.
+            // End of the reach in the direction of `wanted`.
             let share = sqrt(rim / wanted.apart_squared(middle).max(1e-9)).min(1.0);
             let y = middle.y_m + share * (wanted.y_m - middle.y_m);
             let h = middle.altitude_m + share * (wanted.altitude_m - middle.altitude_m);
@@ -156,7 +152,7 @@ impl<'a> Site<'a> {
         let (m, from) = (self.interferer, self.sender.at);
         let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
         let squared = square(ahead) + square(aside) + square(above);
-        // By how much the middle is before that, or beyond Rx.
+        // Distance by which the centre is before `x_m`, or beyond Rx.
         let before = e * (x_m - from_m) + ahead;
         let beyond = -(e * (self.distance_m - from_m) + ahead);
         let off = before.max(beyond).max(0.0);
@@ -168,7 +164,7 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// The farthest that a hop gets on the way from where the sender is across the line to `wanted`, which it does not reach.
+    /// Returns the farthest reachable position on the path from the sender's cross-section to `wanted`, by bisection.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.at);
         let way = |share: f32| CrossSection {
@@ -189,7 +185,7 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Where the relay goes across the line for `share` of its `policy`, when the sender is at `from` instead of `change` before that.
+    /// Returns the cross-section for `share` of `policy`, with the sender at `from`, `change` from its nominal position.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -209,7 +205,7 @@ impl<'a> Site<'a> {
                     y_m: a,
                     altitude_m: b,
                 });
-                // What was right above Rx stays there.
+                // A relay right above Rx stays there.
                 let there = nominal.x_m >= self.distance_m;
                 let disk = || self.disk(target, from.x_m, self.distance_m, wanted);
                 match there.then(disk).flatten() {
@@ -248,7 +244,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// The coordinate that follows from the other two, `at`, by the hop `from` the sender.
+    /// Returns the dependent coordinate for the free coordinates `at`, by the hop `from` the sender.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -277,7 +273,7 @@ impl<'a> Site<'a> {
     }
 }
 
-/// The first coordinate, for the other two `at`, of where a hop ends that is met as `tangent` has it.
+/// Returns the first coordinate of the end of the hop `tangent` for the other two, `at`.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -303,7 +299,7 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// What lies on the way from `best` to `wanted` within a circle; `None` if nothing does.
+/// Returns the point within a circle that is closest to `wanted` on the line from `best`; `None` if there is none.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -325,22 +321,20 @@ fn toward(
     })
 }
 
-/// The largest code of three bytes.
 const LAST: f32 = 16_777_215.0;
 
-/// One relay's (y, h), each in three bytes as a part of its room.
+/// Cross-section (y, h) of one relay, each in three bytes as a fraction of its room.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
 impl Cell {
-    /// The cell nearest to `at` in `room`.
+    /// Returns the cell nearest to `at` in `room`.
     pub(super) fn of(at: CrossSection, room: Room) -> Self {
         let [a, b, c, _] = code(at.y_m, room.lateral).to_le_bytes();
         let [d, e, f, _] = code(at.altitude_m, room.band).to_le_bytes();
         Self([a, b, c, d, e, f])
     }
 
-    /// Where that is.
     pub(super) fn place(self, room: Room) -> CrossSection {
         let Self([a, b, c, d, e, f]) = self;
         CrossSection {
@@ -371,18 +365,18 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
     band.nearest(band.least_m + code * (band.span_m() / LAST))
 }
 
-/// Where a relay may fly across the line.
+/// Allowed region of a relay across the line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Distances to the side, m.
+    /// Lateral offsets, m.
     pub lateral: Band,
     /// Altitudes, m.
     pub band: Band,
 }
 
 impl Room {
-    /// All that the mission leaves.
+    /// Returns the room of the mission.
     pub const fn of(mission: &Mission) -> Self {
         let config = mission.config();
         Self {
@@ -391,7 +385,7 @@ impl Room {
         }
     }
 
-    /// The same for a relay that keeps to one altitude.
+    /// Returns the same room at a single altitude.
     pub const fn at_altitude(self, altitude_m: f32) -> Self {
         Self {
             band: Band::at(altitude_m),
@@ -399,7 +393,7 @@ impl Room {
         }
     }
 
-    /// What of it is nearest to `at`.
+    /// Returns the cross-section in the room that is nearest to `at`.
     #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
         CrossSection {
@@ -409,17 +403,16 @@ impl Room {
     }
 }
 
-/// What of a ceiling is aimed at.
+/// Fraction of a ceiling that is aimed at.
 const LITTLE: f32 = 0.999_97;
 
-/// Halvings of the way to where a first hop is best without noise.
+/// Bisection steps between Tx and the noise-free optimum of a first hop.
 const END_HALVINGS: u8 = 24;
 
-/// The most that a first hop into `room` meets, but for a little that leaves the relay its choice.
-///
-/// That is straight away from the interferer, t times as far from Tx. With U and B the squared distances along that line and across it,
-/// s = B + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t: so
-/// with noise it is best nearer to Tx, and there once.
+/// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice. The optimum is straight away
+/// from the interferer, at t times its distance from Tx. With U and B the squared distances along that line and across it, s = B
+/// + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with
+/// noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -454,7 +447,7 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// The most that the hop from a relay of `power_w` in `room` to Rx meets, but for a little.
+/// Returns the maximum SIR of the hop from a relay of `power_w` in `room` to Rx, less a margin.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -462,7 +455,7 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// The slack of a last relay of `power_w` in `room`, which is `at`, for `target`, and its outlook.
+/// Returns the slack at `target` of a last relay of `power_w` in `room` at `at`, and its derivatives.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,

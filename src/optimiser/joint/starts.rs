@@ -1,9 +1,9 @@
-//! Where an ascent begins: chains that pass the interferer low, in an arch over it, beside it on either hand, or beyond it.
+//! Initial chains of the ascents: they pass the interferer low, in an arch over it, on either side, or beyond it.
 //!
-//! The chain is a shortest way in a metric in which a metre near the interferer counts for more, and there is a locally shortest way on
-//! each side of it. Which of them is the best depends on the room, on the power and on the number of relays; each is tried.
+//! A chain is a shortest path in a metric that weights a metre by its proximity to the interferer, so there is a local optimum on
+//! each side of the interferer. The best one depends on the room, the power and the number of relays; all are tried.
 //!
-//! An ascent begins at the highest target that its chain meets without a change.
+//! An ascent starts at the highest target that its unchanged chain meets.
 
 use super::hop::{Triple, minus, triple};
 use super::site::Room;
@@ -12,28 +12,27 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// One of them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// A parabola over the line: so much to the side and upward in the middle, in halves of D.
+    /// Parabola over the line; `aside` and `up` are the offsets in the middle, in units of D / 2.
     Arch { aside: f32, up: f32 },
-    /// A spiral about the interferer: toward a place right above it or beside it, and from there to Rx.
+    /// Spiral about the interferer: toward a position right above or beside it, and from there to Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// An arch, with no least separation till the places are judged, by rules that let relays hold back.
+    /// Arch without a minimum separation until it is judged by the sweep's rules, which let relays hold back.
     Through { aside: f32, up: f32 },
-    /// An arch to the side, at altitudes that lead from one that a relay keeps to the next; before the first and after the last of them
-    /// `level`, or down to Tx and Rx.
+    /// Arch to the side, with altitudes interpolated between relays with a fixed altitude. Before the first and after the last of
+    /// them `level`, or down to Tx and Rx.
     Held { aside: f32, level: bool },
-    /// As far off the line as the room goes, one relay after the other in turn at its corner and a least separation aside from there:
-    /// for relays that have no room to stand in a row.
+    /// Relays at the outer corner of the room and one minimum separation beside it, alternately; for relays without room for a
+    /// row.
     Turns,
-    /// Low, from a target so high that no hop leaps to the far side of the interferer.
+    /// Low, from a target so high that no hop leaps over the interferer.
     Near,
-    /// Relay 1 right above Rx, as high or far aside as pays, the others on the way down from there.
+    /// Relay 1 right above Rx, at the best altitude or lateral offset, and the others on the way down from there.
     Far,
 }
 
-/// The shapes of arches: aside, up.
+/// Arches: aside, up.
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
@@ -44,10 +43,10 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// How many of them are tried with no least separation.
+/// Number of arches that are also tried without a minimum separation.
 const THROUGH: usize = 3;
 
-/// To the side, and whether level at the ends.
+/// Lateral offset, and true if level at the ends.
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -57,7 +56,7 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spirals: aside and up of the place they lead to first, and how far that is from the interferer, in parts of the geometric mean of
+/// Spirals: aside and up of the intermediate position, and its distance from the interferer, relative to the geometric mean of
 /// the distances of Tx and Rx.
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
@@ -71,12 +70,11 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// A way about the interferer on which the distance to it changes in its logarithm as the direction turns.
+/// Path about the interferer along which the logarithm of the distance to it changes linearly with the direction.
 struct Way {
-    /// Where it leads to: the direction.
     to: Triple,
     angle: f32,
-    /// By how much the logarithm of the distance rises.
+    /// Increase of the logarithm of the distance.
     rise: f32,
     length: f32,
 }
@@ -98,7 +96,7 @@ impl Way {
         }
     }
 
-    /// After a hop from `here` that is `step` of the distance at its end, as seen from the interferer.
+    /// Returns the end of a hop from `here` whose length is `step` times its end's distance from the interferer.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -113,10 +111,10 @@ impl Way {
     }
 }
 
-/// What a way is not divided by less than.
+/// Minimum divisor for lengths.
 const SHORTEST: f32 = 1e-6;
 
-/// The most that a hop turns about the interferer, as a tangent.
+/// Maximum turn of a hop about the interferer, as a tangent.
 const MOST_TURN: f32 = 1.5;
 
 fn length([x, y, z]: Triple) -> f32 {
@@ -124,7 +122,7 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Where a relay flies across the line that comes after one at `from`, by a spiral.
+    /// Returns the cross-section of the relay after one at `from` on a spiral.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -157,7 +155,7 @@ impl Start {
         })
     }
 
-    /// Where relay `index` flies across the line that takes its turn with the one before, `apart_m` from it.
+    /// Returns the cross-section of relay `index` in alternating positions, `apart_m` from each other.
     pub(super) fn in_turn(
         index: u16,
         interferer: &Interferer,
@@ -182,7 +180,7 @@ impl Start {
         })
     }
 
-    /// Start `number` for relays with that `room`; `None` after the last, `Some(None)` where it is no use.
+    /// Returns start `number` for relays with that `room`; `None` after the last, `Some(None)` if it does not apply.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -224,7 +222,7 @@ impl Start {
         }
     }
 
-    /// Where a relay flies across the line that comes after one at `x_m`, of a chain `distance_m` long.
+    /// Returns the cross-section of the relay after one at `x_m`, in a chain of length `distance_m`.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
@@ -240,14 +238,12 @@ impl Start {
     }
 }
 
-/// A search in ln gamma.
+/// Search for the highest feasible target, in ln gamma.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// The highest that was met, and whether relays have to hold back for it.
+    /// Highest feasible target, and true if relays have to hold back for it.
     low: Option<(f32, bool)>,
-    /// The lowest that was not.
     high: Option<f32>,
-    /// What is tried.
     pub(super) sigma: f32,
     step: f32,
     growth: f32,
@@ -255,7 +251,7 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Downward from `sigma`, by `step` and then `growth` times as much each time, until one is met; to `width`.
+    /// Creates a search downward from `sigma`, by `step` and then `growth` times as much each time, to a precision of `width`.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -267,7 +263,7 @@ impl Seek {
         }
     }
 
-    /// Upward from `sigma`, which is met, with relays that have to hold back or not, by `step` and then three times as much each time; to `width`.
+    /// Creates a search upward from the feasible target `sigma`, by `step` and then three times as much each time.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -279,7 +275,7 @@ impl Seek {
         }
     }
 
-    /// What came of it: that it is met, and whether relays have to hold back. Whether there is more to try.
+    /// Records the result of a target, feasible with or without holding back; returns true if there is another to try.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -305,11 +301,11 @@ impl Seek {
         true
     }
 
-    /// The highest target that was met, and whether relays have to hold back for it.
+    /// Returns the highest feasible target, and true if relays have to hold back for it.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }
 }
 
-/// No target is so many e-folds away.
+/// Maximum step, in e-folds of the target.
 const MOST_STEP: f32 = 40.0;

@@ -1,4 +1,4 @@
-//! What the place of a relay is worth to the one before: one relay's worth of a pass back.
+//! Backward pass of one relay: derivatives of the slack by the position of the relay before it.
 
 use super::hop::{Bend, Reach};
 use super::hop::{Coordinate, Triple, minus, triple};
@@ -10,26 +10,26 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::{in_noise, square};
 
-/// What one part of the least separation that is missing costs, in parts of D: a slope that no gain of slack outweighs.
+/// Cost of a violation of the minimum separation, in units of D; it outweighs any gain of slack.
 const STIFFNESS: f32 = 100.0;
 
-/// How near an end of its room a relay is at it, in parts of D.
+/// Distance from an end of the room at which a relay counts as at the end, in units of D.
 const EDGE: f32 = 2e-6;
 
-/// How much of its length a hop may leave and still be as long as it may be.
+/// Relative spare length up to which a hop counts as fully stretched.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// By how much the relay at `to` is nearer to the interferer than a hop of the least separation allows, in squares, m^2, the
-    /// weight of that, and its slope by ln gamma: |p' - p|^2 = q(|p' - m|^2) / c is then less than d_min^2. With noise,
-    /// |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// Returns the violation of the minimum separation at `to` in squares, m^2, its weight, and its slope by ln gamma. A full hop
+    /// shorter than d_min ends too close to the interferer: |p' - p|^2 = q(|p' - m|^2) / c < d_min^2. With noise this is |p' -
+    /// m|^2 < L / (1 - nu L) for L = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
         }
         let m = self.interferer;
         let quiet = c * square(self.apart_m);
-        // Where not even the noise allows such a hop, nowhere is far enough: 1000 L stands for that.
+        // If noise alone prevents such a hop, no distance is sufficient; 1000 L is used then.
         let left = (1.0 - self.noise * quiet).max(1e-3);
         let least = quiet / left;
         let squared = square(m.x_m - to.x_m) + square(m.y_m - to.y_m) + square(to.altitude_m);
@@ -37,16 +37,14 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// What the relay at `to` takes off the slack for being there, m.
+    /// Returns the penalty of the relay at `to`, m of slack.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
-    /// The policy of the relay at `to`, which moves by up to `trust` of its distance from the interferer. `outlook` is what it sees,
-    /// and becomes what the relay before, at `from`, sees of the slack through it.
-    ///
-    /// Work: some 400 multiplications and two square roots.
+    /// Returns the policy of the relay at `to`, and propagates `outlook` to the relay before, at `from`. The step is limited to
+    /// `trust` times the distance from the interferer. Work: some 400 multiplications and two square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -100,8 +98,8 @@ impl Site<'_> {
         }
     }
 
-    /// The coordinate that is to follow, one that is not at an end of its room `low` to `high`, and the slope of F by it: the steeper,
-    /// the better.
+    /// Returns the dependent coordinate and the slope of F by it. It has the steepest slope and is not at an end of its room
+    /// `low` to `high`.
     fn axis(
         &self,
         c: f32,
@@ -117,7 +115,7 @@ impl Site<'_> {
         let [nx, ny, nh] = [q * dx - c * hx, q * dy - c * hy, q * dh - c * hh];
         let ([lx, ly, lh], [ux, uy, uh]) = (low, high);
         let mut best = (Coordinate::X, nx);
-        // Rather x, by which the chain gets on.
+        // x is preferred, since it moves the chain forward.
         let mut steepest = if lx >= -rounding || ux <= rounding {
             0.0
         } else {
@@ -125,7 +123,7 @@ impl Site<'_> {
         };
         for (axis, normal, low, high) in [(Coordinate::Y, ny, ly, uy), (Coordinate::H, nh, lh, uh)]
         {
-            // What a leap does not reach is within a ball, and a relay at its foot may rise from there.
+            // For c <= 1 the points out of reach form a ball; a relay at its foot may rise from there.
             let rises = c <= 1.0 && ux <= rounding;
             let free = (low < -rounding || rises) && high > rounding;
             if (c > 1.0 || rises) && free && normal.abs() > steepest {

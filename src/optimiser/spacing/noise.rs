@@ -1,16 +1,16 @@
-//! How far a hop reaches where receivers have noise of their own: a search that is bounded, on pieces whose curvature is known.
+//! Reach of a hop with receiver noise: a bounded search on intervals of known curvature.
 //!
-//! In the notation of [`spacing`](super), with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance from the
-//! interferer, l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over what of the interferer arrives at a metre, the
+//! In the notation of [`spacing`](super), with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance from the interferer,
+//! l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over the interferer's power received at 1 m, the
 //! interference P / (eta s) becomes P / (eta s) + N, and so
 //!
 //! ```text
 //! SINR = A s / (l (1 + nu s)) >= gamma   <=>   g(d) = q(s(d)) - rho l(d) >= 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
-//! which times 1 + nu s is a quartic in d. It has no use for the quartic's four roots, but for the last one before `high`, and finds it
-//! from above: noise meets no target that is missed without it, so the noise-free reach is one bound; and the SNR alone, rho nu l <= 1,
-//! is another. Where SINR only falls they are within a factor of sqrt(2) of it together.
+//! which times 1 + nu s is a quartic in d. Only its last root before `high` is needed, and the search finds it from above. One
+//! bound is the noise-free reach, since a target that is missed without noise is missed with it; the other is the SNR alone, rho
+//! nu l <= 1. Where SINR only falls with d, the smaller bound is within a factor of sqrt(2) of the root.
 //!
 //! **Curvature.** With w = 1 + nu s, v = 1 + nu a^2 and t = d - u
 //!
@@ -18,47 +18,46 @@
 //! g'' / 2 = (v - 3 nu t^2) / w^3 - rho
 //! ```
 //!
-//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; else it is convex within T of the interferer, and
-//! concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v: one root, as the left side rises, from 4 v / 3 by Newton's
-//! rule from above.
+//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; otherwise it is convex within T of the
+//! interferer, and concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v. The left side rises, so there is one
+//! root, found from 4 v / 3 by Newton's method from above.
 //!
-//! **Search**, from the right, on at most three pieces, each of which begins where g < 0:
+//! **Search**, from the right, on at most three intervals, each of which starts where g < 0:
 //!
-//! - On a concave piece Newton's tangents from the right lie above g, so no step passes the last root, and the first one that does not
-//!   fall or leaves the piece proves that there is none.
-//! - On the convex piece g has a root if and only if g >= 0 at its left end, and then one. Newton's tangents from the left lie below g,
-//!   so no step passes it; each is taken no shorter than a halving.
+//! - On a concave interval Newton's tangents from the right are above g, so no step passes the last root, and the first step that
+//!   does not fall or leaves the interval proves that there is none.
+//! - On the convex interval g has a root if and only if g >= 0 at its left end, and then exactly one. Newton's tangents from the
+//!   left are below g, so no step passes it; each step is at least a bisection step.
 //!
-//! g falls with rho and, at one place, with the distance of the sender: the reach falls with the target and rises with the sender's
-//! place, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
+//! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and rises with
+//! the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
 
 use super::{Hop, rounded};
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Steps of Newton's rule on a concave piece. Four to eight do; next to a double root each halves what is left.
+/// Newton steps on a concave interval. Four to eight are usual; near a double root each halves the error.
 const STEPS: u8 = 32;
 
-/// Steps on the convex piece: each at least halves it.
+/// Steps on the convex interval; each at least halves it.
 const HALVINGS: u8 = 32;
 
-/// Steps to where the curvature changes its sign: the worst case is exact to an f32 after four.
+/// Newton steps to the inflection point; the worst case is exact to an f32 after four.
 const TURNS: u8 = 5;
 
-/// What rounding may take from g, as a part of rho l: a target that is missed by no more counts as met.
+/// Rounding error of g relative to rho l: a target that is missed by at most this counts as met.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// A step so short, as a part of the place, is the last one.
+/// Step, relative to d, at which the iteration ends.
 const CLOSE: f32 = 5e-7;
 
 impl Hop {
-    /// Whether the receivers have no noise.
     pub(in crate::optimiser) fn is_silent(&self) -> bool {
         !(self.noise > 0.0)
     }
 
-    /// [`Hop::reach`] with noise, which reaches no farther than without it.
-    #[inline(never)] // out of the way of a sweep without noise
+    /// Returns [`Hop::reach`] with noise, which is at most that without it.
+    #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;
         let hop = self.noisy(target, from_m);
@@ -83,7 +82,6 @@ impl Hop {
     }
 }
 
-/// One hop for one target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// rho = gamma / A.
@@ -103,19 +101,19 @@ pub(super) struct NoisyHop {
 }
 
 impl NoisyHop {
-    /// The farthest that the sender is heard through the noise alone, m; `None` where it is heard nowhere. At most 1e9.
+    /// Returns the maximum distance at which the signal exceeds the noise as required, m, at most 1e9; `None` if there is none.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Whether the target is met at `d`: as the SINR's own terms.
+    /// Returns true if the target is met at `d`, by the terms of the SINR.
     pub(super) fn is_met(&self, d: f32) -> bool {
         let s = square(d - self.ahead) + self.aside_squared;
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// g, half of g', and what rounding may take from g, at a `d` that is not beyond where the sender is heard through the noise.
+    /// Returns g, g' / 2, and the rounding error of g, at a `d` up to the limit by noise.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -123,11 +121,11 @@ impl NoisyHop {
         let l = square(d) + self.across_squared;
         let nus = self.noise * s;
         let inverse = 1.0 / (1.0 + nus);
-        // At most about 1, as the hop is heard through the noise.
+        // At most about 1 up to the limit by noise.
         let needed = ratio * l;
         let lost = needed * self.noise;
         if self.excess.abs() < 0.5 && nus < 1.0 {
-            // Next to A, s and rho l cancel far from the interferer: so by their difference.
+            // For a target close to A, s and rho l cancel far from the interferer, so their difference is used.
             let f = ahead * (ahead - 2.0 * d) + self.base - self.excess * l;
             let slope = -(ahead + self.excess * d) - t * nus * (2.0 + nus) * square(inverse);
             return ((f - lost * s) * inverse, slope, ROUNDING * needed);
@@ -136,7 +134,7 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, ROUNDING * needed)
     }
 
-    /// How far from the interferer the curvature of g changes its sign, m; `None` where g is concave everywhere.
+    /// Returns the distance from the interferer at which g's curvature changes sign, m; `None` if g is concave.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -150,9 +148,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// The last d in [`low`, `high`] at which the target is met, m; `None` where there is none.
-    ///
-    /// `high` is not beyond where the sender is heard through the noise. Work: at most 96 evaluations of g, usually five.
+    /// Returns the last d in [`low`, `high`] at which the target is met, m; `None` if there is none. `high` is at most the limit
+    /// by noise. Work: at most 96 evaluations of g, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -182,7 +179,7 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// The last root in [`low`, `high`] of a piece on which g is concave, and below 0 at `high` but for rounding.
+    /// Returns the last root in [`low`, `high`], where g is concave and below 0 at `high` but for rounding.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {

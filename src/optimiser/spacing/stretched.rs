@@ -1,4 +1,4 @@
-//! The reach as the joint method differentiates it.
+//! Reach as a differentiable function for the joint method.
 
 use super::Hop;
 use super::MOST_RATIO;
@@ -6,8 +6,8 @@ use crate::root::sqrt_in_place;
 use crate::sir::square;
 
 impl Hop {
-    /// The reach as a smooth function of everything: without a least step, and behind `from_m` where the hop across takes more than
-    /// there is. `None` where there is none at all.
+    /// Returns the reach without a minimum step, as a smooth function of all parameters; `None` if there is none. It is before
+    /// `from_m` if the distance across the line is longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if !(self.noise > 0.0) {
@@ -19,7 +19,7 @@ impl Hop {
             return Some(place);
         }
         let heard = hop.through_noise()?;
-        // Below A what is met may have two parts, of which the one before Tx is no hop; above it there is one.
+        // Below A the target may be met on two intervals, the one before the sender being no hop; above A on one.
         let least = if hop.excess > 0.0 { -heard } else { 0.0 };
         Some(from_m + hop.last(least, heard.min(most))?)
     }

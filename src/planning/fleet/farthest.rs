@@ -1,7 +1,7 @@
-//! The paper's eq. (Opt) and Problem 1: how many relays it takes until the reaches of a pass end within the last hop.
+//! Minimum number of relays by the reaches of a pass: the paper's eq. (Opt) and Problem 1.
 //!
-//! No chain gets farther than the reaches do (see `pass`), so n relays whose reaches do not end near enough
-//! cannot meet the target. The printed search begins with two relays; one may do.
+//! No chain gets farther than its reaches (see `pass`), so n relays whose reaches do not end within the last hop cannot meet the
+//! target. The printed search starts with two relays; one may be enough.
 
 use super::Fewest;
 use crate::mission::{Heading, MAX_RELAYS, Mission, Profile};
@@ -9,7 +9,6 @@ use crate::optimiser::spacing::Stand;
 use crate::optimiser::walk::{Walk, before};
 use crate::place::Placement;
 
-/// The fewest relays whose chain meets `target`; see [`Fewest::of`].
 pub(super) fn fewest(
     mission: &Mission,
     target: f32,
@@ -17,7 +16,7 @@ pub(super) fn fewest(
 ) -> Option<Fewest> {
     match mission.heading() {
         Heading::TowardRx => toward_rx(mission, target, profile_of),
-        // What the relays hold is counted from Tx, so every number of them is another chain.
+        // Profiles are indexed from Tx, so every number of relays is another chain.
         Heading::TowardTx => (1..=MAX_RELAYS)
             .map_while(|relays| mission.with_relays(relays).ok())
             .find(|mission| chain(mission, target, profile_of).is_met())
@@ -37,7 +36,7 @@ fn toward_rx(
     let mut proven = true;
     for index in 1..=MAX_RELAYS {
         let mission = mission.with_relays(index).ok()?;
-        // As the last of its chain it may go to the very end.
+        // The last relay of its chain may go to the very end.
         let last = chain(&mission, target, profile_of);
         let link = last.link(index);
         from_m = link.reach(target, from_m)?;
@@ -47,7 +46,7 @@ fn toward_rx(
         {
             continue;
         }
-        // With room to be left for those behind it, a chain may end sooner than one that grows without knowing its length.
+        // If it leaves room for the relays behind it, a chain of known length may end earlier than one that grows.
         if last.is_met() {
             return Some(Fewest {
                 relays: index,
@@ -72,7 +71,6 @@ fn chain<'a, F: Fn(u16) -> Profile>(
     }
 }
 
-/// The places of the chain for `target`; see [`super::places`].
 pub(super) fn places(
     mission: &Mission,
     target: f32,
@@ -87,7 +85,7 @@ pub(super) fn places(
     settled(&chain, places).is_some() || settled(&plain, places).is_some()
 }
 
-/// Reaches first, and then from the last one back to where each is to stand.
+/// Computes the reaches, and then the required positions from the last relay back.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let (slack, mut place) = chain.ends(|index, reach| {

@@ -1,13 +1,13 @@
-//! How many relays a target SIR needs, and where they go: the paper's eq. (Opt), and Problem 1 in a field.
+//! Number of relays for a target SIR, and their positions: the paper's eq. (Opt), and Problem 1 in a field.
 //!
-//! | interference | relays | file | how good |
+//! | interference | profiles | file | accuracy |
 //! | --- | --- | --- | --- |
-//! | one interferer | any | [`farthest`] | exact where it says so: no chain with one relay fewer meets the target |
-//! | a field | all alike | `ranges` | exact, in an uneven field too, which the paper leaves to an exhaustive search |
-//! | a field | other | [`farthest`] | what Algorithm 4 finds; not proven |
+//! | one interferer | any | [`farthest`] | exact if `proven`: no chain with one relay fewer meets the target |
+//! | a field | equal | `ranges` | exact, also in an uneven field, which the paper leaves to an exhaustive search |
+//! | a field | different | [`farthest`] | result of Algorithm 4; not proven |
 //!
-//! A least separation can only raise the number: a number that is the same without it is proven, any other is not.
-//! Nothing here is meant for a relay's main loop; nothing allocates either.
+//! A minimum separation can only raise the number. A number that is the same without it is proven, any other is not. These
+//! functions do not allocate, but are not intended for a relay's main loop.
 
 pub mod farthest;
 #[cfg(not(feature = "internals"))]
@@ -20,39 +20,40 @@ use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::place::Placement;
 use crate::sir;
 
-/// The answer to how many relays.
+/// Minimum number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fewest {
-    /// That many relays meet the target.
+    /// Number of relays that meets the target.
     pub relays: u16,
-    /// Whether it is certain that no fewer do.
+    /// True if no smaller number meets it.
     pub proven: bool,
 }
 
-/// The most that any number of relays can have.
+/// Maximum SIR of any number of relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Most {
-    /// The highest target that is met, linear SIR, to 1e-6 relative.
+    /// Highest target that is met, linear SIR, to 1e-6 relative.
     pub target: f32,
-    /// The fewest relays that meet it.
+    /// Minimum number of relays that meets it.
     pub relays: u16,
 }
 
-/// How far below the ceiling of the first hop [`Most::of`] looks.
+/// Lower limit of the search in [`Most::of`], relative to the ceiling of the first hop.
 const DEPTH: f32 = 1e-20;
 
-/// Halvings of that range, in its logarithm: 46 in it, to 1e-8.
+/// Bisection steps of that range in its logarithm, which is 46 wide: to 1e-8.
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// The fewest relays that meet `target` (linear SIR, above 0), at most [`Mission::MAX_RELAYS`]; the mission's own number is not looked at.
+    /// Returns the minimum number of relays for `target` (linear SIR, above 0), at most [`Mission::MAX_RELAYS`].
     ///
-    /// `profile_of` gives what relay 1..=N holds. Equal to an exhaustive count wherever `proven`:
-    /// `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay, and once more all
-    /// of them where they must keep a distance; in a field at most 32 chains of `ranges`.
-    /// `None` when no number of relays meets it; [`Most::of`] has what they can meet.
+    /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive count if
+    /// `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay,
+    /// and all of them again with a minimum separation; in a field at most 32 chains of `ranges`.
+    ///
+    /// `None` if no number of relays meets it; [`Most::of`] returns the best that they can meet.
     pub fn of(mission: &Mission, target: f32, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let found = counted(mission, target, &profile_of)?;
         if !(mission.config().min_separation_m > 0.0) || !found.proven {
@@ -67,9 +68,10 @@ impl Fewest {
 }
 
 impl Most {
-    /// The highest target that any number of relays meets; `None` where none does down to 1e-20 of what the first hop can have.
+    /// Returns the highest target that any number of relays meets; `None` if it is below 1e-20 of the first hop's ceiling.
     ///
-    /// With relays of different altitudes, or a least separation, it is one that is met, not certainly the highest. Work: 33 times that of [`Fewest::of`].
+    /// With different altitudes, or a minimum separation, it is a feasible target but not certainly the highest. Work: 33 times
+    /// that of [`Fewest::of`].
     pub fn of(mission: &Mission, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let meets = |target: f32| {
             let found = counted(mission, target, &profile_of)?;
@@ -101,10 +103,10 @@ impl Most {
 }
 
 impl Mission {
-    /// Writes the places of the N relays for `target` into `places`, relay 1 first. Returns false if they do not meet it, or if
-    /// `places` is shorter than N.
+    /// Writes the positions of the mission's N relays for `target` to `places`, relay 1 first.
     ///
-    /// Every hop but one is as long as the target allows, and meets it to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
+    /// Returns false if they do not meet it, or `places` is shorter than N. Every hop but one has its maximum length, and meets
+    /// the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
     pub fn places_for(
         &self,
         target: f32,
@@ -118,7 +120,7 @@ impl Mission {
     }
 }
 
-/// The fewest relays; `proven` leaves the separation out of account.
+/// Returns the minimum number of relays; `proven` ignores the separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         ranges::fewest(mission, target, profile_of(1))
@@ -127,7 +129,7 @@ fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile)
     }
 }
 
-/// Whether relays 1 to `last` hold the same.
+/// Returns true if relays 1 to `last` have the same profile.
 fn alike(last: u16, profile_of: &impl Fn(u16) -> Profile) -> bool {
     let first = profile_of(1);
     (2..=last).all(|index| profile_of(index) == first)

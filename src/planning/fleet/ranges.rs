@@ -1,7 +1,7 @@
-//! Relays that are all alike in a field: the paper's Problem 1, exactly.
+//! Equal relays in a field: the exact solution of the paper's Problem 1.
 //!
-//! More equals never meet less where they may stand as close as they like, and N of them meet a target if and only if the ranges
-//! of [`retreat`](crate::optimiser::retreat) end in a place that the first hop reaches.
+//! Without a minimum separation, more equal relays never have a lower SIR. N of them meet a target if and only if the ranges of
+//! [`retreat`](crate::optimiser::retreat) end at a position within the reach of the first hop.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -20,10 +20,9 @@ use crate::optimiser::walk::Walk;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// How many relays more than without a least separation are tried with one.
+/// Number of additional relays that are tried with a minimum separation.
 const MORE: u16 = 32;
 
-/// Halvings of the range of targets.
 const TARGETS: u8 = 48;
 
 fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
@@ -36,9 +35,8 @@ fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
     chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// The fewest equals that meet `target` in a field; see [`super::fewest`].
-///
-/// More relays never meet less where they may stand as close as they like, so the number is found by halving.
+/// Returns the minimum number of equal relays for `target` in a field; see [`super::fewest`]. Without a separation it is found by
+/// bisection.
 pub(super) fn fewest(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {
         mission
@@ -70,22 +68,22 @@ pub(super) fn fewest(mission: &Mission, target: f32, profile: Profile) -> Option
         })
 }
 
-/// The highest target (linear, to an f32's own step) that the mission's N equals, which hold `profile`, meet in its field; `None`
-/// without a field, or where none is met.
+/// Returns the highest target (linear, to an f32's step) of the mission's N equal relays in its field.
 ///
-/// The optimum where no least separation binds: `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be
-/// below it in an uneven field. Work: 48 chains, each three square roots for every point of the field and relay.
+/// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
+/// `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
+/// each three square roots for every point of the field and relay.
 pub fn best(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
     let met = |target: f32| is_met(mission, target, profile);
-    // The last hop from right above Rx.
+    // SIR of the last hop from right above Rx.
     let mut high = mission.receiver_gain(profile.power_w) / square(profile.altitude_m);
     if met(high) {
         return Some(high);
     }
     let mut low = 0.0;
     for _ in 0..TARGETS {
-        // In powers first: the targets span many decades.
+        // Geometric bisection first, since the targets span many decades.
         let middle = if high > 4.0 * low {
             sqrt(high * low.max(high * 1e-6))
         } else {

@@ -1,29 +1,29 @@
-//! One relay that may also go aside: Theorems 1 and 3 with y free. Not in the paper.
+//! One relay with lateral freedom: Theorems 1 and 3 with y free. Not in the paper.
 //!
-//! At a place (x, y, h), with c = SIR_1 / A, k = c - 1, q = X^2 + Y^2 and s the distance from Rx along the ground:
+//! At a position (x, y, h), with c = SIR_1 / A, k = c - 1, q = X^2 + Y^2 and s the ground distance from Rx:
 //!
 //! ```text
 //! c     = ((X - x)^2 + (Y - y)^2 + h^2) / (x^2 + y^2 + h^2)    A = p_t / p_MSI
 //! SIR_2 = K / (s^2 + h^2)                                      s^2 = (D - x)^2 + y^2
 //! ```
 //!
-//! **Spheres.** SIR_1 is the same where k (x^2 + y^2 + h^2) + 2 X x + 2 Y y = q: on a sphere about the point -(X, Y) / k of the
-//! ground, for k = 0 on an upright plane. It is above that inside for k > 0, outside for k < 0. SIR_2 is the same on a sphere
-//! about Rx, and above that inside.
+//! **Spheres.** SIR_1 is constant where k (x^2 + y^2 + h^2) + 2 X x + 2 Y y = q: on a sphere about the ground point -(X, Y) / k,
+//! for k = 0 on a vertical plane. It is higher inside for k > 0, outside for k < 0. SIR_2 is constant on a sphere about Rx, and
+//! higher inside.
 //!
-//! **At one altitude, without limits.** The best place is one of three.
+//! **At one altitude, without limits.** The optimum is one of three positions.
 //!
-//! 1. Above Rx, where SIR_2 has its top, if SIR_1 is no worse there.
-//! 2. On the hill of SIR_1, its only top: t = 2 h^2 / (sqrt(q) + sqrt(q + 4 h^2)) from Tx, straight away from the interferer; if
-//!    SIR_2 is no worse there.
-//! 3. Else where the two level circles through a place touch and their insides lie apart, with SIR_1 = SIR_2. No other place is
-//!    as good: of two such sets that touch, the point is all they share. This holds for two discs (k > 0) and for the disc of
-//!    SIR_2 within the disc that SIR_1 leaves out (k < 0).
+//! 1. Above Rx, where SIR_2 is maximal, if SIR_1 is no worse there.
+//! 2. At the maximum of SIR_1, its only one, if SIR_2 is no worse there: t = 2 h^2 / (sqrt(q) + sqrt(q + 4 h^2)) from Tx,
+//!   straight away from the interferer.
+//! 3. Otherwise where two level circles touch with disjoint insides and SIR_1 = SIR_2. No other position is as good, because two
+//!   such sets share only the touching point. This holds for two discs (k > 0), and for the disc of SIR_2 within the disc that
+//!   SIR_1 excludes (k < 0).
 //!
-//! A place that is none of these can be improved: either one SIR is worse and can rise, or both can rise together.
+//! Any other position can be improved: either one SIR is worse and can rise, or both can rise together.
 //!
-//! **The touching place** is the one on the circle of radius s about Rx at which SIR_1 is largest. With x = D - s cos w,
-//! y = s sin w that is the largest k for which k m - a = (b + k n) cos w + e sin w has a solution:
+//! **The touching position** is the one on the circle of radius s about Rx at which SIR_1 is maximal. With x = D - s cos w, y = s
+//! sin w that is the largest k for which k m - a = (b + k n) cos w + e sin w has a solution:
 //!
 //! ```text
 //! a = q - 2 X D    b = 2 X s    e = -2 Y s    m = D^2 + s^2 + h^2    n = 2 D s
@@ -31,41 +31,42 @@
 //! (cos w, sin w) ~ (b + k n, e)
 //! ```
 //!
-//! Up to the hill's s the largest SIR_1 on the circle is that on the whole disc, since the hill is its only top: it rises with s.
-//! SIR_2 falls. They are equal at one s, which halving finds. In c it is a root of the quartic that says that circles touch:
+//! While the maximum of SIR_1 is outside of the disc, the largest SIR_1 on the circle is that on the whole disc; it rises with s,
+//! and SIR_2 falls. They are equal at one s, found by bisection. In c it is a root of the quartic for touching circles:
 //!
 //! ```text
 //! ((D^2 + 2 h^2) k c + (2 D X - q) c - G k)^2 = 4 c (q c - h^2 k^2) (G - h^2 c)    G = K / A
 //! ```
 //!
-//! **Limits.** If that place is in [0, D] x [left, right], it is the best. If not, the best is on an edge of that rectangle: within
-//! it, a place that cannot be improved would be one of the three. An edge is a problem of one dimension: `edge`.
+//! **Limits.** If the touching position is in [0, D] x [left, right], it is the optimum. Otherwise the optimum is on an edge of
+//! that rectangle, because an inner position that cannot be improved is one of the three. An edge is a one-dimensional problem:
+//! `edge`.
 //!
-//! **With the altitude free** the lowest is the best wherever there is room. Extremum a place about the line on the ground that joins
-//! the middles of its two spheres. Neither SIR changes, and the relay sinks to one side or the other. So no place above is better
-//! than the best of the lowest plane without limits; and if that is within the corridor, it is the best of all. In numbers: at the
-//! same distance r from the line, and so with the same signal at both ends, y = -r is further from the interferer than h = r, by
-//! 2 Y r in squared distance. For Y = 0 the two are equal.
+//! **With the altitude free** the lowest altitude is optimal if there is lateral room. Turn a position about the line on the
+//! ground through the centres of its two spheres: neither SIR changes, and the relay descends to one side or the other. So no
+//! higher position is better than the optimum of the lowest plane without limits, and if that is within the corridor, it is the
+//! global optimum. In numbers: at the same distance r from the line, and so with the same signal at both ends, y = -r is farther
+//! from the interferer than h = r, by 2 Y r in squared distance. For Y = 0 the two are equal.
 //!
-//! Altitude can pay only where that place is outside the corridor. Then the best is on one of the twelve edges of the box: any
-//! place higher up can be turned down until it is in the lowest plane or in an upright face, and in an upright face all level
-//! circles have their middles on the ground, so that they touch nowhere above it.
+//! A higher altitude can only be better if that position is outside of the corridor. Then the optimum is on one of the twelve
+//! edges of the box: any higher position can be turned down until it is in the lowest plane or in a vertical face. In a vertical
+//! face all level circles have their centres on the ground, so they do not touch above it.
 //!
 //! **With noise** SIR_1 = A s / (l (1 + nu s)), s and l the squared distances from the interferer and from Tx.
 //!
-//! - The hill is at t times as far from Tx, straight away from the interferer, as that is: where h^2 = t q + t^2 q + nu t s^2 with
-//!   s = (1 + t)^2 q + h^2, once, nearer than without. It still is the only top: along the line on the other side, where
-//!   (1 / s w)(r - |(X, Y)|) = r / l, 1 / s w is above 1 / l, and SIR_1 rises to both sides.
-//! - On a circle about Rx s and l are linear in (cos w, sin w): they run around an ellipse. q(s) / l with q(s) = s / (1 + nu s) is at
-//!   least v on a convex set, q(s) - v l being concave, and better with more s and less l. So on the arc from the place nearest to Tx to
-//!   that farthest from the interferer it has one top, and that is the circle's: halving finds it.
-//! - On a sphere about Rx l is linear in x, and s in x and y: for Y = 0 SIR_1 is the same towards both sides, for any other Y it rises
-//!   towards the one away from the interferer. On that side the relay sinks as it moves there: the lowest is the best
-//!   wherever there is room. On the interferer's own side it climbs: there the highest may be. But in an upright face of the box along
-//!   the line the level lines may touch in between: `touching`. In the two across the line l is the same along such a circle: there
-//!   they do not.
-//! - Where the touching place is outside the corridor another one may be within, in the lowest plane or in the highest: `corridor`
-//!   searches for it.
+//! - The maximum of SIR_1 is at t times the interferer's distance from Tx, straight away from it, with h^2 = t q + t^2 q + nu t
+//!   s^2 and s = (1 + t)^2 q + h^2: there is one solution, closer than without noise. It is still the only maximum: along the
+//!   line on the other side, where (1 / s w)(r - |(X, Y)|) = r / l, 1 / s w is above 1 / l, and SIR_1 rises to both sides.
+//! - On a circle about Rx s and l are linear in (cos w, sin w): they follow an ellipse. q(s) / l with q(s) = s / (1 + nu s) is at
+//!   least v on a convex set, since q(s) - v l is concave, and better with a larger s and a smaller l. So on the arc from the
+//!   point closest to Tx to that farthest from the interferer it has one maximum, found by bisection.
+//! - On a sphere about Rx l is linear in x, and s in x and y. For Y = 0 SIR_1 is symmetric in y; for any other Y it rises toward
+//!   the side away from the interferer. On that side the relay descends as it moves there, so the lowest altitude is optimal if
+//!   there is room. On the interferer's side it climbs, so the highest may be optimal. In a vertical face along the line the
+//!   level lines may touch in between: `touching`. In the two faces across the line l is constant along such a circle, so they do
+//!   not touch.
+//! - If the touching position is outside of the corridor, another one may be inside, in the lowest plane or the highest: see
+//!   `corridor`.
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
@@ -76,33 +77,33 @@ use crate::place::Placement;
 
 pub use super::edge::EdgeCoordinate;
 
-/// Halvings of the distance from Rx, in f64: to far below an f32's own step.
+/// Bisection steps of the distance from Rx, in f64: to far below an f32's step.
 const HALVINGS: u8 = 48;
 
-/// Which case applied.
+/// Case of the optimum.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
-    /// Where the level circles of both SIRs touch, at the lowest altitude.
+    /// Touching position of the level circles of both SIRs, at the lowest altitude.
     Touching,
-    /// The first hop is the worse one even where it is best: there, at the lowest altitude.
+    /// Maximum of SIR_1, at the lowest altitude: the first hop is the worse one even there.
     Hilltop,
-    /// The first hop is the better one even right above Rx, as low as may be: there.
+    /// Above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,
-    /// That place is outside the corridor: the best of the box's edges, on which this is free.
+    /// Edge of the box with this free coordinate: the unlimited optimum is outside of the corridor.
     Edge(EdgeCoordinate),
-    /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: above Rx.
+    /// Above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level,
-    /// With noise: on an upright wall of the corridor, where the lines of equal SIR of both hops touch.
+    /// Touching position on a vertical face of the corridor, with noise.
     Wall,
-    /// With noise: at the lowest or the highest altitude within the corridor, by a search; nothing proves that it is the best.
+    /// Position inside the corridor at its lowest or highest altitude, with noise; by a search without a proof of optimality.
     Inside,
-    /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; above Rx.
+    /// Above Rx: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned,
 }
 
 impl AsideCase {
-    /// Its number: 1 to 3 as above, then the edges along x, y and upward, 7 to 10.
+    /// Number of the case: 1 to 3 as in the module's text, 4 to 6 for edges along x, y and h, then 7 to 10.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -117,18 +118,18 @@ impl AsideCase {
     }
 }
 
-/// Where a relay that holds `profile` does best in [0, D] and the mission's room to the side, and why; `None` in a field.
+/// Returns the optimal position of a relay with `profile` in [0, D] and the lateral band, and its case; `None` in a field.
 ///
-/// The mission's band of altitudes is not looked at. Work: 48 halvings in f64, with noise as many for each, and where they end outside the corridor at most
-/// 272 evaluations of both hops; with noise and room to the side some 13 000 more.
+/// The mission's band of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the result is
+/// outside of the corridor, at most 272 evaluations of both hops; with noise and lateral room some 13 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Where a relay of `power_w` watts does best in [0, D], the mission's room to the side and its band, and why; `None` in a field.
+/// Returns the optimal position of a relay of `power_w` watts in [0, D] and both bands, and its case; `None` in a field.
 ///
-/// Work: 48 halvings in f64, with noise as many for each, and where they end outside the corridor at most 736 evaluations of both
-/// hops; with noise and room to the side some 26 000 more.
+/// Work: 48 bisection steps in f64, with noise as many for each. If the result is outside of the corridor, at most 736
+/// evaluations of both hops; with noise and lateral room some 26 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }
@@ -148,7 +149,7 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     if holds(along, place.x_m) && holds(across, place.y_m) {
         return Some((hops.found(place), case));
     }
-    // Above Rx is always within.
+    // The position above Rx is always within.
     let above_rx = Placement::on_line(config.distance_m, band.least_m);
     let mut best = (hops.found(above_rx), AsideCase::AboveRx);
     let at = |x_m: f32, y_m: f32, altitude_m: f32| Placement {
@@ -200,7 +201,6 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     Some(best)
 }
 
-/// The ends of a band, one of them if they are the same.
 fn both_ends(band: Band) -> impl Iterator<Item = f32> {
     let other = (!band.is_single()).then_some(band.most_m);
     core::iter::once(band.least_m).chain(other)
@@ -210,7 +210,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// The best place at one altitude, wherever on the plane.
+/// Returns the optimal position at one altitude, without limits in x and y.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -234,7 +234,7 @@ fn without_limits(
     (place, case)
 }
 
-/// The plane at one altitude, in m and m^2: D, X, Y, h^2, G = K / A and nu.
+/// Plane at one altitude, in m and m^2: D, X, Y, h^2, G = K / A and nu.
 struct Plane {
     d: f64,
     x: f64,
@@ -275,13 +275,13 @@ impl Plane {
         (self.loudest(high), AsideCase::Touching)
     }
 
-    /// SIR_1 / A.
+    /// Returns SIR_1 / A.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// How much farther from Tx than the interferer the hill is, on the other side.
+    /// Returns the distance of SIR_1's maximum from Tx, relative to that of the interferer on the other side.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {
@@ -304,10 +304,10 @@ impl Plane {
         low
     }
 
-    /// Where SIR_1 is largest on the circle of radius `s` about Rx, with noise.
+    /// Returns the point with the largest SIR_1 on the circle of radius `s` about Rx, with noise.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
         let at = |w: f64| (self.d - s * libm::cos(w), s * libm::sin(w));
-        // From the place nearest to Tx, at 0, to that farthest from the interferer.
+        // From the point closest to Tx, at 0, to that farthest from the interferer.
         let mut far = libm::atan2(-self.y, self.x - self.d);
         if !(squared(self.x) + squared(self.y) > 0.0) {
             far = 0.0;
@@ -330,12 +330,12 @@ impl Plane {
         at(low * far)
     }
 
-    /// SIR_2 / A at the distance `s` from Rx along the ground.
+    /// Returns SIR_2 / A at the ground distance `s` from Rx.
     fn second(&self, s: f64) -> f64 {
         self.g / (squared(s) + self.h2)
     }
 
-    /// Where SIR_1 is largest on the circle of radius `s` about Rx.
+    /// Returns the point with the largest SIR_1 on the circle of radius `s` about Rx.
     fn loudest(&self, s: f64) -> (f64, f64) {
         if self.noise > 0.0 {
             return self.loudest_in_noise(s);
@@ -352,7 +352,7 @@ impl Plane {
         if size > 0.0 {
             (self.d - s * (cos / size), s * (sin / size))
         } else {
-            // The same all around.
+            // SIR_1 is constant on the circle.
             (self.d - s, 0.0)
         }
     }

@@ -1,28 +1,27 @@
-//! One relay aside with noise, where the touching place of the lowest plane is outside the corridor: a search of the corridor at one
-//! altitude.
+//! One relay with lateral freedom and noise: search of the corridor at one altitude, if the touching position is outside.
 //!
-//! Without noise no place within the rectangle can then be the best. With noise there may be a second place at which two level lines
-//! touch from within, on the other side of the interferer's own line: next to Y = 0 it is all but the mirror image of the first. Nothing
-//! proves how many there are, so the plane is searched: along x each line is solved exactly, by `edge`, and across it the best of them is
-//! looked for, from ever closer lines next to y = 0 and by golden section about the three best.
+//! Without noise no position inside the rectangle can then be optimal. With noise there may be a second position at which two
+//! level lines touch from within, on the other side of the interferer's line; near Y = 0 it is almost the mirror image of the
+//! first. There is no proof of their number, so the plane is searched. Each line along x is solved exactly, by `edge`. The best
+//! line is searched on lines that are closer near y = 0, and by golden section about the three best.
 
 use super::Found;
 use super::edge::{Edge, EdgeCoordinate, TwoHops};
 use crate::mission::{Band, Interferer};
 use crate::place::Placement;
 
-/// Lines to either side of y = 0.
+/// Number of lines on either side of y = 0.
 const LINES: u8 = 24;
 
-/// The best of them that are followed.
+/// Number of the best lines that are refined.
 const FOLLOWED: usize = 3;
 
-/// Steps of golden section about each.
+/// Golden-section steps about each.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
 
-/// The best place at `altitude_m` in `along` by `across`. Work: at most 145 lines, each some 90 evaluations of both hops.
+/// Returns the best position at `altitude_m` in `along` by `across`. Work: at most 145 lines of some 90 evaluations.
 pub(super) fn best(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -84,7 +83,7 @@ pub(super) fn best(
     best
 }
 
-/// Keeps the best ones, best first.
+/// Inserts `new` into the best lines, best first.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {

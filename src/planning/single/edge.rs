@@ -1,9 +1,9 @@
-//! One edge of the box that a single relay may fly in: x, y or the altitude is free there, the other two are given.
+//! One edge of the box of a single relay: one of x, y and altitude is free, the other two are fixed.
 //!
-//! With t for what is free, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 turns at E alone.
-//! SIR_1 turns where P t^2 - (P^2 + a - b) t - P b = 0, at two places whose product is -b. Between these three both only rise
-//! or only fall: the worse of the two is best at an end of such a piece, or where they cross, which is once. With noise it may turn at
-//! three places: [`edge_noise`].
+//! With t the free coordinate, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 has one extremum, at
+//! E. SIR_1 has extrema where P t^2 - (P^2 + a - b) t - P b = 0, at two points whose product is -b. Between these three points
+//! both are monotone, so the worse one is maximal at an end of such an interval, or where they cross, which is at one point. With
+//! noise SIR_1 may have three extrema: [`edge_noise`].
 //!
 //! | free | P | a | b | E |
 //! | --- | --- | --- | --- | --- |
@@ -16,7 +16,7 @@ use crate::mission::{Band, Interferer, Mission};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
 
-/// What is free on an edge.
+/// Free coordinate of an edge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -25,11 +25,11 @@ pub enum EdgeCoordinate {
     Along = 4,
     /// y, across it.
     Across = 5,
-    /// The altitude.
+    /// Altitude.
     Upward = 6,
 }
 
-/// The two hops of the only relay of a mission, wherever it is.
+/// Two hops of a mission's only relay, at any position.
 #[derive(Clone, Copy)]
 pub(super) struct TwoHops<'a> {
     pub(super) mission: &'a Mission,
@@ -37,7 +37,6 @@ pub(super) struct TwoHops<'a> {
 }
 
 impl TwoHops<'_> {
-    /// SIR_1 and SIR_2.
     fn both(&self, at: Placement) -> (f32, f32) {
         let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
         (first, sir::at_receiver(self.mission, at, self.power_w))
@@ -52,7 +51,7 @@ impl TwoHops<'_> {
     }
 }
 
-/// An edge: `through` it, over `room`, m.
+/// Edge that contains `through`, with the free coordinate in `room`, m.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,
@@ -71,7 +70,7 @@ impl Edge {
         place
     }
 
-    /// Where SIR_1 turns, in f64, and where SIR_2 does; those that do not exist are no numbers, or far away.
+    /// Returns the extrema of SIR_1, computed in f64, and of SIR_2; missing ones are NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let squared = |x: f64| x * x;
@@ -104,16 +103,14 @@ impl Edge {
             return [behind, valley, hill, end];
         }
         let half = 0.5 * (squared(p) + a - b);
-        // The root of the larger size first, the other from their product: neither cancels.
+        // The larger root first, the other one from their product: neither cancels.
         let root = libm::sqrt(squared(half) + squared(p) * b);
         let sum = half + libm::copysign(root, half);
         [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
     }
 
-    /// The best place on it.
-    ///
-    /// Work: at most 10 evaluations of both hops, and 40 more for each piece on which one SIR rises, the other falls, and they
-    /// cross: without noise one such piece for x and for the altitude, two for y.
+    /// Returns the best position on the edge. Work: at most 10 evaluations of both hops, and 40 more for each interval on which
+    /// one SIR rises, the other falls, and they cross: without noise one such interval for x and for the altitude, two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,
@@ -132,7 +129,7 @@ impl Edge {
         best
     }
 
-    /// The best of the piece [`low`, `high`], on which each SIR only rises or only falls, but for its lower end.
+    /// Returns the best position of the interval [`low`, `high`] without its lower end; each SIR is monotone on it.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -159,7 +156,7 @@ impl Edge {
     }
 }
 
-/// Rising; in place of what is no number, one of the others.
+/// Sorts the values; a NaN is replaced by one of the others.
 fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
     let (c, d) = (c.min(d), c.max(d));

@@ -1,22 +1,22 @@
-//! Where SIR_1 turns on an edge with noise.
+//! Extrema of SIR_1 on an edge with noise.
 //!
-//! In the notation of [`edge`](super::edge), s = (t - P)^2 + a, its slope has the sign of
+//! In the notation of [`edge`](super::edge), s = (t - P)^2 + a, the slope of SIR_1 has the sign of
 //!
 //! ```text
 //! P t^2 - (P^2 + a - b) t - P b - nu t s^2
 //! ```
 //!
-//! For P > 0 (else all is mirrored) that over t, phi, is concave where t > 0, since s is convex and not negative, and so is s^2: at most
-//! two turns there, a valley and a hill, none before the noise-free valley. Where t < 0 phi falls away from 0 from where it is above
-//! it: one turn, nearer than the noise-free one. For P = 0 it is -t (a - b + nu (t^2 + a)^2).
+//! For P > 0 (otherwise everything is mirrored) this over t, phi, is concave for t > 0, since s is convex and not negative, and
+//! so is s^2. So there are at most two extrema, a minimum and a maximum, none before the noise-free minimum. For t < 0 phi falls
+//! with |t| from a positive value: one extremum, closer than the noise-free one. For P = 0 the sign is that of -t (a - b + nu
+//! (t^2 + a)^2).
 
-/// Halvings, in f64.
 const HALVINGS: u8 = 60;
 
-/// Doublings until something that falls is below 0.
+/// Doublings of t at most until a falling function is below 0.
 const DOUBLINGS: u8 = 100;
 
-/// The turns, m; those that do not exist are no numbers.
+/// Returns the extrema, m; missing ones are NaN.
 pub(super) fn turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     if !(libm::fabs(p) > 0.0) {
         let squared = libm::sqrt((b - a) / noise) - a;
@@ -51,7 +51,6 @@ impl Slope {
         p * t - (p * p + a - b) - p * b / t - noise * s * s
     }
 
-    /// Its slope.
     fn bend(&self, t: f64) -> f64 {
         let Self { p, a, b, noise } = *self;
         let s = (t - p) * (t - p) + a;
@@ -62,7 +61,7 @@ impl Slope {
         let Self { p, a, b, .. } = *self;
         let half = 0.5 * (p * p + a - b);
         let root = libm::sqrt(half * half + p * p * b);
-        // Without noise: neither cancels.
+        // Extrema without noise; neither cancels.
         let (valley, before) = if half > 0.0 {
             ((half + root) / p, p * b / (half + root))
         } else {
@@ -84,7 +83,7 @@ impl Slope {
     }
 }
 
-/// The last place in [`low`, `high`] at which `holds`, which does at `low` and changes once.
+/// Returns the last t in [`low`, `high`] at which `holds` is true; it is true at `low` and changes once.
 fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..HALVINGS {
@@ -98,7 +97,6 @@ fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// A place beyond `from` at which it does not hold any more.
 fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let mut at = 2.0 * from;
     for _ in 0..DOUBLINGS {

@@ -1,14 +1,14 @@
 //! One relay at a given altitude: the paper's Corollary 1 and Theorem 1, for an interferer anywhere.
 //!
-//! SIR_2 rises with x. SIR_1 falls up to its valley and rises beyond (X > 0), so the worse of the two is best where they cross
-//! before the valley, or above Rx. With the interferer behind Tx (X < 0), which the paper leaves out, SIR_1 rises up to a hill
-//! and falls beyond: up to the hill both rise, so the best place is the hilltop, the crossing beyond it, or above Rx.
+//! SIR_2 rises with x. For X > 0 SIR_1 falls to a minimum and rises beyond, so the worse one is maximal where they cross before
+//! the minimum, or above Rx. With the interferer behind Tx (X < 0), which the paper omits, SIR_1 rises to a maximum and falls
+//! beyond. Up to the maximum both rise, so the optimum is the maximum, the crossing beyond it, or above Rx.
 //!
-//! With noise SIR_1 falls for good in the end: beyond its valley it has a hill, or neither. Up to the hill both rise; beyond it the best
-//! is the hilltop, the crossing, or above Rx.
+//! With noise SIR_1 finally falls: beyond its minimum it has a maximum, or it has neither. Up to the maximum both rise; beyond,
+//! the optimum is the maximum, the crossing, or above Rx.
 //!
-//! The crossing is a root of the paper's quartic. Its coefficients cancel in f32; the SIRs themselves do not, so the root is
-//! found by halving a stretch on which their difference changes its sign once.
+//! The crossing is a root of the paper's quartic. Its coefficients cancel in f32, but the SIRs themselves do not, so the root is
+//! found by bisection of an interval on which their difference changes its sign once.
 //!
 //! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
@@ -16,37 +16,37 @@ use super::{Found, Two};
 use crate::mission::{Mission, Profile};
 use crate::sir::{Extremum, first_hop_turn};
 
-/// Which case applied; the first five are Corollary 1's, for X >= 0.
+/// Case of the optimum; the first five are Corollary 1's, for X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
-    /// The first hop is the worse one even right above Tx, p_t / p_u < C_1: x = 0.
+    /// x = 0: the first hop is the worse one even right above Tx, p_t / p_u < C_1.
     AboveTx = 1,
-    /// SIR_1 falls all the way that counts and crosses SIR_2 once: x is there.
+    /// x of the only crossing: SIR_1 falls over the relevant range and crosses SIR_2 once.
     Crossing = 2,
-    /// The first hop is the better one wherever it is not rising: x = D.
+    /// x = D: the first hop is the better one wherever SIR_1 does not rise.
     AboveRx = 3,
-    /// The SIRs cross before the valley of SIR_1: x is there, or D if SIR_1 has recovered by then.
+    /// x of the crossing before the minimum of SIR_1, or D if SIR_1 has recovered by then.
     BeforeValley = 4,
-    /// The first hop is the better one even in its valley: x = D.
+    /// x = D: the first hop is the better one even at the minimum of SIR_1.
     OverValley = 5,
-    /// X < 0, and SIR_1 is the worse one even where it is best, on its hill: x is there.
+    /// x of the maximum of SIR_1, for X < 0: the first hop is the worse one even there.
     Hilltop = 6,
-    /// X < 0, and the SIRs cross beyond the hill of SIR_1: x is there.
+    /// x of the crossing beyond the maximum of SIR_1, for X < 0.
     BeyondHill = 7,
-    /// X < 0, and the first hop is the better one even above Rx, or rises all the way: x = D.
+    /// x = D, for X < 0: the first hop is the better one even above Rx, or SIR_1 rises over the whole range.
     HillAboveRx = 8,
-    /// The interferer stands at Tx (X = Y = 0), SIR_1 is the same everywhere: x = D.
+    /// x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level = 9,
-    /// The interferer stands at Rx (X = D, Y = 0), and no place helps: SIR_2 is 0; x = D.
+    /// x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned = 10,
-    /// With noise: the best is beyond the valley of SIR_1, on the hill that follows it, or where the SIRs cross beyond that.
+    /// Maximum that follows the minimum of SIR_1, or the crossing beyond it; with noise.
     SecondHill = 11,
 }
 
 impl PlaceCase {
-    /// The number that Corollary 1 has for it, 1 to 5; 0 for the cases that it leaves out.
+    /// Number of the case in Corollary 1, 1 to 5; 0 for cases that it omits.
     pub const fn printed(self) -> u8 {
         let number = self as u8;
         if number <= Self::OverValley as u8 {
@@ -57,9 +57,9 @@ impl PlaceCase {
     }
 }
 
-/// Where a relay that holds `profile` does best between Tx and Rx, and why; `None` in a field.
+/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case; `None` in a field.
 ///
-/// Any place of the interferer, any D and altitude that a mission takes. Work: at most 90 evaluations of both hops, and with noise 230 more.
+/// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two { mission, profile };
@@ -69,7 +69,7 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
         return Some((above_rx, PlaceCase::Drowned));
     }
     let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
-    // How far SIR_1 falls, and whether it rises again before Rx.
+    // End of the falling part of SIR_1, and true if it rises again before Rx.
     let turn = first_hop_turn(mission, interferer, profile.altitude_m);
     let (to, valley) = match turn {
         Extremum::Level => return Some((above_rx, PlaceCase::Level)),
@@ -103,7 +103,7 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCa
     })
 }
 
-/// The best on the hill that follows the valley of SIR_1, or beyond it, if that is before `end_m`.
+/// Returns the best position at or beyond the maximum that follows the minimum of SIR_1, if that is before `end_m`.
 fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;

@@ -1,7 +1,7 @@
-//! How to choose the powers of Tx and relay: the ratios p_t / p_u at which the cases of Corollary 1 change.
+//! Guide for the powers of Tx and relay: the ratios p_t / p_u at which the cases of Corollary 1 change.
 //!
-//! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at some place: above Tx (C_1),
-//! above Rx (C_2), and at the bottom of SIR_1's valley (C_3). The paper writes them out; here they are the SIRs' own formulas.
+//! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at one position: above Tx (C_1),
+//! above Rx (C_2), and at the minimum of SIR_1 (C_3). The paper prints them as formulas; here they are computed from the SIRs.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -22,16 +22,16 @@ use crate::sir::{Extremum, first_hop_turn};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
-    /// C_1: below it the first hop is the worse one even right above Tx; 0 with the interferer on Rx.
+    /// C_1: below it the first hop is the worse one even right above Tx; 0 with the interferer at Rx.
     pub c1: f32,
     /// C_2: above it the first hop is the better one even right above Rx.
     pub c2: f32,
-    /// C_3: above it the first hop is the better one even where it is worst, be that between Tx and Rx or beyond. Only for an
-    /// interferer ahead of Tx (X > 0); with noise, where it is worst before its hill.
+    /// C_3: above it the first hop is the better one even at the minimum of SIR_1, between Tx and Rx or beyond. `None` for X <=
+    /// 0; with noise, the minimum before the maximum.
     pub c3: Option<f32>,
 }
 
-/// The ratios for a relay at `altitude_m`, m, above 0; `None` in a field.
+/// Returns the ratios for a relay at `altitude_m`, m, above 0; `None` in a field.
 ///
 /// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
 pub fn ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {

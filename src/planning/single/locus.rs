@@ -1,20 +1,21 @@
-//! Where the two hops of a single relay have the same SIR: the paper's Lemma 1.
+//! Locus of equal SIR of both hops of a single relay: the paper's Lemma 1.
 //!
 //! With u = h^2, a = (x - X)^2 + Y^2, b = x^2, c = (D - x)^2 and G = (p_u / p_t)(mu_nlos / eta)((X - D)^2 + Y^2), SIR_1 = SIR_2
-//! is (a + u)(c + u) = G (b + u), that is
+//! is (a + u)(c + u) = G (b + u), or
 //!
 //! ```text
 //! u^2 + (a + c - G) u + a c - G b = 0,
 //! ```
 //!
-//! the paper's A u^2 + B u + C = 0 divided by A = p_t. With noise SIR_1 has a factor 1 + nu (a + u) below, K has the noise at Rx in it, and
+//! which is the paper's A u^2 + B u + C = 0 divided by A = p_t. With noise the denominator of SIR_1 has a factor 1 + nu (a + u),
+//! K includes the noise at Rx, and
 //!
 //! ```text
 //! (1 - G nu) u^2 + (a + c - G - G nu (a + b)) u + a c - G b - G nu a b = 0.
 //! ```
 //!
-//!  Worked out in f64, and so exact to the last place of the f32
-//! that comes out. Accuracy: `the_locus_is_where_the_hops_are_equal` in `host-tests/tests/theorems/`.
+//! Computed in f64, and so exact to the last place of the f32 result. Accuracy: `the_locus_is_where_the_hops_are_equal` in
+//! `host-tests/tests/theorems/`.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -29,10 +30,11 @@
 
 use crate::mission::Mission;
 
-/// The altitudes, m, lower first, at which a relay of `power_w` watts at `x_m` has SIR_1 = SIR_2: the paper's h^- and h^+.
+/// Returns the altitudes, m, lower first, at which a relay of `power_w` watts at `x_m` has SIR_1 = SIR_2: the paper's h^- and
+/// h^+.
 ///
-/// Any `x_m`, m, and `power_w`, W; altitudes are above 0 and not bounded by the mission's band. `None` for each that does not
-/// exist, both in a field. Constant work.
+/// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's band. `None` for each that does not
+/// exist, and for both in a field. Constant work.
 pub fn altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];
@@ -51,7 +53,7 @@ pub fn altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] 
     if discriminant < 0.0 {
         return [None; 2];
     }
-    // The root of the larger size first, the other from their product: neither cancels.
+    // The larger root first, the other one from their product: neither cancels.
     let far = -(half + libm::copysign(libm::sqrt(discriminant), half));
     let near = if libm::fabs(far) > 0.0 {
         product / far

@@ -1,18 +1,18 @@
-//! One relay alone between Tx and Rx: where the worse of its two hops is best.
+//! One relay between Tx and Rx: the position that maximises the worse SIR of its two hops.
 //!
-//! | what is given | file | source |
+//! | fixed | file | source |
 //! | --- | --- | --- |
-//! | the altitude, one interferer | [`given_altitude`] | Corollary 1, Theorem 1 |
-//! | the place along x, one interferer | [`given_x`] | Theorem 2 |
-//! | neither, one interferer | [`free`] | Theorem 3, as corrected |
-//! | with room beside the line, one interferer | [`aside`] | not in the paper |
-//! | the altitude, a field of interference | [`stochastic`] | Algorithm 3, as corrected |
-//! | noise alone | [`noise`] | the paper's special case without interference |
+//! | altitude, one interferer | [`given_altitude`] | Corollary 1, Theorem 1 |
+//! | x, one interferer | [`given_x`] | Theorem 2 |
+//! | nothing, one interferer | [`free`] | Theorem 3, as corrected |
+//! | nothing, with lateral room, one interferer | [`aside`] | not in the paper |
+//! | altitude, a field of interference | [`stochastic`] | Algorithm 3, as corrected |
+//! | altitude, noise only | [`noise`] | the paper's special case without interference |
 //!
-//! They rest on where the two SIRs are equal ([`locus`], Lemma 1) and on where that of the first hop turns
-//! ([`crate::sir::first_hop_turn`], Lemma 2); [`guide`] has C_1, C_2 and C_3, the ratios of powers at which the cases change.
-//! SIR_2 rises with x and falls with the altitude, always. Where receivers have noise SIR_1 may turn once more, and the best place of
-//! Theorem 3 may lie inside the box (`touching`); the mission's noise is in all of them but [`noise`], which has its own.
+//! They use the locus of equal SIRs ([`locus`], Lemma 1) and the extrema of the first hop's SIR ([`crate::sir::first_hop_turn`],
+//! Lemma 2). [`guide`] has C_1, C_2 and C_3, the power ratios at which the cases change. SIR_2 always rises with x and falls with
+//! the altitude. With receiver noise SIR_1 may have one more extremum, and the optimum of Theorem 3 may be inside the box
+//! (`touching`). All modules use the mission's noise but [`noise`], which has its own.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -50,27 +50,27 @@ use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
 
-/// Halvings of a stretch for the place where the SIRs cross: to an f32's own step, even next to Tx.
+/// Bisection steps for the crossing of the SIRs: to an f32's step, even near Tx.
 const HALVINGS: u8 = 40;
 
-/// Where a relay stands, and the SIR (linear; expected, in a field) of the worse of its two hops.
+/// Position of a relay, and the SIR (linear; in a field expected) of the worse of its two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found {
-    /// Where.
+    /// Position.
     pub place: Placement,
-    /// The worse of SIR_1 and SIR_2.
+    /// Smaller one of SIR_1 and SIR_2.
     pub sir: f32,
 }
 
 impl Found {
-    /// The better of two; this one if they are equal.
+    /// Returns the better of the two; this one if they are equal.
     fn or(self, other: Self) -> Self {
         if other.sir > self.sir { other } else { self }
     }
 }
 
-/// The two hops of the only relay of a mission, at one altitude.
+/// Two hops of a mission's only relay, at one altitude.
 #[derive(Clone, Copy)]
 struct Two<'a> {
     mission: &'a Mission,
@@ -97,8 +97,7 @@ impl Two<'_> {
         }
     }
 
-    /// The best of the two places next to where SIR_1 falls below SIR_2, in [`low`, `high`]: not below at the one end, and at
-    /// the other.
+    /// Returns the better of the two f32 positions at the crossing in [`low`, `high`], where SIR_1 falls below SIR_2.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

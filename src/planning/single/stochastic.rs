@@ -1,13 +1,13 @@
-//! One relay in a field: the paper's Algorithm 3, as corrected, and the place it converges to.
+//! One relay in a field: the paper's Algorithm 3, as corrected, and its limit.
 //!
-//! With one relay E(SIR_2) only rises with x, so a target gamma puts it at x = D - sqrt(A / gamma - h^2), where E(SIR_2) is
-//! gamma; E(SIR_1) there is what it is. The printed algorithm takes the first gamma, from the top, that E(SIR_1) meets. That
-//! is not the best: a place whose E(SIR_1) falls short of its gamma may still be better than one that meets a lower gamma.
-//! So it has to go on until gamma is no more than the best min(gamma, E(SIR_1)) seen.
+//! With one relay E(SIR_2) rises with x, so a target gamma determines x = D - sqrt(A / gamma - h^2), where E(SIR_2) is gamma. The
+//! printed algorithm takes the first gamma, from the top, that E(SIR_1) meets there. That is not optimal: a position whose
+//! E(SIR_1) is below its gamma may still be better than one that meets a lower gamma. So it has to continue until gamma is at
+//! most the best min(gamma, E(SIR_1)) so far.
 //!
-//! [`best_place`] needs no step: between two points of the field E(SIR_1) = c (a + b x) / (x^2 + h^2), which turns at the
-//! roots of a quadratic, so each stretch falls into pieces on which it only rises or only falls, and the best of a piece is
-//! at an end of it or where the two SIRs cross. [`stepped`] is the algorithm.
+//! [`best_place`] needs no step. Between two points of the field E(SIR_1) = c (a + b x) / (x^2 + h^2), whose extrema are the
+//! roots of a quadratic. So each section has intervals on which it is monotone, and the optimum of an interval is at an end or
+//! where the two SIRs cross. [`stepped`] is the algorithm.
 //!
 //! Accuracy: `host-tests/tests/single.rs`, against a dense search in f64.
 
@@ -17,20 +17,20 @@ use crate::mission::{Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// The best of [`low`, `high`], on which E(SIR_1) only rises or only falls.
+/// Returns the best position of [`low`, `high`], on which E(SIR_1) is monotone.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {
         return ends;
     }
-    // E(SIR_1) is above at the one end and below at the other, and E(SIR_2) only rises: they cross once.
+    // E(SIR_1) is above at one end and below at the other, and E(SIR_2) rises: they cross once.
     ends.or(two.crossing(low, high))
 }
 
-/// Where one relay that holds `profile` does best between Tx and Rx; `None` without a field.
+/// Returns the optimal position of a relay with `profile` between Tx and Rx; `None` without a field.
 ///
-/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops for each two points of the field; a plan's, not
-/// one for a relay's main loop.
+/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops per field point; not for a relay's main
+/// loop.
 pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.heard()?;
     let two = Two { mission, profile };
@@ -59,13 +59,13 @@ pub fn best_place(mission: &Mission, profile: Profile) -> Option<Found> {
     Some(best)
 }
 
-/// Where E(SIR_1) may turn in a stretch on which Upsilon is a straight line, rising: the roots of b x^2 + 2 a x - b h^2 = 0.
+/// Returns the extrema of E(SIR_1), rising, for a linear Upsilon: the roots of b x^2 + 2 a x - b h^2 = 0.
 fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);
     let a = at_low - b * low;
     if !(b.abs() * high > 1e-7 * at_low) {
-        // Upsilon is level: E(SIR_1) only falls.
+        // Upsilon is constant, so E(SIR_1) falls.
         return [high, high];
     }
     // Without cancellation: with q = -(a + sign(a) sqrt(a^2 + b^2 h^2)) the roots are q / b and -b h^2 / q.
@@ -75,9 +75,10 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
     [one.min(other), one.max(other)]
 }
 
-/// Algorithm 3 with the step `epsilon` (linear SIR, above 0), from the highest target on; `None` without a field.
+/// Runs Algorithm 3 with the step `epsilon` (linear SIR, above 0), from the highest target; `None` without a field.
 ///
-/// It looks only where E(SIR_2) is one of its targets, so a field that changes much between two of them may hold more. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// It only evaluates positions where E(SIR_2) is one of its targets, so it may miss the optimum of a field that changes much
+/// between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two { mission, profile };

@@ -1,35 +1,35 @@
-//! One relay in an upright plane with noise: the place inside the box at which the level lines of both SIRs touch.
+//! One relay in a vertical plane with noise: the position inside the box at which the level lines of both SIRs touch.
 //!
-//! In the plane y = y0, on the circle of radius r about (D, y0) SIR_2 is the same everywhere, and with z = x - D both squared distances
-//! are linear in z:
+//! In the plane y = y0, SIR_2 is constant on the circle of radius r about (D, y0), and with z = x - D both squared distances are
+//! linear in z:
 //!
 //! ```text
 //! l = r^2 + y0^2 + D^2 + 2 D z               from Tx
 //! s = r^2 + (D - X)^2 + (y0 - Y)^2 + 2 (D - X) z    from the interferer
 //! ```
 //!
-//! SIR_1 = A s / (l (1 + nu s)) has a slope by z of the sign of (D - X) l - D s - D nu s^2. The first two terms together do not depend
-//! on z:
+//! The slope of SIR_1 = A s / (l (1 + nu s)) by z has the sign of (D - X) l - D s - D nu s^2. The sum of the first two terms does
+//! not depend on z:
 //!
 //! ```text
 //! T = (D - X) y0^2 - X r^2 + D ((D - X) X - (y0 - Y)^2)
 //! ```
 //!
-//! So without noise SIR_1 only rises or only falls along the circle, and no place inside the box is the best: Theorem 3 as corrected.
-//! With noise and X < D it rises up to s = sqrt(T / (D nu)) and falls beyond: there it is best, above the ground where |z| < r. For
-//! X >= D the sign is below 0.
+//! So without noise SIR_1 is monotone along the circle, and no position inside the box is optimal: Theorem 3 as corrected. With
+//! noise and X < D it rises up to s = sqrt(T / (D nu)) and falls beyond; this maximum is above the ground if |z| < r. For X >= D
+//! the sign is negative.
 //!
-//! SIR_1 has no top off the ground (its slope by h is 0 only where l = s (1 + nu s), that by x then only for X = 0, where it is the sum
-//! of two that are not), so the most on a circle is the most within it, and does not fall with r, while SIR_2 does: they are equal at one
-//! r, which halving finds. A place inside the box that cannot be improved must be this one: there both slopes point in opposite
-//! directions, so along the circle SIR_1 is level, and the SIRs are equal.
+//! SIR_1 has no maximum off the ground: its slope by h is 0 only where l = s (1 + nu s), and then that by x only for X = 0, where
+//! it is the sum of two terms that are not. So the maximum on a circle is that of its inside, and does not fall with r, while
+//! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
+//! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
 use super::edge::{TwoHops, narrow};
 use super::{Found, HALVINGS};
 use crate::mission::{Band, Interferer};
 use crate::place::Placement;
 
-/// The touching place at `y_m` within [0, D] and `band`; `None` where it is not, and without noise. Work: 40 halvings in f64.
+/// Returns the touching position at `y_m`; `None` outside of [0, D] and `band`, and without noise. 40 bisection steps.
 pub(super) fn inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -69,7 +69,7 @@ pub(super) fn inside(
     within.then(|| hops.found(place))
 }
 
-/// An upright plane along the line, in m and m^2: D, X, (y0 - Y)^2, y0^2, nu, and G = K / A.
+/// Vertical plane along the line, in m and m^2: D, X, (y0 - Y)^2, y0^2, nu, and G = K / A.
 struct Face {
     d: f64,
     x: f64,
@@ -80,7 +80,7 @@ struct Face {
 }
 
 impl Face {
-    /// Where SIR_1 is best on the circle of radius `r`, as x - D.
+    /// Returns x - D of the maximum of SIR_1 on the circle of radius `r`.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
@@ -89,7 +89,7 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// The most of SIR_1 / A on it.
+    /// Returns the maximum of SIR_1 / A on the circle of radius `r`.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

@@ -1,24 +1,24 @@
-//! A claim to a node number, by which two nodes that use one number find out about each other.
+//! Claim to a node number, by which two nodes with the same number detect each other.
 
 use super::parts::{MessageError, read, write};
 use super::tag;
 
-/// Either way: the sender uses its node number since a start of its own; or the repetition of such a claim.
+/// Claim of the sender to its node number since its start, or the repetition of such a claim; sent in both directions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Claim number of the node: drawn at its start, and raised at most once while it is active.
+    /// Claim number of the node: drawn at its start, raised at most once while it is active.
     pub number: u32,
-    /// Claim number that the node has received last under its node number from another one; 0 for none.
+    /// Last claim number received under the node's own number from another node; 0 for none.
     pub heard: u32,
     /// True if the node is passive because another node uses its number.
     pub passive: bool,
-    /// True if the sender repeats to the destination what it received under the destination's number.
+    /// True if the sender repeats what it received under the destination's number.
     pub echo: bool,
 }
 
 impl Claim {
-    /// Flags from bit 0: passive, echo.
+    /// Encodes the claim; flags from bit 0: passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.heard].map(u32::to_le_bytes);

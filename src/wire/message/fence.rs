@@ -1,11 +1,11 @@
-//! The fence between two neighbours, as [`Fence`] has it.
+//! Encoding of a [`Fence`] between two neighbours.
 
 use super::parts::{MessageError, PassId, Word, read, write};
 use super::tag;
 use crate::guard::Fence;
 use crate::place::CrossSection;
 
-/// The number beside the mission is that of the association.
+/// Encodes a fence; the number in the pass id is that of the association.
 pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
     let numbers = [fence.echo, fence.number].map(Word::new);
@@ -14,7 +14,6 @@ pub(super) fn encode(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<u
     write(&(tag::FENCE, pass, numbers, places, fence.flags), buffer)
 }
 
-/// The mission of the sender, and the fence.
 pub(super) fn decode(body: &[u8]) -> Result<(u16, Fence), MessageError> {
     type FenceBody = (PassId, [Word; 2], [f32; 5], u8);
     let (pass, [echo, number], places, flags): FenceBody = read(body)?;

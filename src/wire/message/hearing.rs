@@ -1,4 +1,4 @@
-//! The pass on which relays add up what they hear, and what came of it.
+//! Messages of the pass that collects the relays' interference measurements.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,27 +9,27 @@ use crate::sensing::level::{Level, is_power};
 use crate::sensing::sums::{SUMS, Sums};
 use crate::wire::node_number::MAX_NODE;
 
-/// Bytes of the body: the tag, the pass, what is believed, the sums, what the receiver hears and who is off.
+/// Length of the body: tag, pass id, estimate, sums, receiver's level and the excluded node.
 pub(super) const LENGTH: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Onward: what is believed of the interference, and what the relays up to the sender hear. Back: what those from the sender on do.
+/// Interference estimate, and measurements: onward of the relays up to the sender, back of those from the sender on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub mission: u16,
-    /// What all of them believe from now on.
+    /// New estimate for all relays.
     pub told: Told,
-    /// What is heard.
+    /// Sums of the measurements.
     pub sums: Sums,
-    /// What the receiver hears.
+    /// Level at the receiver.
     pub receiver: Level,
-    /// Back: the node number of a relay that hears something else than all the others, whose share has been left out; 0 for none.
+    /// Node number of a relay that does not fit the others and is not included in `sums`; 0 for none. Used on the way back.
     pub off: u16,
 }
 
-/// A belief as one byte and four numbers, all of them 0 where they mean nothing.
+/// Estimate as one byte and four numbers, which are 0 if unused.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct BeliefBody {
     number: Word,
@@ -87,11 +87,10 @@ impl BeliefBody {
     }
 }
 
-/// The sums in two parts: postcard has no longer tuples.
+/// Sums in two parts, since serde has no longer tuples.
 type Parts = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {
-    /// The message of this tag, onward or back.
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         let [a, b, c, d, e, f, g, h, i, rest @ ..] = self.sums.numbers;

@@ -1,4 +1,4 @@
-//! What one node tells another about the chain as it sees it.
+//! Hello: a node's state of the chain.
 
 use super::parts::{MessageError, Word, read, write};
 use super::tag;
@@ -6,7 +6,7 @@ use crate::mission::MAX_RELAYS;
 use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 
-/// What one node tells another about the chain as it sees it.
+/// State of the chain as seen by one node, for another node.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "seven flags of the wire format"
@@ -14,45 +14,45 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
-    /// [`digest`](crate::wire::digest::digest) of the sender's mission, as it was loaded.
+    /// [`digest`](crate::wire::digest::digest) of the sender's mission as loaded before flight.
     pub mission: u16,
-    /// The latest view that the sender has heard of.
+    /// Latest view known to the sender.
     pub newest: ViewId,
-    /// The node that it takes for its neighbour on this side; 0 for none.
+    /// The sender's neighbour on this side; 0 for none.
     pub neighbour: u16,
-    /// Whether it asks for a hello in return.
+    /// True to request a hello in return.
     pub ask: bool,
-    /// Whether it asks for a new view.
+    /// True to request a new view.
     pub form: bool,
-    /// Whether it has been switched on and has had no part in anything yet.
+    /// True if the sender has restarted and has not taken part in anything yet.
     pub fresh: bool,
-    /// Whether it could come between the receiver and the node that the receiver takes there: whether it and that one hear each other.
+    /// True if the sender could join between the destination and the destination's neighbour: these two receive each other.
     pub ready: bool,
-    /// How many relays hang together from it on toward its other side, itself included: 1 to 1000.
+    /// Number of connected relays from the sender on toward its other side, 1 to 1000.
     pub behind: u16,
-    /// The nodes on this side that it hears, bit 0 for the nearest: 0 to 15.
+    /// Nodes on this side that the sender receives, bit 0 for the nearest: 0 to 15.
     pub hears: u8,
-    /// The newest mission that it holds.
+    /// Newest mission that the sender has.
     pub holds: MissionId,
-    /// Whether that is the one it flies.
+    /// True if the sender flies that mission.
     pub flies: bool,
-    /// Whether all relays of its view fly that, an uploaded mission.
+    /// True if all relays of the sender's view fly that mission, an upload.
     pub whole: bool,
-    /// Whether a relay that it knows of refuses that: the sender itself, which then flies and holds another one, or one beyond it.
+    /// True if a relay refuses that mission: the sender itself, which then flies another one, or one beyond it.
     pub refused: bool,
-    /// A number for the offer that answers it; 0 at a node that takes none.
+    /// Number for the offer that answers this hello; 0 if the sender accepts none.
     pub nonce: u16,
 }
 
 impl Hello {
-    /// Whether node `by`, which says this, hears node `of`, which is on the side that it says it to.
+    /// Returns true if node `by`, the sender, receives node `of`, on the side of the destination.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// The mission; the neighbour; how many are behind; the newest view; digest and version of what it holds; the number for an offer; whom it hears; flags from bit 0: asks for
-    /// a hello, asks for a new view, fresh, ready, flies what it holds, so do all of its view, refused.
+    /// Encodes mission, neighbour, `behind`, newest view, digest and version of `holds`, nonce, `hears`, and flags from bit 0:
+    /// `ask`, `form`, `fresh`, `ready`, `flies`, `whole`, `refused`.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
             ask, form, fresh, ..

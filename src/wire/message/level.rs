@@ -1,4 +1,4 @@
-//! How strong the interference is at an end of the chain, said by the ground.
+//! Interference level at an end of the chain, reported by the ground station.
 
 use super::parts::{MessageError, Word, read, write};
 use super::tag;

@@ -1,8 +1,7 @@
-//! What neighbours say to each other; `FORMAT.md` has the byte tables.
+//! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
-//! For each kind of message there is one file, with the type, the one way to write it and the one way to read it, which checks
-//! its ranges: what is read holds no number that a relay would have to doubt. A body is a byte, the `tag`, and postcard of a
-//! tuple, whose order is the format. `parts` has what several kinds have in common.
+//! Each kind of message has one file with its type, its encoder and its decoder, which checks all ranges: a decoded message has
+//! no invalid number. A body is a byte, the `tag`, and postcard of a tuple, whose order is the format. `parts` has shared parts.
 
 mod claim;
 mod fence;
@@ -35,104 +34,103 @@ use self::parts::{Word, read, write};
 use super::upload::Upload;
 use crate::guard::Fence;
 
-/// The longest body of a sweep: sixteen targets with what was measured, or from aside of the line.
+/// Maximum body of a sweep: sixteen targets with a measured field or with a lateral offset.
 const SWEEP: usize = 88;
 
-/// The longest body but an offer: what relays hear, or without the feature `sensing` a sweep.
+/// Maximum body except for an offer: measurements, or without the feature `sensing` a sweep.
 const LONG: usize = if cfg!(feature = "sensing") {
     hearing::LENGTH
 } else {
     SWEEP
 };
 
-/// Bytes of an upload, as a body and as it is stored: those of an offer but its last two.
+/// Length of an upload as a body and as stored, bytes: an offer without its last two bytes.
 #[cfg(feature = "upload")]
 pub use self::offer::UPLOAD;
 
-/// The longest body: an offer, or without the feature `upload` what relays hear, or a sweep.
+/// Maximum body: an offer.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
     offer::LENGTH
 } else {
     LONG
 };
-/// The longest body: an offer, or without the feature `upload` what relays hear, or a sweep.
+/// Maximum body: measurements, or without the feature `sensing` a sweep.
 #[cfg(not(feature = "upload"))]
 pub const MAX_BODY: usize = LONG;
 
-/// One message between neighbours. *Onward* is the way a pass goes: toward Rx, or toward Tx in a field.
+/// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Onward: targets, and how far the sender reaches for each.
+    /// Onward: targets, and the sender's reach for each.
     Sweep(Sweep),
-    /// Back: what became of them. It acknowledges the sweep of the same number.
+    /// Back: verdict on a sweep. It acknowledges the sweep of the same number.
     Verdict(Answer),
-    /// Back: the pass of this number has arrived, what became of it is not known yet. Sent for a repeated one only.
+    /// Back: the pass of this number has arrived, but has no result yet. Sent in reply to a repeated pass only.
     Busy {
-        /// The number of the pass.
+        /// Number of the pass.
         sweep: u16,
     },
-    /// Either way: a question whether the other one is there, an answer to one, or both.
+    /// Either direction: heartbeat request, reply, or both.
     Heartbeat {
-        /// The sender's mission digest, so that a wrong configuration shows before take-off.
+        /// Digest of the sender's mission, so that a wrong configuration is detected before take-off.
         mission: u16,
-        /// The number of the sender's question, 0 for none.
+        /// Number of the sender's request, 0 for none.
         ask: u16,
-        /// The number of the question that it answers, 0 for none.
+        /// Number of the answered request, 0 for none.
         answer: u16,
     },
-    /// Onward: what the relays up to the sender bring along.
+    /// Onward: profiles of the relays up to the sender.
     Gather(Roster),
-    /// Back: what those along the whole chain do.
+    /// Back: profiles of the whole chain.
     Gathered(Roster),
-    /// Onward: what is believed of the interference, and what the relays up to the sender hear.
+    /// Onward: interference estimate, and measurements of the relays up to the sender.
     Sense(Heard),
-    /// Back: what the relays from the sender on hear.
+    /// Back: measurements of the relays from the sender on.
     Sensed(Heard),
-    /// Onward: whose turn it is to move.
+    /// Onward: token of Algorithm 2.
     Token(Token),
-    /// Back: who has moved where.
+    /// Back: result of a token.
     Moved(Moved),
-    /// Onward: the leader of the view still holds it.
+    /// Onward: lease renewal by the view's leader.
     Pulse(Pulse),
-    /// Back: so do all that the pulse has come to.
+    /// Back: acknowledgement of a lease renewal.
     Pulsed(Pulsed),
-    /// Either way, also to nodes that are no neighbours: who the sender takes for its neighbour, and which view it holds.
+    /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Onward: who is there, for a new view of the chain.
+    /// Onward: proposal of a new view, which counts the present relays.
     Proposal(Proposal),
-    /// Back: how many there are.
+    /// Back: decision on a proposal.
     Decision(Decision),
-    /// Either way: the fence between two neighbours.
+    /// Either direction: fence between two neighbours.
     Fence {
-        /// [`digest`](super::digest::digest) of the sender's mission, as it was loaded; with the sites of an upload that it flies, where
-        /// that has any.
+        /// [`digest`](super::digest::digest) of the sender's mission as loaded before flight, combined with its upload's sites.
         mission: u16,
-        /// What the sender says of it.
+        /// State of the fence at the sender.
         fence: Fence,
     },
-    /// Either way, also from the ground: a mission that is newer than the one that the receiver holds.
+    /// Either direction, also from the ground: a mission that is newer than the destination's.
     #[cfg(feature = "upload")]
     Offer {
-        /// The mission.
+        /// Uploaded mission.
         upload: Upload,
-        /// The number of the receiver's hello that it answers, 0 for none.
+        /// Number of the destination's hello that it answers, 0 for none.
         answer: u16,
     },
-    /// From the ground: how strong the interference is at that end of the chain.
+    /// Ground to relay: interference level at that end of the chain.
     #[cfg(feature = "upload")]
     Level {
-        /// Digest of the mission that the relays were loaded with.
+        /// Digest of the mission loaded before flight.
         mission: u16,
-        /// Mean received power, W: 1e-30 to 1e6, with the noise of the end's receiver.
+        /// Mean received power, W: 1e-30 to 1e6, including the noise of that receiver.
         power_w: f32,
     },
-    /// Either way: a claim to the sender's node number, or the echo of one.
+    /// Either direction: claim to the sender's node number, or the echo of one.
     Claim(Claim),
 }
 
 impl Message {
-    /// The digest of the sender's mission; a [`Message::Busy`] and a [`Message::Claim`] bear none.
+    /// Returns the digest of the sender's mission; `None` for [`Message::Busy`] and [`Message::Claim`].
     pub const fn mission(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.mission),
@@ -155,7 +153,7 @@ impl Message {
         }
     }
 
-    /// Whether it is said of a pass that places come of: then its digest is that of a view of the chain.
+    /// Returns true for messages of a round, whose digest is that of mission and view.
     pub(crate) const fn is_of_a_view(&self) -> bool {
         matches!(
             self,
@@ -172,12 +170,12 @@ impl Message {
         )
     }
 
-    /// Whether it is said of a proposal: then its digest is that of the mission to be flown in it.
+    /// Returns true for messages of a view change, whose digest is that of the proposed mission.
     pub(crate) const fn is_of_a_proposal(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Whether it is a pass, which goes onward.
+    /// Returns true for messages that are sent onward in a pass.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
@@ -192,11 +190,12 @@ impl Message {
 }
 
 impl Message {
-    /// Writes the body into `buffer` and returns how many bytes it takes, at most [`MAX_BODY`]; `None` if it does not fit, or is of a method
-    /// that this relay was built without.
+    /// Encodes the body into `buffer`; returns its length, at most [`MAX_BODY`].
+    ///
+    /// `None` if it does not fit, or needs a feature that the crate was built without.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         match self {
-            // What it was built without it never says.
+            // Messages of a missing feature are never sent.
             Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
             Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
             #[cfg(feature = "upload")]
@@ -234,11 +233,11 @@ impl Message {
         }
     }
 
-    /// The message in `bytes`, with every number in its range. Work linear in their number, at most [`MAX_BODY`] of use.
+    /// Decodes a message and checks all ranges. Work linear in the length, at most [`MAX_BODY`].
     ///
     /// # Errors
-    /// [`MessageError::Encoding`] if it is not one message in its shortest form and nothing else, [`MessageError::Value`] for
-    /// a number that is not finite or outside its range, and for a message of a method that this relay was built without.
+    /// [`MessageError::Encoding`] if the bytes are not exactly one message in its shortest form, [`MessageError::Value`] for a
+    /// number that is not finite or out of range, and for a message of a missing feature.
     #[inline(never)]
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;

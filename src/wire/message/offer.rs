@@ -1,4 +1,4 @@
-//! A mission that is newer than the one that the receiver holds, as [`Upload`] has it.
+//! Encoding of an [`Upload`], in an offer and for storage.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,10 +9,9 @@ use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::sites::{self, Sites};
 use crate::wire::upload::Upload;
 
-/// Bytes of an upload: its tag, and what the fields of its wire form take, each of them always the same.
+/// Length of an encoded upload, bytes: its tag and the fixed-size fields of its wire form.
 pub const UPLOAD: usize = size_of::<u8>() + size_of::<OfferBody>();
 
-/// Bytes of the body.
 pub(super) const LENGTH: usize = UPLOAD + size_of::<Word>();
 
 pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
@@ -26,15 +25,16 @@ pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
     Ok((upload, answer.number()))
 }
 
-/// As it is stored: without what it answers, which says nothing of the mission.
+/// Stored form of an upload: an offer without `answer`.
 impl Upload {
-    /// Writes it as it is to be stored, [`Upload::LENGTH`] bytes, into `buffer`; `None` if it does not fit.
+    /// Encodes the upload for storage, [`Upload::LENGTH`] bytes, into `buffer`; `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         write(&(tag::OFFER, OfferBody::of(self)), buffer)
     }
 
-    /// Reads it back; `None` if `bytes` are anything but one upload in range. Whether they were stored whole is for a check
-    /// sequence around them to say.
+    /// Decodes a stored upload; `None` if `bytes` are not exactly one valid upload.
+    ///
+    /// The caller protects the stored bytes by a check sequence.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (&tag::OFFER, body) = bytes.split_first()? else {
             return None;
@@ -43,20 +43,19 @@ impl Upload {
     }
 }
 
-/// The wire form: version and base, and the numbers in the order of the digest, the sites last.
-///
-/// Packed, it takes as many bytes in memory as on the wire, which is where [`UPLOAD`] comes from.
+/// Wire form: version and base, the numbers in the order of the digest, and the sites. It is packed, so its size in memory is
+/// that on the wire, from which [`UPLOAD`] is computed.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// The number is the version, the mission the base.
+    /// Pass id: its number is the version, its mission the base.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// As [`Sites::to_bytes`] has them; all 0 for none.
+    /// Encoded by [`Sites::to_bytes`]; all 0 for none.
     sites: SitesBody,
 }
 

@@ -1,5 +1,6 @@
-//! What bodies of several kinds have in common, and the ranges of their numbers. A type of its own costs no byte, and saves
-//! the code to read it once more.
+//! Parts of several bodies, and the ranges of their numbers.
+//!
+//! A type of its own costs no bytes on the wire, and saves the code to read it again.
 
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -7,7 +8,7 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
-/// A number of 16 bits: always two bytes, which postcard would not make of a `u16`.
+/// 16-bit number in two bytes; postcard would encode a `u16` as a varint.
 #[derive(Clone, Copy, Deserialize)]
 pub(super) struct Word([u8; 2]);
 
@@ -28,19 +29,18 @@ impl Serialize for Word {
     }
 }
 
-/// Writes `body` to the start of `buffer`, and how many bytes it takes; `None` if it does not fit.
+/// Encodes `body` at the start of `buffer`; returns its length, or `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
     postcard::to_slice(body, buffer)
         .ok()
         .map(|written| written.len())
 }
 
-/// Reads what the start of `bytes` is, and gives the rest.
+/// Decodes the start of `bytes`, and returns the rest.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
     postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
 }
 
-/// Reads what `bytes` are, with nothing left over.
 pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
     match take(bytes)? {
         (body, []) => Ok(body),
@@ -48,8 +48,8 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Reads numbers of targets, and gives the rest. postcard reads longer encodings too, whose count is padded with empty varint
-/// bytes, and how many it puts up with depends on the width of a usize: what one node took, another would refuse.
+/// Decodes numbers of targets, and returns the rest. postcard also accepts longer encodings, with a count padded by empty varint
+/// bytes, up to a limit that depends on the width of usize. They are rejected here, so that all nodes accept the same.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -60,10 +60,9 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// No slack or reach in metres is larger: a place is at most 1e6, a reach of the last hop is cut at 1e9.
+/// Maximum slack or reach, m: a position is at most 1e6, and the last hop is limited to 1e9.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
-/// Which pass, of which mission.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct PassId {
     number: Word,
@@ -87,7 +86,6 @@ impl PassId {
     }
 }
 
-/// A place above the line.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(super) struct PlaceBody {
     x_m: f32,
@@ -102,24 +100,21 @@ impl PlaceBody {
         }
     }
 
-    /// The place, if a relay may be there.
     pub(super) fn checked(self) -> Option<Placement> {
         let place = Placement::on_line(self.x_m, self.altitude_m);
         is_place(place).then_some(place)
     }
 }
 
-/// Whether a relay may be there.
 pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Whether a relay may be so far from the line, m.
+/// Returns true if the lateral offset is in range, m.
 pub(super) fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
 
-/// The profile of these numbers, if they are in range.
 pub(super) fn profile(altitude_m: f32, power_w: f32) -> Option<Profile> {
     let profile = Profile {
         altitude_m,
@@ -128,21 +123,20 @@ pub(super) fn profile(altitude_m: f32, power_w: f32) -> Option<Profile> {
     profile.is_valid().then_some(profile)
 }
 
-/// Whether all numbers are within [`least`, `FARTHEST_M`].
 pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
     numbers
         .iter()
         .all(|number| (least..=FARTHEST_M).contains(number))
 }
 
-/// Why a body is no message.
+/// Reason why a body is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
-    /// Not the one encoding of any message, or bytes are left over.
+    /// Invalid or non-canonical encoding, or bytes are left.
     Encoding,
-    /// A number is not finite or outside its range.
+    /// Number that is not finite or outside its range.
     Value,
 }
 

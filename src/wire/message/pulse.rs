@@ -1,29 +1,29 @@
-//! A pulse, by which the relays of a view know that all of them still hold it, and what comes back of it.
+//! Lease renewal, and its acknowledgement.
 
 use super::parts::{MessageError, PassId, Word, read, write};
 use super::tag;
 
-/// Onward: the leader of the view still holds it.
+/// Lease renewal by the view's leader; sent onward.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
-    /// Its number, wrapping: all have taken part in the one before.
+    /// Number of the renewal, wrapping: all members have taken part in the one before.
     pub number: u16,
     /// Digest of the mission and the view.
     pub mission: u16,
-    /// How long a relay may hold the view after it has taken part in one, in tenths of a second: 1 to 65535.
+    /// Duration of the lease after a member has taken part in a renewal, in tenths of a second: 1 to 65535.
     pub lease: u16,
 }
 
-/// Back: the pulse has arrived.
+/// Acknowledgement of a lease renewal; sent back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulsed {
-    /// Number of the pulse.
+    /// Number of the renewal.
     pub number: u16,
     /// Digest of the mission and the view.
     pub mission: u16,
-    /// Whether it has come to the last relay, and back from there.
+    /// True if the renewal has reached the last relay and has been acknowledged by it.
     pub done: bool,
 }
 

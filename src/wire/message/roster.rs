@@ -1,45 +1,44 @@
-//! The pass of the joint method on which relays gather what each of them brings along, and what came of it.
+//! Messages of the gathering pass of the joint method, which collects the relays' profiles.
 
 use heapless::Vec;
 
 use super::parts::{MessageError, PassId, Word, profile, read, write};
 use crate::mission::MAX_RELAYS;
 
-/// The most relays that one roster names.
+/// Maximum number of relays in one roster.
 pub const MOST_NAMED: usize = 8;
 
-/// A relay that brings along something else than the mission says of all.
+/// Profile of a relay that differs from the mission's common one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Its place in the view, from 1 next to Tx.
+    /// Index of the relay in the view, from 1 next to Tx.
     pub index: u16,
-    /// The altitude it keeps to, m; 0 if it chooses.
+    /// Fixed altitude, m; 0 if the relay chooses.
     pub held_m: f32,
-    /// Its transmit power, W.
+    /// Transmit power, W.
     pub power_w: f32,
 }
 
-/// Some of those relays, in their order.
+/// Profiles of some relays, in the order of their indices.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// What relays bring along: onward of those up to the sender, back of those along the whole chain.
+/// Profiles: onward of the relays up to the sender, back of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub mission: u16,
-    /// Relays up to this one have been named by the passes before; 0 in the first one.
+    /// Index of the last relay in earlier passes; 0 in the first pass.
     pub after: u16,
-    /// The next ones. A full roster may leave some out; the next pass is for them.
+    /// Profiles of the relays after that one. If the roster is full, the next pass collects the rest.
     pub seats: OwnSeats,
 }
 
-/// For each relay its index, its altitude or 0, and its power.
+/// Index, altitude or 0, and power of each relay.
 type Parts = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
-    /// The message of this tag, onward or back.
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.mission);
         let mut parts = Parts::new();
@@ -51,7 +50,7 @@ impl Roster {
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (pass, after, parts): (PassId, Word, Parts) = read(body)?;
-        // No empty varint bytes in the count: see `take_targets`.
+        // The count has no empty varint bytes: see `take_targets`.
         if body.len() != 7 + 10 * parts.len() {
             return Err(MessageError::Encoding);
         }
@@ -62,7 +61,7 @@ impl Roster {
             seats: OwnSeats::new(),
         };
         let mut last = roster.after;
-        // By reference: what is left of an iterator by value is dropped by code that could panic.
+        // By reference, because the code that drops the rest of a by-value iterator could panic.
         for &(index, held_m, power_w) in &parts {
             let index = index.number();
             let chooses = held_m.to_bits() == 0;

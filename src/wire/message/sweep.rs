@@ -1,4 +1,4 @@
-//! A pass of targets along the chain, and the verdict on it, which travels back.
+//! Sweep of targets along the chain, and its verdict, which travels back.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,30 +12,30 @@ use crate::optimiser::ladder::{Ladder, TARGETS};
 use crate::optimiser::verdict::Verdict;
 use crate::place::{CrossSection, Station};
 
-/// One pass of targets along the chain, as one relay hands it to the next.
+/// Sweep of targets along the chain, from one relay to the next.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub mission: u16,
-    /// The targets.
+    /// Targets.
     pub ladder: Ladder,
-    /// Where the sender flies across the line, and its power.
+    /// Cross-section and power of the sender.
     pub relay: Station,
-    /// Whether relays are to be where the joint method has each of them across the line, and not where they were given.
+    /// True if relays use the joint method's cross-sections instead of their configured ones.
     pub chosen: bool,
-    /// Upsilon as the sender measures it where it stands, 1/W, in a closed loop.
+    /// Upsilon measured by the sender at its position, 1/W, in a closed loop.
     pub measured_per_w: Option<f32>,
-    /// The sender's place for each target, m along x; shorter than the ladder where the upper targets cannot be met.
+    /// Reach of the sender for each target, m along x; shorter than the ladder if the upper targets cannot be met.
     pub reaches: PerTarget,
 }
 
-/// What a sweep of each kind begins with; its reaches come last.
+/// Common start of all kinds of sweeps; the reaches come last.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Below zero for a plain pass.
+    /// Anchor of the ladder; negative for a plain pass.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -62,7 +62,7 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Upsilon or the distance from the line comes between head and reaches.
+    /// Encodes the sweep; Upsilon or the lateral offset comes between head and reaches.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -72,7 +72,6 @@ impl Sweep {
         }
     }
 
-    /// The sweep of this tag in `body`.
     pub(super) fn decode(tag: u8, body: &[u8]) -> Result<Self, MessageError> {
         let (head, rest): (SweepHead, _) = take(body)?;
         let (between, rest) = match tag {
@@ -88,7 +87,7 @@ impl Sweep {
     }
 }
 
-/// The sweep of these parts, if they are in range, at the cross-section chosen if there is a `y_m`.
+/// Checks the ranges of a sweep; with a `y_m` it is one at the joint method's cross-section.
 fn checked(
     head: SweepHead,
     y_m: Option<f32>,
@@ -118,18 +117,18 @@ fn checked(
     })
 }
 
-/// The verdict on one sweep, as it travels back.
+/// Verdict on a sweep; sent back.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Answer {
     /// Number of the sweep.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub mission: u16,
-    /// What became of the targets.
+    /// Results of the targets.
     pub verdict: Verdict,
-    /// Where the receiver is to stand when a target is committed, m along x; `None` for its own reach.
+    /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
     pub stand: Option<f32>,
-    /// Whether the sender or a relay after it differs from what the mission says of all.
+    /// True if the sender or a relay after it has a profile of its own.
     pub own: bool,
 }
 

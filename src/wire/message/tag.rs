@@ -1,4 +1,4 @@
-//! The first byte of a body: which message it is, or for a sweep what it says beside targets and reaches.
+//! Tags: the first byte of a body, which is the kind of message; sweeps have three kinds.
 
 pub(super) const SWEEP: u8 = 0;
 pub(super) const VERDICT: u8 = 1;

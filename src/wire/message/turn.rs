@@ -1,4 +1,4 @@
-//! A turn of Algorithm 2, and what it came to, which travels back.
+//! Token of Algorithm 2, and its result, which travels back.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,20 +7,20 @@ use super::tag;
 use crate::optimiser::local::Local;
 use crate::place::Placement;
 
-/// One turn of Algorithm 2.
+/// Token of Algorithm 2.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub mission: u16,
-    /// Where the sender stands now.
+    /// Current position of the sender.
     pub place: Placement,
-    /// The sender's transmit power, W.
+    /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// What this pass is for.
+    /// Action of this pass.
     pub turn: AdjustStep,
-    /// SIR of the chain before this pass, linear; 0 before it is known.
+    /// SIR of the chain before this pass, linear; 0 if unknown.
     pub sir: f32,
 }
 
@@ -59,24 +59,24 @@ impl Token {
     }
 }
 
-/// What a relay does when the token comes.
+/// Action of a relay that receives the token.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// It stays, and hears where its neighbours are.
+    /// Stay, and learn the neighbours' positions.
     Look,
-    /// It moves if that is better.
+    /// Move if another position is better.
     Move {
-        /// How far up or down it may, m: the paper's `epsilon_h`.
+        /// Maximum change of altitude, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// How it looks for a better place.
+        /// Local search.
         local: Local,
     },
-    /// It stays for good.
+    /// Stay for good.
     Stop,
 }
 
-/// A turn as one byte and three numbers, all of them 0 where they mean nothing.
+/// Action as one byte and three numbers, which are 0 if unused.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -107,7 +107,7 @@ impl StepBody {
         }
     }
 
-    /// The turn, if it could not be written otherwise and is in range.
+    /// Decodes the action; `None` if it is out of range or not the only encoding.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -132,16 +132,16 @@ impl StepBody {
     }
 }
 
-/// What a turn came to, as it travels back.
+/// Result of a token; sent back.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
     /// Number of the pass.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub mission: u16,
-    /// Where the sender stands now.
+    /// Current position of the sender.
     pub place: Placement,
-    /// Whether it or any relay after it has moved.
+    /// True if the sender or any relay after it has moved.
     pub any: bool,
     /// SIR of the worst hop after the sender, linear.
     pub worst: f32,
@@ -166,7 +166,6 @@ impl Moved {
     }
 }
 
-/// A linear SIR, if it is one.
 fn sir_in_range(sir: f32) -> Option<f32> {
     (0.0..=f32::MAX).contains(&sir).then_some(sir)
 }

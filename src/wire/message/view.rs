@@ -1,4 +1,4 @@
-//! The proposal of a new view of the chain, and the decision on it, which travels back.
+//! Proposal of a new view of the chain, and its decision, which travels back.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,40 +8,41 @@ use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 
-/// The proposal of a new view, as one relay hands it to the next.
+/// Proposal of a new view; sent onward from relay to relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
-    /// The mission that the view is to fly: the one that every relay up to the sender holds.
+    /// Mission of the view: the one that every relay up to the sender has.
     pub mission_id: MissionId,
-    /// The new view, after every one that its proposer has heard of.
+    /// New view, later than every view known to its proposer.
     pub view: ViewId,
-    /// How many relays it has come through, the sender included: 1 to 1000.
+    /// Number of relays that the proposal has reached, including the sender: 1 to 1000.
     pub place: u16,
-    /// What it has gathered from them.
+    /// Result of the poll so far.
     pub poll: Poll,
 }
 
-/// What a proposal has gathered.
+/// Poll of a proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
-    /// The newest view that any relay on the way knows to be agreed on.
+    /// Newest view that any polled relay knows to be agreed on.
     pub agreed: View,
-    /// How many of its members were on the way, 0 to 1000.
+    /// Number of polled members of that view, 0 to 1000.
     pub votes: u16,
-    /// Whether one of them is the one that proposed it: of two halves, theirs is the larger.
+    /// True if its proposer was polled: that half of a split view counts as the larger one.
     pub proposer: bool,
-    /// How long members of it that are elsewhere may still hold it, in tenths of a second.
+    /// Remaining lease of members of that view that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// How long its places are still not to be taken, for the sake of earlier views, in tenths of a second; 65535 where nobody knows.
+    /// Time until positions of the new view may be used, because of leases of earlier views, in tenths of a second; 65535 if
+    /// unknown.
     pub rest: u16,
-    /// The latest successor of it that a member has accepted, which may have been agreed on.
+    /// Latest successor of that view that a member has accepted; it may have been agreed on.
     pub successor: Option<Successor>,
 }
 
 impl Poll {
-    /// Of the members of `agreed`, before any has been asked.
+    /// Returns an empty poll of the members of `agreed`.
     pub(crate) const fn of(agreed: View) -> Self {
         Self {
             agreed,
@@ -54,37 +55,36 @@ impl Poll {
     }
 }
 
-/// A view that was decided on, and may have been agreed on.
+/// View that was decided, and may have been agreed on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
-    /// The proposal that the decision was on.
+    /// Proposal of the decision.
     pub proposal: ViewId,
-    /// The view: the one proposed, or one that was found to be decided on before.
+    /// Decided view: the proposed one, or one that was found to be decided before.
     pub view: View,
 }
 
-/// What came of a proposal, as it travels back.
+/// Decision on a proposal; sent back.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
-    /// The mission that was proposed.
+    /// Proposed mission.
     pub mission_id: MissionId,
-    /// The view that was proposed.
+    /// Proposed view.
     pub proposal: ViewId,
-    /// The sender's place, from 1 at the one that has proposed: 1 to 1000.
+    /// Position of the sender on the proposal's path, from 1 at the proposer: 1 to 1000.
     pub place: u16,
-    /// How many relays the proposal has come through: 1 to 1000.
+    /// Number of relays that the proposal has reached: 1 to 1000.
     pub there: u16,
-    /// The newest view that any relay on the way knew to be agreed on: what is decided follows it.
+    /// Newest view that any polled relay knows to be agreed on, which the decision follows.
     pub base: View,
-    /// The view to be accepted: the one proposed, or one that was decided on before; `None` if too few members are there.
+    /// View to accept: the proposed one, or one that was decided before; `None` without a quorum.
     pub view: Option<View>,
-    /// How long its places are not to be taken, for the sake of members of the view before that are elsewhere, in tenths of a second.
+    /// Time until its positions may be used, because of members of the previous view that were not polled, in tenths of a second.
     pub lease_left: u16,
 }
 
-/// A mission, a proposal and a place.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct CallBody {
     digest: Word,
@@ -103,7 +103,6 @@ impl CallBody {
         }
     }
 
-    /// The numbers, if they are in range.
     fn checked(self) -> Option<(MissionId, ViewId, u16)> {
         let mission_id = MissionId {
             version: self.version.number(),
@@ -116,7 +115,6 @@ impl CallBody {
     }
 }
 
-/// A view and its size.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SizedBody {
     id: [u8; 4],
@@ -139,7 +137,7 @@ impl SizedBody {
     }
 }
 
-/// Whether a chain can be in it.
+/// Returns true if the view can exist.
 fn is_view(view: View) -> bool {
     (view.id == ViewId::LOADED || view.id.is_proposed()) && is_size(view.relays)
 }
@@ -171,7 +169,7 @@ impl Proposal {
         )
     }
 
-    /// What is agreed on, or was decided on, was proposed before.
+    /// Decodes a proposal; agreed or decided views must be earlier ones.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);

@@ -1,4 +1,4 @@
-//! Two sessions that say handshake to each other, and a table that is too small for all who do.
+//! Handshakes of two sessions, and a table with fewer entries than nodes.
 
 use super::{Checked, HELLO, PEERS, Session};
 use crate::node::duplicate::{RAISED, Rival, Sender};
@@ -10,20 +10,18 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// [`PEERS`] as node numbers count.
+/// [`PEERS`] as a node number.
 const ROOM: u16 = 8;
 
-/// As `Settings::dead_after`.
+/// Value of `Settings::dead_after`.
 const GONE: Duration = Duration::from_millis(15_000);
 
 const KEY: Key = Key::new([0xA5; 32]);
 
-/// Node 1 of epoch 5.
 fn session() -> Session {
     Session::new(Auth { key: KEY, epoch: 5 }, 0, GONE)
 }
 
-/// A frame without COBS.
 type Plain = Vec<u8>;
 
 fn plain(frame: &FrameBuf, len: usize) -> Plain {
@@ -35,7 +33,7 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// What `from`, of node `addresses.0`, sends to node `addresses.1`: a handshake, or busy.
+/// Returns a frame of `from`, node `addresses.0`, to node `addresses.1`: a handshake or a `Busy`.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
@@ -65,7 +63,7 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Hands over the handshakes that both owe each other, and how many those were; `counters` of `one` and `other`.
+/// Exchanges all pending handshakes, and returns their number; `counters` are those of `one` and `other`.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -93,7 +91,7 @@ fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     }
 }
 
-/// Session of node `node`, epoch `epoch`, that has met node 1's `own`.
+/// Returns the session of node `node`, epoch `epoch`, after handshakes with node 1's `own`.
 fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
     let mut other = Session::new(Auth { key: KEY, epoch }, 0, GONE);
     other.greet(1);
@@ -114,12 +112,12 @@ fn three_handshakes_make_a_link_known_and_four_where_they_cross() {
         let said = meet([(&mut one, 1), (&mut other, 2)], &mut [0; 2]);
         assert_eq!(said, if crossing { 4 } else { 3 });
         assert!(one.knows(2) && other.knows(1));
-        // Nothing is owed any more.
+        // No handshake is pending.
         assert_eq!((one.take_handshake(), other.take_handshake()), (None, None));
     }
 }
 
-/// Whichever handshake is lost: whoever is left in doubt asks again, and is answered.
+/// Handshakes are lost: the end without proof requests again, and receives a reply.
 #[test]
 fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
     for lost in 0..4 {
@@ -134,7 +132,7 @@ fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
                 } else {
                     (&mut other, &mut one, (2, 1), &mut counters[1])
                 };
-                // As a relay that has something to say.
+                // A relay with a message to send.
                 if from.find(ends.1).is_some() && !from.knows(ends.1) {
                     from.greet(ends.1);
                 }
@@ -174,7 +172,7 @@ fn a_body_of_a_handshake_says_who_is_known() {
     );
 }
 
-/// The neighbours stay, of the others the one that was used last; and what was recorded before is worth nothing after.
+/// Pinned entries and the most recently used one stay; earlier recordings are rejected.
 #[test]
 fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     let mut own = session();
@@ -197,7 +195,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert!(own.knows(2) && own.knows(3) && !own.knows(20) && !own.knows(30));
     assert!(own.knows(29 + ROOM));
     assert_eq!(check(&mut own, &recorded), Checked::Forged);
-    // A recorded handshake makes an entry, and is no proof: that has another nonce.
+    // A recorded handshake creates an entry but is no proof, since it contains another nonce.
     assert_eq!(check(&mut own, &handshake), Checked::Unproven);
     assert!(!own.knows(20));
     assert_eq!(check(&mut own, &recorded), Checked::Forged);
@@ -218,7 +216,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Handshakes recorded of many nodes take the place of those only that have proven nothing.
+/// Recorded handshakes of many nodes replace only entries of unproven nodes.
 #[test]
 fn recorded_handshakes_do_not_drive_out_who_is_known() {
     let mut handshakes = Vec::new();
@@ -245,8 +243,7 @@ fn recorded_handshakes_do_not_drive_out_who_is_known() {
     }
 }
 
-/// A node that was switched on again without a word, or has forgotten this one, is not heard, and hears nothing; greeted, it is
-/// met again.
+/// A node that restarted without a handshake, or forgot this one, has no session in either direction; `greet` starts one.
 #[test]
 fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();
@@ -284,7 +281,6 @@ fn a_handshake_of_another_length_is_forged() {
     }
 }
 
-/// A nonce is never used twice.
 #[test]
 fn after_the_last_nonce_nobody_new_is_met() {
     let mut own = session();
@@ -296,7 +292,7 @@ fn after_the_last_nonce_nobody_new_is_met() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// A node that has begun again with an older epoch, or with the same, says handshakes for ever; what was recorded is one frame.
+/// A node with an older or reused epoch repeats handshakes; a replayed recording is a single frame.
 #[test]
 fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not() {
     for epoch in [1, 7] {
@@ -334,7 +330,7 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
     }
 }
 
-/// What a frame under the own number says: claim numbers and epochs of the sender, by the own key or another.
+/// Frames under the own number: claim numbers and epochs of the sender, with the own key or another.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -366,7 +362,7 @@ fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     }
 }
 
-/// An echo of what a node has sent to its neighbour, handshake and message.
+/// Echo of a node's own frames, handshake and message.
 #[test]
 fn frames_of_its_own_are_recognised() {
     let mut counters = [0; 2];
@@ -378,7 +374,7 @@ fn frames_of_its_own_are_recognised() {
     }
 }
 
-/// Two nodes 2 of one epoch at node 1: it believes the larger claim, and shows that to the smaller one, which thus learns of it.
+/// Two nodes 2 of one epoch at node 1, which accepts the larger claim and shows that to the smaller one.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     const FAR: u32 = 1 << 20;
@@ -414,7 +410,7 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
         assert_eq!(small.poll_rival(), Some(rival));
         check(&mut large, &answer);
         assert_eq!(large.poll_rival(), None);
-        // It raises its claim number, to keep its place: the node believes it from then on.
+        // The node raises its claim number, and is accepted from then on.
         small.restart(FAR | RAISED);
         small.greet(1);
         let asks = frame(&mut small, (2, 1), true, 0);
@@ -422,8 +418,8 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     }
 }
 
-/// Node 2 with the larger claim falls silent: the one with the smaller claim is believed once it was for long enough, and nothing recorded of the
-/// larger one is taken from then on, until that one is heard itself.
+/// Node 2 with the larger claim falls silent: after the timeout the smaller claim is accepted, and recordings of the larger one
+/// are rejected until that node itself is received.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

@@ -1,6 +1,6 @@
-//! The parts that bodies are written of.
+//! Encoders of the parts of bodies.
 
-/// What the message of a pass begins with: its tag, its number, the digest.
+/// Encodes the start of a pass: tag, number, digest.
 pub(super) fn pass(tag: u8, numbers: [u16; 2]) -> Vec<u8> {
     let mut out = vec![tag];
     words(&mut out, &numbers);

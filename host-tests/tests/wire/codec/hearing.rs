@@ -1,4 +1,4 @@
-//! What relays hear and believe of the interference: onward and back alike.
+//! Interference measurements and estimates, in both directions.
 
 use serde::Deserialize;
 use uav_relay::Interferer;
@@ -8,18 +8,18 @@ use uav_relay::wire::message::{Heard as Taken, Message};
 use super::bytes::{pass, reals, words};
 use super::reader::Reader;
 
-/// What a hearing says, but for its tag.
+/// Content of a Sense or Sensed message.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Heard {
     pub(crate) number: u16,
     pub(crate) mission: u16,
-    /// Number and kind of what is believed.
+    /// Number and kind of the current estimate.
     pub(crate) told: u16,
     pub(crate) kind: u8,
-    /// Power, X and Y of the source, and what the receiver hears of it.
+    /// Power, X and Y of the source, and its power at the receiver.
     pub(crate) source: [f32; 4],
     pub(crate) sums: [f32; 18],
-    /// What the receiver hears, and of how many measurements.
+    /// Power at the receiver, and its number of measurements.
     pub(crate) receiver: [f32; 2],
     pub(crate) off: u16,
 }
@@ -36,7 +36,7 @@ impl Heard {
         out
     }
 
-    /// The message that says this, read by the crate: nobody but a relay adds sums up.
+    /// Decodes the message by the crate, because only relays can add sums.
     pub(super) fn message(&self, tag: u8) -> Message {
         let message = Message::decode(&self.body(tag)).unwrap();
         let ((17, Message::Sense(hearing)) | (18, Message::Sensed(hearing))) = (tag, &message)
@@ -47,7 +47,7 @@ impl Heard {
         message
     }
 
-    /// Whether that is what the crate has read.
+    /// Returns true if the crate decoded the same content.
     fn is(&self, hearing: &Taken) -> bool {
         let [power_w, x_m, y_m, receiver_w] = self.source;
         let source = Interferer { power_w, x_m, y_m };
@@ -62,7 +62,7 @@ impl Heard {
             number: self.told,
             belief,
         };
-        // That they are in their order only this shows.
+        // Only this shows that the sums are in order.
         let sums = format!("Sums {{ numbers: {:?} }}", self.sums);
         hearing.number == self.number
             && hearing.mission == self.mission

@@ -1,4 +1,4 @@
-//! What a hello says.
+//! Hello message.
 
 use serde::Deserialize;
 use uav_relay::ViewId;
@@ -9,14 +9,13 @@ use super::bytes::{pass, words};
 use super::limits::is_count;
 use super::reader::Reader;
 
-/// What a hello says.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Greeting {
     pub(crate) mission: u16,
     pub(crate) neighbour: u16,
     pub(crate) behind: u16,
     pub(crate) newest: u32,
-    /// Digest and version of the mission held.
+    /// Digest and version of the held mission.
     pub(crate) holds: (u16, u16),
     pub(crate) nonce: u16,
     pub(crate) hears: u8,

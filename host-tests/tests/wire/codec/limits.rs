@@ -1,10 +1,10 @@
-//! Which numbers a message may say.
+//! Ranges of numbers in messages.
 
 pub(super) fn is_count(relays: u16) -> bool {
     (1..=1000).contains(&relays)
 }
 
-/// Whether a node may have proposed that: its number is in the low ten bits, the number of the view above.
+/// Returns true if a node may propose `view`: node number in the low ten bits, view number above.
 pub(super) fn is_proposed(view: u32) -> bool {
     (1..=1000).contains(&(view % 1024)) && view >= 1024
 }

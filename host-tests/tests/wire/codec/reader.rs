@@ -1,6 +1,6 @@
-//! A body that is read, part by part.
+//! Decoder of the parts of a body.
 
-/// What is left of a body; every method is `None` where the bytes are no such thing.
+/// Rest of a body; every method returns `None` for invalid bytes.
 pub(super) struct Reader<'a>(pub(super) &'a [u8]);
 
 impl Reader<'_> {

@@ -1,4 +1,4 @@
-//! Who brings what along: a gathering, and its answer.
+//! Profiles of relays: Gather and Gathered.
 
 use serde::Deserialize;
 use uav_relay::wire::message::{OwnSeat, Roster};
@@ -7,14 +7,14 @@ use super::bytes::{pass, reals};
 use super::limits::{is_altitude, is_power};
 use super::reader::Reader;
 
-/// What a gathering says, and its answer.
+/// Content of a Gather or Gathered message.
 #[expect(clippy::struct_field_names, reason = "the vectors name it so")]
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Seats {
     pub(crate) number: u16,
     pub(crate) mission: u16,
     pub(crate) after: u16,
-    /// Place, altitude or 0, power of each.
+    /// Relay, altitude or 0, and power of each.
     pub(crate) seats: Vec<(u16, f32, f32)>,
 }
 

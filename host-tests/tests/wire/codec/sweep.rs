@@ -1,4 +1,4 @@
-//! A pass of targets: what is told onward, and the verdict that comes back.
+//! Sweep of targets, and its verdict.
 
 use serde::Deserialize;
 use uav_relay::optimiser::PerTarget;
@@ -11,12 +11,12 @@ use super::bytes::{list, option, pass, reals};
 use super::limits::{is_altitude, is_place, is_power};
 use super::reader::Reader;
 
-/// What every sweep says.
+/// Common content of all sweeps.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Swept {
     pub(crate) number: u16,
     pub(crate) mission: u16,
-    /// Below zero in a plain pass.
+    /// Negative in a plain pass.
     pub(crate) anchor: f32,
     pub(crate) gap: u8,
     pub(crate) growth: u8,
@@ -26,7 +26,7 @@ pub(crate) struct Swept {
 }
 
 impl Swept {
-    /// The body; what some sweeps say more stands before the reaches.
+    /// Encodes the body, with the numbers `more` before the reaches.
     pub(super) fn body(&self, tag: u8, more: &[f32]) -> Vec<u8> {
         let mut out = pass(tag, [self.number, self.mission]);
         reals(&mut out, &[self.anchor]);
@@ -37,7 +37,7 @@ impl Swept {
         out
     }
 
-    /// The message: from beside the line, where that is chosen; with what is measured.
+    /// Converts to the crate's message, with a chosen lateral offset or a measured Upsilon.
     pub(super) fn message(&self, chosen_y_m: Option<f32>, measured_per_w: Option<f32>) -> Message {
         let ladder = Ladder::from_parts(self.anchor.abs(), self.gap, self.growth).unwrap();
         Message::Sweep(Sweep {
@@ -57,7 +57,7 @@ impl Swept {
         })
     }
 
-    /// Whether there is such a ladder, with no more reaches than it has targets, and all numbers are in range.
+    /// Returns true if the ladder is valid with enough targets, and all numbers are in range.
     pub(super) fn in_range(&self) -> bool {
         let targets = targets(self.anchor.abs(), self.gap, self.growth);
         (self.gap > 0 || self.growth == 0)
@@ -69,7 +69,7 @@ impl Swept {
             && is_power(self.power_w)
     }
 
-    /// A sweep, and the numbers that stand before its reaches.
+    /// Decodes a sweep with the numbers before its reaches.
     pub(super) fn read<const N: usize>(rest: &mut Reader) -> Option<(Self, [f32; N])> {
         let mut sweep = Self {
             number: rest.word()?,
@@ -87,8 +87,7 @@ impl Swept {
     }
 }
 
-/// A ladder's targets. Every step is worked out in f64, where sum, product and quotient of two f32 keep more than twice
-/// their digits, and then rounded to f32: the same as one f32 operation, by another route.
+/// Returns a ladder's targets; each step is rounded from f64, which equals one f32 operation.
 pub(crate) fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];
@@ -119,7 +118,7 @@ pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// What a verdict says.
+/// Content of a verdict.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Judged {
     pub(crate) number: u16,

@@ -1,4 +1,4 @@
-//! A turn of Algorithm 2: the token onward, and what came of it back.
+//! Turn of Algorithm 2: token and result.
 
 use serde::Deserialize;
 use uav_relay::wire::message::{AdjustStep, Message, Moved, Token};
@@ -8,7 +8,7 @@ use super::bytes::{pass, reals};
 use super::limits::{is_altitude, is_place, is_power, is_sir};
 use super::reader::Reader;
 
-/// What a token says.
+/// Content of a token.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Handed {
     pub(crate) number: u16,
@@ -85,7 +85,7 @@ impl Handed {
     }
 }
 
-/// What came of a turn.
+/// Result of a turn.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub(crate) struct Shifted {
     pub(crate) number: u16,

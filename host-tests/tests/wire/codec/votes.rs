@@ -1,4 +1,4 @@
-//! The votes on a view: the proposal and the decision on it.
+//! Votes on a view: proposal and decision.
 
 use serde::Deserialize;
 use uav_relay::wire::digest::MissionId;
@@ -11,7 +11,7 @@ use super::bytes::{pass, words};
 use super::limits::{is_count, is_proposed};
 use super::reader::Reader;
 
-/// A view and how many relays it has.
+/// View and its number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct SizedView {
     pub(crate) id: u32,
@@ -35,7 +35,7 @@ impl SizedView {
         is_proposed(self.id) && is_count(self.relays)
     }
 
-    /// Whether it is a proposed one, or the chain as it was loaded.
+    /// Returns true for a proposed view or the chain as loaded.
     pub(super) fn is_view(self) -> bool {
         (self.id == 0 || is_proposed(self.id)) && is_count(self.relays)
     }
@@ -48,7 +48,7 @@ impl SizedView {
     }
 }
 
-/// What a proposal and the decision on it have in common: of which mission, which view, and the place of the sender.
+/// Common content of proposals and decisions: mission, view, and the sender's place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Call {
     /// Digest and version of the mission.
@@ -82,7 +82,6 @@ impl Call {
     }
 }
 
-/// What a proposal says.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Proposed {
     pub(crate) call: Call,
@@ -91,7 +90,7 @@ pub(crate) struct Proposed {
     pub(crate) lease_left: u16,
     pub(crate) rest: u16,
     pub(crate) proposer: bool,
-    /// The proposal that was decided on, and the view that was decided for.
+    /// Accepted successor: the proposal by which it was decided, and the view.
     pub(crate) successor: Option<(u32, SizedView)>,
 }
 
@@ -136,7 +135,7 @@ impl Proposed {
             && self
                 .successor
                 .is_none_or(|(proposal, view)| is_proposed(proposal) && view.is_proposed())
-            // All of that was proposed before.
+            // The views were proposed earlier.
             && agreed.id < self.call.view
             && self.successor.is_none_or(|(proposal, view)| {
                 proposal < self.call.view && view.id <= proposal
@@ -156,11 +155,11 @@ impl Proposed {
     }
 }
 
-/// What a decision says.
+/// Content of a decision.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(crate) struct Decided {
     pub(crate) call: Call,
-    /// What the decision follows.
+    /// View that the decision follows.
     pub(crate) base: SizedView,
     pub(crate) view: Option<SizedView>,
     pub(crate) there: u16,

@@ -1,4 +1,4 @@
-//! A relay, and what it is handed.
+//! Relays and messages for the tests.
 
 use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
@@ -34,7 +34,7 @@ pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Relay 2 of 3, with or without a key.
+/// Returns relay 2 of 3, with a key if it `signs`.
 pub(super) fn relay(signs: bool) -> Node {
     relay_of(base(), 2, signs)
 }
@@ -51,7 +51,7 @@ pub(super) fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
     let identity = Identity { network: 1, index };
     let mut node = Node::new(&mission, identity, &settings, 1, Instant::ZERO);
     node.begin(identity, 1, Instant::ZERO);
-    // What it says by itself after so long.
+    // Discards the first messages, which the relay sends by itself.
     node.handle_timeout(NOW);
     said(&mut node);
     node
@@ -76,7 +76,7 @@ pub(super) fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
     said
 }
 
-/// A hello of a neighbour that has taken relay 2.
+/// Returns a hello of a neighbour that has selected relay 2.
 pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,

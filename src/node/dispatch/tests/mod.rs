@@ -1,4 +1,4 @@
-//! What one relay does on its own: what it is handed, and what it says of it.
+//! Tests of one relay: received messages, and its replies and events.
 
 mod fixture;
 mod offers;

@@ -1,4 +1,4 @@
-//! What a relay does with an offer and a proposal, and says of them.
+//! Tests of offers and proposals.
 
 use super::fixture::{NOW, base, hello, relay, relay_of, said, upload, upload_to};
 use crate::mission::tests::paper;
@@ -14,7 +14,7 @@ use crate::wire::upload::Upload;
 
 const LENGTH: usize = Upload::LENGTH;
 
-/// The first view that relay 1 proposes.
+/// First view proposed by relay 1.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 
 fn proposal(mission_id: MissionId) -> Message {
@@ -33,13 +33,13 @@ fn proposal(mission_id: MissionId) -> Message {
     })
 }
 
-/// An offer that answers a hello that is said just now.
+/// Returns an offer that answers a hello sent at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
     let answer = node.ask_number(NOW);
     Message::Offer { upload, answer }
 }
 
-/// What it offers to a node that said number `answer` in its last hello.
+/// Returns an offer to a node whose last hello had the number `answer`.
 fn offered(upload: Upload, answer: u16) -> Message {
     Message::Offer { upload, answer }
 }
@@ -68,7 +68,7 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!(node.layers.update.latest(), new.id());
     assert_ne!(node.member.active, new.id());
-    // An offer answers a hello: it asks for one.
+    // An offer answers a hello, so relay 2 requests one.
     let told = said(&mut node);
     assert!(
         matches!(
@@ -83,10 +83,10 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     let behind = hello(&node, old);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
     assert_eq!(said(&mut node), [(3, offered(new, 9))]);
-    // A proposal waits for it, too.
+    // A proposal waits for the offer too.
     node.handle_message(NOW, Side::Upstream, 1, &proposal(new.id()));
     assert_eq!(said(&mut node), [(3, offered(new, 9))]);
-    // It says that it holds it.
+    // Relay 3 reports the mission.
     let holds = hello(&node, new.id());
     node.handle_message(NOW, Side::Downstream, 3, &holds);
     let told = said(&mut node);
@@ -109,13 +109,13 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     );
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
-    // Whoever it may be newer for is asked at once for a hello that an offer can answer.
+    // A neighbour without a known mission is at once requested to send a hello, which an offer can answer.
     let told = said(&mut node);
     assert!(
         matches!(told[..], [(1, Message::Hello(Hello { ask: true, .. }))]),
         "{told:?}"
     );
-    // Again and again, as nobody answers, and less and less often.
+    // Without a reply the offer is repeated, less and less often.
     let mut at: heapless::Vec<u64, 40> = heapless::Vec::new();
     for ms in 1..4_000 {
         let now = NOW + Duration::from_millis(ms);
@@ -146,7 +146,7 @@ fn without_a_key_nothing_is_taken() {
     );
     assert_eq!(node.upload(), None);
     assert_eq!(said(&mut node), []);
-    // Nor is the ground anybody to listen to.
+    // Messages of the ground are not accepted either.
     assert_eq!((node.side_of(0), node.side_of(4)), (None, None));
     let signed = relay(true);
     assert_eq!(signed.side_of(0), Some(Side::Upstream));
@@ -176,7 +176,7 @@ fn an_offer_for_other_relays_is_refused() {
     );
 }
 
-/// Two that do not take each other for neighbours, but one of them the other: offers and hellos must come to an end.
+/// Offers and hellos between two nodes must end if only one has selected the other as its neighbour.
 #[test]
 fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
@@ -207,7 +207,7 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     );
 }
 
-/// Hours later, or just too late, an offer is nothing but a reason to say a hello; one that answers that is taken.
+/// A late offer only triggers a hello; an offer that answers that hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {
@@ -219,7 +219,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             let held = node.layers.update.latest();
             let withheld = offer(&mut node, upload(1));
             if hellos {
-                // It goes on saying hellos; their number is another one by then.
+                // The relay continues to send hellos, whose number has changed by then.
                 let step = Settings::default().dead_after;
                 node.ask_number(NOW + step);
                 node.ask_number(NOW + step.times(2));

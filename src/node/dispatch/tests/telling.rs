@@ -1,4 +1,4 @@
-//! What the firmware is told of a neighbour.
+//! Tests of events about a neighbour.
 
 use super::fixture::{NOW, hello, relay};
 use crate::event::Event;
@@ -7,7 +7,7 @@ use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::{Hello, Message};
 
-/// The hello of node 1, which hears relay 2 or not.
+/// Returns a hello of node 1, which receives the nodes in `hears`.
 fn hello_of(node: &Node, hears: u8) -> Message {
     let Message::Hello(hello) = hello(node, node.layers.update.latest()) else {
         unreachable!();

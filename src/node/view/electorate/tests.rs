@@ -1,4 +1,4 @@
-//! Who may decide, in whichever order proposals and decisions come.
+//! Rules of voting, for different orders of proposals and decisions.
 
 extern crate std;
 
@@ -24,7 +24,7 @@ fn count(nodes: &[u16]) -> u16 {
     u16::try_from(nodes.len()).unwrap()
 }
 
-/// A chain of relays, nodes 1 to as many.
+/// Acceptor states of nodes 1 to N.
 struct Chain(Vec<Electorate>);
 
 impl Chain {
@@ -32,13 +32,13 @@ impl Chain {
         Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
     }
 
-    /// Whether the one of that place from 0 accepts `view`.
+    /// Makes the relay at place `at`, from 0, accept `view`; returns true if it does.
     fn accept(&mut self, at: usize, view: View) -> bool {
         let base = self.0[at].agreed();
         self.0[at].accept(view.id, base, Some(view))
     }
 
-    /// What a proposal gathers of `nodes`.
+    /// Returns the poll of a proposal that visits `nodes`.
     fn poll(&mut self, nodes: &[u16], proposal: ViewId) -> Poll {
         let mut told = None;
         for &node in nodes {
@@ -49,7 +49,7 @@ impl Chain {
         told.unwrap()
     }
 
-    /// What is decided on a proposal to `nodes`; the last `accept` of them hear of it.
+    /// Returns the decision on a proposal to `nodes`; the last `accept` of them receive it.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Outcome {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -79,7 +79,7 @@ const fn granted(id: ViewId, relays: u16) -> Outcome {
     Outcome::View(View { id, relays })
 }
 
-/// For all parts of all chains up to seven, as they were loaded.
+/// Checks all parts of all initial chains of up to seven relays.
 #[test]
 fn more_than_half_decide_or_half_with_the_elder() {
     for relays in 1..=7_u16 {
@@ -94,7 +94,7 @@ fn more_than_half_decide_or_half_with_the_elder() {
             if most {
                 assert_eq!(outcome, granted(id(1, 1), there));
             }
-            // Never two parts of one chain.
+            // Two parts of one chain never decide both.
             let rest = ((1 << relays) - 1) & !part;
             let rest: Vec<u16> = (1..=relays)
                 .filter(|node| rest >> (node - 1) & 1 == 1)
@@ -112,7 +112,7 @@ fn the_members_of_the_view_decide_and_not_those_who_are_there() {
     let mut chain = Chain::of(5);
     let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
     assert_eq!(first, granted(id(1, 1), 3));
-    // Three of five, but one of three that are in the view.
+    // Three of the five relays are polled, but only one of the three members of the view.
     let others = chain.propose(&[3, 4, 5], id(2, 3), 3);
     assert_eq!(others, granted(id(1, 1), 3), "it may be agreed on");
     let next = chain.propose(&[3, 4, 5], id(3, 3), 3);
@@ -121,7 +121,7 @@ fn the_members_of_the_view_decide_and_not_those_who_are_there() {
         [3, 4, 5].map(|node| chain.knows(node).1),
         [true, false, false]
     );
-    // Two of its three.
+    // Two of the three members are polled.
     let members = chain.propose(&[1, 2], id(4, 1), 2);
     assert_eq!(members, granted(id(4, 1), 2));
 }
@@ -130,7 +130,7 @@ fn the_members_of_the_view_decide_and_not_those_who_are_there() {
 fn of_a_split_view_the_half_of_its_proposer_goes_on() {
     for (part, goes_on) in [(&[3, 4][..], true), (&[1, 2], false), (&[2, 3], true)] {
         let mut chain = Chain::of(4);
-        // Node 3 proposes, and the others hear of it in two ways.
+        // Node 3 proposes, and the other nodes receive the decision in two ways.
         let view = View {
             id: id(1, 3),
             relays: 4,
@@ -148,7 +148,7 @@ fn of_a_split_view_the_half_of_its_proposer_goes_on() {
 #[test]
 fn what_may_be_agreed_on_is_decided_on_again() {
     let mut chain = Chain::of(3);
-    // The last one alone has heard of it.
+    // Only the last relay has received the decision.
     assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
     assert_eq!(chain.propose(&[2, 3], id(2, 2), 2), granted(id(1, 1), 3));
     assert_eq!(
@@ -156,11 +156,11 @@ fn what_may_be_agreed_on_is_decided_on_again() {
         id(1, 1),
         "all there have accepted it now"
     );
-    // Who has voted for it is in it, heard or not.
+    // A relay that has voted for the view is a member, whether or not it has received the decision.
     assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), granted(id(3, 2), 2));
 }
 
-/// Were they refused, a chain of which most were switched off and on again would never fly any more.
+/// If they were refused, a chain in which most relays were restarted would never fly again.
 #[test]
 fn all_of_the_mission_are_a_view_whatever_they_remember() {
     let mut chain = Chain::of(3);
@@ -209,7 +209,7 @@ fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
 fn a_promise_keeps_what_was_decided_before_from_being_accepted() {
     let mut chain = Chain::of(3);
     assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 0), granted(id(2, 1), 3));
-    // The second one has promised more in the meantime, and takes part in nothing that is older.
+    // The second relay has promised a later proposal and ignores earlier ones.
     chain.poll(&[2], id(3, 2));
     let view = View {
         id: id(2, 1),
@@ -239,7 +239,7 @@ fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// They come before those who know: their voices are those of an older view, and do not count.
+/// Relays that vote before one that knows the newer view vote in the older view, so their votes do not count.
 #[test]
 fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
     let mut chain = Chain::of(3);
@@ -277,7 +277,7 @@ fn others_may_rely_on_members_alone() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Proposals that came to nothing take no room; of those that nothing is heard of so many are remembered.
+/// Refused proposals free their places; only a limited number of proposals without a decision is remembered.
 #[test]
 fn votes_are_remembered_until_what_came_of_them_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -316,17 +316,17 @@ fn votes_are_remembered_until_what_came_of_them_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// The bound that is stated above: node 2 is in the view that goes on, forgets it, and is counted in the chain as it was loaded.
+/// Requirement of the module's documentation: node 3 is a member of the current view, forgets it, and votes in the initial view.
 #[test]
 fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
     let mut chain = Chain::of(5);
     assert_eq!(chain.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
     chain.0[2] = Electorate::new(5, 1);
     assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
-    // The others are two of its three.
+    // The other two nodes are two of its three members.
     chain.0[3].commit();
     assert_eq!(chain.propose(&[4, 5], id(3, 4), 2), granted(id(3, 4), 2));
-    // With what it had stored it would have told of that.
+    // With its record the node would have reported that view.
     let mut kept = Chain::of(5);
     assert_eq!(kept.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
     assert_eq!(kept.propose(&[1, 2, 3], id(2, 1), 3), Outcome::Refused);

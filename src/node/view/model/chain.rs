@@ -1,4 +1,4 @@
-//! A state: each relay, the parts that they are in, the frames in the air, and what has been decided on.
+//! Model state: relays, partition of the chain, frames in the air, and past decisions.
 
 extern crate std;
 
@@ -7,10 +7,10 @@ use std::vec::Vec;
 use crate::node::view::change::ViewChange;
 use crate::view::ViewId;
 
-/// A view and its size, as it can be sorted.
+/// View and its size, as a sortable pair.
 pub(super) type Sized = (ViewId, u16);
 
-/// What is sent.
+/// Content of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) enum Body {
     Proposal {
@@ -37,11 +37,11 @@ pub(super) struct Frame {
     pub(super) body: Body,
 }
 
-/// One relay.
+/// State of one relay.
 #[derive(Clone, Debug)]
 pub(super) struct Unit {
     pub(super) change: ViewChange,
-    /// The view that it accepted last, its place in that, and how many are in it.
+    /// Last accepted view, this relay's place in it, and its size.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -71,23 +71,23 @@ impl core::hash::Hash for Unit {
     }
 }
 
-/// A view that was decided on first: what it follows, and how many are in it.
+/// New view that was decided on: its size and the view that it follows.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct Decree {
     pub(super) view: Sized,
     pub(super) follows: ViewId,
-    /// Relays that it was proposed to, bit 0 for the first one.
+    /// Relays that voted on the proposal, bit 0 for the first relay.
     pub(super) members: u8,
 }
 
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Chain {
     pub(super) units: Vec<Unit>,
-    /// The part of each relay.
+    /// Partition number of each relay.
     pub(super) parts: Vec<u8>,
-    /// In order, each once.
+    /// Frames in the air, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// What has been decided on, and what has been agreed on, ever.
+    /// Lists of all views that were ever decided on, and of all that were ever agreed on.
     pub(super) decrees: Vec<Decree>,
     pub(super) agreed: Vec<Sized>,
     pub(super) cuts: u8,
@@ -96,7 +96,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
 }
 
-/// What happens.
+/// Event of the model.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Happens {
     Part(usize),
@@ -109,7 +109,7 @@ pub(super) enum Happens {
     Forgets(usize),
 }
 
-/// Puts it where it belongs, once.
+/// Inserts `one` into a sorted list, unless it is already there.
 pub(super) fn put<T: Ord>(all: &mut Vec<T>, one: T) {
     if let Err(at) = all.binary_search(&one) {
         all.insert(at, one);

@@ -1,4 +1,4 @@
-//! What happens to a chain, one thing after the other, and what comes of it.
+//! Transitions of the model: each event and its effect on the chain.
 
 #![allow(clippy::cast_possible_truncation, reason = "chains of a few relays")]
 
@@ -21,16 +21,16 @@ use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::message::Message;
 
-/// Who counts.
+/// Rule of voting.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Rule {
-    /// As it flies.
+    /// Rule of the firmware: only members vote.
     Members,
-    /// Everybody present, against the size of the newest view that somebody present has.
+    /// Every present relay votes, and the quorum is half of the newest view known to any of them.
     Everybody,
 }
 
-/// What is checked, of how much.
+/// Configuration of a check: rule and bounds on the events.
 #[derive(Clone, Debug)]
 pub(super) struct Check {
     pub(super) rule: Rule,
@@ -40,11 +40,11 @@ pub(super) struct Check {
     pub(super) proposals: u8,
     pub(super) reboots: u8,
     pub(super) losses: u8,
-    /// Whether every state is healed, to see whether it settles.
+    /// True to check in every state that a healed chain settles.
     pub(super) heals: bool,
 }
 
-/// All ways in which so many relays fall into parts.
+/// Returns all set partitions of `relays` relays.
 pub(super) fn partitions(relays: usize) -> Vec<Vec<u8>> {
     let mut all = vec![vec![]];
     for _ in 0..relays {
@@ -99,7 +99,7 @@ impl Check {
         }
     }
 
-    /// The relays that have taken part in a proposal.
+    /// Returns the relays that have voted on `proposal`, as a bit mask.
     pub(super) fn asked(chain: &Chain, proposal: ViewId) -> u8 {
         let voters = chain.units.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
@@ -111,7 +111,7 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// What relay `at` has to say goes out, and what came of it is taken down.
+    /// Sends the pending messages of relay `at`, and records the decision in `effects`.
     pub(super) fn settle(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -167,7 +167,7 @@ impl Check {
         if self.rule == Rule::Everybody {
             change.electorate.count_everybody();
         }
-        // What is of time alone, or makes up for what is heard of late.
+        // Resets timers and everything that only repairs late messages, to reduce the number of states.
         change.newest = ViewId::LOADED;
         change.asking = Asking::new(1);
         change.refused = false;

@@ -1,4 +1,4 @@
-//! What is sent, as a relay reads it, and as it can be sorted.
+//! Conversion between messages of the protocol and sortable frames of the model.
 
 use super::chain::Body;
 use crate::view::View;

@@ -1,4 +1,4 @@
-//! Whether a chain settles once its links are healed.
+//! Liveness property: a chain settles once its links are restored.
 
 #![allow(clippy::cast_possible_truncation, reason = "chains of a few relays")]
 
@@ -7,11 +7,11 @@ use super::check::Check;
 use crate::node::circulation::Stage;
 use crate::view::ViewId;
 
-/// So many proposals are enough for a chain that is healed.
+/// Maximum number of proposals that a healed chain needs.
 pub(super) const MOST: u8 = 3;
 
 impl Check {
-    /// What is in the air of the relays of `there` arrives, until nothing changes any more.
+    /// Delivers all frames to the relays of `there` until nothing changes any more.
     pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
         loop {
             let before = chain.clone();
@@ -29,7 +29,7 @@ impl Check {
         }
     }
 
-    /// Whether the relays of `there` are a quorum of the newest view that they know, and of all that were decided on since.
+    /// Returns true if the relays of `there` are a quorum of the newest view that they know, and of all views decided on since.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.units.len()).filter(known);
@@ -46,8 +46,9 @@ impl Check {
             })
     }
 
-    /// The relays of `there` hear each other from now on, and nobody else: after how many proposals all are in one view of them all
-    /// that they know to be agreed on.
+    /// Returns the number of proposals until all relays of `there` are in one view of them all and know it to be agreed on. Links
+    /// between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if [`MOST`] are not
+    /// enough.
     pub(super) fn settles(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {
@@ -82,7 +83,7 @@ impl Check {
         None
     }
 
-    /// Whether all that are a quorum settle, whoever they are.
+    /// Returns true if every set of relays that is a quorum settles.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
         let all = ((1_u16 << chain.units.len()) - 1) as u8;
         (1..=all).all(|there| {

@@ -1,28 +1,29 @@
-//! All that can happen to a short chain, one thing after the other: the view change that flies, checked in every order of events.
+//! Model check of the view change: the code of the firmware in short chains, under every order of events.
 //!
-//! | what happens | how it is modelled |
+//! | event | model |
 //! | --- | --- |
-//! | a frame | once sent it stays in the air: it arrives any time later, in any order, as often as may be, or never |
-//! | links are cut and heal | the chain falls into other parts, any set partition; a relay's neighbours are the next ones of its part |
-//! | a relay falls silent | it is a part of its own |
-//! | a proposal is timed out | a relay with nobody before it proposes anew, with a larger number than any in its part |
-//! | nobody is after a relay any more | it decides, or gives the proposal up |
-//! | a pass | who knows that the view it flies is agreed on tells the next one, if that flies it, too |
-//! | a relay reboots | it keeps its electorate, and nothing else; or it forgets that, too |
+//! | frame | remains in the air once sent: received at any later time, in any order, any number of times, or never |
+//! | links cut or restored | the chain changes to another set partition; neighbours are the nearest relays of the same part |
+//! | relay silent | a part of its own |
+//! | proposal timed out | a relay without a predecessor proposes anew, with a larger number than any in its part |
+//! | no successor | the relay decides, or abandons the proposal |
+//! | pass | a relay that knows its view to be agreed on informs the next relay, if that is in the same view |
+//! | reboot | the relay keeps only its acceptor state, or loses that, too |
 //!
-//! How many cuts, proposals and reboots there are is bounded; nothing else is. There is no time: what a lease adds is that the places
-//! of a view are not taken before members of the one before have let go of theirs.
+//! The numbers of cuts, proposals and reboots are bounded, nothing else is. Time is not modelled. The lease adds that positions
+//! of a view are not used before members of the previous view have released theirs.
 //!
-//! A view is *in force* from the moment its leader has it accepted by all until a view that follows it is. Views that follow each other
-//! one by one are never in force at once, so what is checked is that they are one chain, back to the chain as it was loaded.
+//! A view is *in force* from the time its leader knows that all members have accepted it until a successor is in force. Views
+//! that follow each other one by one are never in force together. The check is therefore that all agreed views form one sequence,
+//! starting with the initial view.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `chain` | a state |
-//! | `frames` | what is in the air |
-//! | `check` | what happens |
-//! | `healing`, `properties` | what is held against it |
-//! | `search` | all of it, one after the other |
+//! | `chain` | model state |
+//! | `frames` | frames in the air |
+//! | `check` | transitions |
+//! | `healing`, `properties` | checked properties |
+//! | `search` | exhaustive search |
 
 mod chain;
 mod check;
@@ -34,7 +35,7 @@ mod search;
 use check::{Check, Rule};
 use search::ONE_CHAIN;
 
-/// Cuts, proposals, reboots; whether every state is healed.
+/// Checks chains of `relays` relays with so many cuts, proposals and reboots; `heals`: every state is healed.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,
@@ -53,7 +54,7 @@ fn chains_of_three_and_four_have_one_view_after_the_other_and_settle_once_healed
     all_holds(4, (2, 3, 0), false);
 }
 
-/// The same with more of everything: some minutes.
+/// Searches larger bounds; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_hold_through_more() {
@@ -64,7 +65,7 @@ fn chains_of_three_and_four_hold_through_more() {
     all_holds(4, (2, 3, 1), false);
 }
 
-/// What it is that finds nothing above: a rule that counts whoever is there comes to two views at once.
+/// Shows that the check finds faults: with every present relay voting, two views are in force together.
 #[test]
 fn a_rule_that_counts_everybody_is_found_to_break() {
     for relays in [3, 4] {
@@ -77,7 +78,7 @@ fn a_rule_that_counts_everybody_is_found_to_break() {
     }
 }
 
-/// The bound of it all: promises are kept.
+/// Shows that the requirement is needed: without its record a relay breaks its promises.
 #[test]
 fn one_that_forgets_what_it_has_said_is_found_to_break_it() {
     let check = Check {

@@ -1,4 +1,4 @@
-//! What has to be so of every state.
+//! Safety properties of every state.
 
 extern crate std;
 
@@ -9,7 +9,7 @@ use super::check::{Check, Rule};
 use crate::view::ViewId;
 
 impl Check {
-    /// Every view that was agreed on follows another one that was, and no two follow the same.
+    /// Returns true if every agreed view follows an agreed view, and no two follow the same one.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &Sized| {
             let decree = chain.decrees.iter().find(|decree| decree.view.0 == *id);
@@ -34,7 +34,7 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Nobody knows anything to be agreed on that is not, and no more than are in a view have a voice in it.
+    /// Returns true if each relay's agreed view was agreed on and has at most as many members as its size.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.units.iter().all(|unit| {

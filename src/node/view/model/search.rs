@@ -1,4 +1,4 @@
-//! The search through all states.
+//! Exhaustive search of all states.
 
 extern crate std;
 
@@ -13,7 +13,7 @@ use super::chain::{Chain, Happens};
 use super::check::Check;
 use crate::node::context::Effects;
 
-/// Of all that was ever agreed on.
+/// Property of all agreed views.
 pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
 
 impl Model for Check {
@@ -103,14 +103,14 @@ impl Model for Check {
     }
 }
 
-/// A property that does not hold, and how it comes to that.
+/// Violated property and the events that lead to it.
 pub(super) struct Counterexample {
     pub(super) what: &'static str,
     pub(super) how: String,
 }
 
 impl Check {
-    /// Goes through everything, with the two threads of a small machine, and prints how much that was.
+    /// Searches all states with two threads and prints their number.
     pub(super) fn search(&self) -> Option<Counterexample> {
         let began = Instant::now();
         let checker = self.clone().checker().threads(2);

@@ -1,4 +1,4 @@
-//! What is decided, and who accepts it.
+//! Decisions, and which relays accept them.
 
 use super::relay::{PROPOSED, Relay, all, came, id};
 use crate::node::circulation::Stage;
@@ -75,7 +75,7 @@ fn the_last_one_decides() {
     };
     assert_eq!(relay.handle(&Message::Proposal(proposal)), granted);
     assert!(relay.view.electorate.awaits(id(1, 1)));
-    // All have accepted it, as the first pass shows.
+    // The first pass shows that all relays have accepted it.
     relay.view.commit(id(1, 1));
     assert_eq!(relay.view.electorate.agreed(), all(id(1, 1)));
     relay.view.commit(id(1, 1));
@@ -91,7 +91,7 @@ fn an_earlier_view_is_accepted_and_the_leader_proposes_anew_from_there() {
         id: id(1, 1),
         relays: 3,
     };
-    // It has proposed that itself, and has not heard of it.
+    // This relay has proposed the view itself and has not received the decision.
     let first = relay.view.electorate.promised();
     assert_eq!(first, earlier.id);
     relay.view.heard_of(id(2, 3));
@@ -107,7 +107,7 @@ fn an_earlier_view_is_accepted_and_the_leader_proposes_anew_from_there() {
     assert!(relay.leads().began);
 }
 
-/// It was found that those who come before others in the chain, and did not know what these knew, were refused for good.
+/// Regression test: relays near the leader that did not know the newest view were refused for good.
 #[test]
 fn a_refusal_says_which_view_was_agreed_on() {
     let view = View {
@@ -143,7 +143,7 @@ fn a_refusal_says_which_view_was_agreed_on() {
             assert_eq!(decided, Some(Decided::Refused));
             assert_eq!(second.view.electorate.agreed(), view);
         } else {
-            // Two of its three, now that both know it.
+            // Two of its three members are polled, now that both know the view.
             assert!(matches!(decided, Some(Decided::Granted { relays: 2, .. })));
         }
     }
@@ -168,7 +168,7 @@ fn a_decision_is_of_the_mission_that_was_proposed() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// A newer mission has taken the place of the one proposed: it cannot be flown any more.
+/// A newer mission has replaced the proposed one, which can not be flown any more.
 #[test]
 fn who_has_lost_the_mission_has_no_part_in_its_view() {
     let mut relay = Relay::second();

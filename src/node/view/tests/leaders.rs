@@ -1,4 +1,4 @@
-//! Who proposes, and who gives up what nobody can decide.
+//! Leaders: who proposes, and abandoned proposals.
 
 use super::relay::{FROM, LATE, Relay, came, id};
 use crate::node::context::{Decided, Effects};
@@ -29,12 +29,12 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
         assert!(relay.view.asking.asks());
         assert_eq!(relay.view.newest(), id(2, 2), "one number more, once");
     }
-    // A later one may end here.
+    // A later proposal may end here.
     let later = relay.proposal(id(3, 1));
     assert!(relay.handle(&later).decided.is_some());
 }
 
-/// It was found that two views bore one name: of relays 1 to 3, and of 1 and 4, when relay 2 had fallen silent to relay 1 alone.
+/// Regression test: two views had one identifier, relays 1 to 3, and 1 and 4, when only relay 1 had lost relay 2.
 #[test]
 fn a_proposal_is_handed_to_one_node_alone() {
     let mut relay = Relay::new(1);
@@ -46,7 +46,7 @@ fn a_proposal_is_handed_to_one_node_alone() {
     assert!(relay.view.asking.asks());
     relay.view.resend();
     assert!(relay.onward(2).is_some(), "it may be back");
-    // One of a later number may go that way.
+    // A later proposal may be forwarded to the other node.
     let mut later = relay.leads();
     for _ in 0..4 {
         if later.began {
@@ -81,14 +81,14 @@ fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
     relay.view.heard_of(id(8, 2));
     assert!(relay.leads().began);
     assert_eq!(relay.view.newest(), id(9, 1));
-    // Toward what is far ahead it goes step by step.
+    // A view far ahead is approached in steps.
     for number in [265, 521, 777, 1000, 1000] {
         relay.view.heard_of(id(1000, 3));
         assert_eq!(relay.view.newest(), id(number, 3));
     }
 }
 
-/// A relay that is alone for hours spends one number, not one every five seconds.
+/// Checks that a relay alone for hours uses one view number, not one every five seconds.
 #[test]
 fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
     let mut relay = Relay::second();
@@ -100,7 +100,7 @@ fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again()
         assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
     }
     assert_eq!(relay.view.newest(), newest);
-    // With somebody after it the poll may come out otherwise.
+    // With a successor the poll may have another result.
     relay.end = false;
     let began = (0..8).any(|_| relay.leads().began);
     assert!(began && relay.view.newest() > newest);

@@ -1,4 +1,4 @@
-//! What one relay does with proposals and decisions.
+//! Tests of the view change at one relay.
 
 mod decisions;
 mod leaders;

@@ -1,4 +1,4 @@
-//! A proposal comes: it is handed on, or what is known of it is said.
+//! Received proposals: forwarded, or answered from the known decision.
 
 use super::relay::{LATE, PROPOSED, REPEATED, Relay, all, came, id};
 use crate::node::context::{Decided, Effects};
@@ -57,7 +57,7 @@ fn a_newer_one_takes_the_place_of_one_that_is_not_decided() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// The leader was switched on again in the midst of a proposal, and has been offered another mission.
+/// The leader has restarted during a proposal and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();

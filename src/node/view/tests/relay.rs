@@ -1,4 +1,4 @@
-//! A relay of four, and what comes to it.
+//! Test relay in a chain of four, with its inputs.
 
 use crate::mission::Mission;
 use crate::mission::tests::paper;
@@ -15,7 +15,7 @@ pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
 }
 
-/// A relay of four, which holds mission 4 and flies the one it was loaded with.
+/// Relay in a chain of four that holds mission 4 and flies the loaded one.
 pub(super) struct Relay {
     pub(super) member: Member,
     pub(super) latest: MissionId,
@@ -55,14 +55,14 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Nobody is after it any more.
+    /// Removes the next relay.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
         self.view.decide(&context)
     }
 
-    /// Nobody is before it, and it is time to ask.
+    /// Lets the relay lead: no relay precedes it, and its request timer expires.
     pub(super) fn leads(&mut self) -> Effects {
         self.view.asking.ask(self.now);
         self.now = self.view.asking.next_timeout().unwrap();
@@ -75,7 +75,7 @@ impl Relay {
         self.view.take_onward(&context, to)
     }
 
-    /// From relay 1.
+    /// Returns a proposal of relay 1.
     pub(super) fn proposal(&self, view: ViewId) -> Message {
         Message::Proposal(Proposal {
             mission_id: self.latest,
@@ -92,7 +92,7 @@ impl Relay {
         })
     }
 
-    /// From the relay after this one.
+    /// Returns a decision sent by the next relay.
     pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
         Message::Decision(Decision {
             mission_id: self.latest,

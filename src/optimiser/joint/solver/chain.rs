@@ -1,7 +1,7 @@
-//! The chain as the passes see it: who sends to whom, which altitudes are kept to, what its first and last hop can meet.
+//! Chain as seen by the passes: senders, fixed altitudes, and the ceilings of the first and the last hop.
 //!
-//! Of a relay the powers and altitudes are given ([`Seat`]). A chain is kept in segments: of each the outlook at its end, and the policies
-//! of one.
+//! Powers and rooms of the relays are given as [`Seat`]. A chain is stored in segments, with the value function at the end of
+//! each, and the policies of one.
 
 use crate::mission::{Interferer, Mission, Profile};
 use crate::optimiser::joint::hop::Triple;
@@ -13,13 +13,11 @@ use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
 use crate::sir::{Sender, square};
 
-/// What the passes have in common.
 #[derive(Clone, Copy)]
 pub(super) struct SolverContext<'a, F> {
     pub(super) mission: &'a Mission,
     pub(super) interferer: &'a Interferer,
     pub(super) seat_of: &'a F,
-    /// What the power is worth that the mission has all relays hold.
     pub(super) gain: PowerRatio,
 }
 
@@ -28,7 +26,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.mission.config().distance_m
     }
 
-    /// The sender of relay `index`, which stands at `from`.
+    /// Returns the sender of relay `index`, at `from`.
     pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
         if index <= 1 {
             return Sender::transmitter(self.mission);
@@ -45,7 +43,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// gamma / A of the hop from `from` to relay `index`, against what is heard of interference and noise there.
+    /// Returns gamma / A of the hop from `from` to relay `index`, with the noise at `from` included.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -53,19 +51,18 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// The altitude that relay `index` keeps to, if it keeps to one while others choose.
+    /// Returns the fixed altitude of relay `index`, if it has one while other relays choose.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = (self.seat_of)(index).room;
         let free = !self.mission.config().band.is_single();
         (free && band.is_single()).then_some(band.least_m)
     }
 
-    /// Whether any relay does.
     pub(super) fn holds(&self) -> bool {
         (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// The altitude at relay `index` on the way from one that does to the next.
+    /// Returns the altitude of relay `index`, interpolated between the relays with a fixed altitude.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.mission.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -81,19 +78,19 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         low + share * (high - low)
     }
 
-    /// Relay `index`, fed from `from`.
+    /// Returns relay `index`, which receives from `from`.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// The slack of the last relay at `at`, and its outlook.
+    /// Returns the slack of the last relay at `at`, and its derivatives.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         site::tail(self.mission, power_w, room, target, at)
     }
 
-    /// No chain meets more than the first hop or the last one can have.
+    /// Returns the ceiling of the chain, in ln gamma: the smaller of those of the first and the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;
@@ -102,7 +99,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// The largest gain of any hop, in ln gamma: above it nobody leaps to the far side of the interferer.
+    /// Returns the target, in ln gamma, above which no hop leaps over the interferer: the largest gain of any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -111,7 +108,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 }
 
-/// Where in `room`, right above Rx, a relay hears Tx best.
+/// Returns the cross-section in `room`, right above Rx, with the best SIR from Tx.
 pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -127,23 +124,21 @@ pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Roo
     best.1
 }
 
-/// Relays in a segment.
 pub(super) const SEGMENT: usize = 10;
-/// How many of them are held; without the feature `altitude` nobody solves a chain.
+/// Relays of a segment in memory; 0 without the feature `altitude`.
 pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
     SEGMENT
 } else {
     0
 };
-/// The same number as of a segment, to count relays by.
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// The chain up to the end of a segment.
+/// State of the chain at a segment: the position before it and the value function at its end.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Mark {
-    /// Where the relay before the segment is along x, m.
+    /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// What the last relay of the segment sees, but for what a pass back alone has to know.
+    /// Value function at the last relay of the segment, without the parts for the backward pass only.
     pub(super) slope: Triple,
     pub(super) bend: [f32; 6],
 }
@@ -165,40 +160,38 @@ impl Mark {
     }
 }
 
-/// A relay of the segment at hand.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stage {
     pub(super) x_m: f32,
     pub(super) policy: Brief,
 }
 
-/// The last segment.
 pub(super) fn last_of(mission: &Mission) -> u8 {
     let last = (usize::from(mission.relays()) - 1) / SEGMENT;
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// The numbers of the relays in `segment`.
+/// Returns position and index of the relays in `segment`.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
-    // Counted in u16, which both are: to zip two ranges backward may panic.
+    // Counted in u16 at both ends, since zipping two ranges backward may panic.
     (0..SEGMENT_RELAYS)
         .map(move |k| (usize::from(k), first + 1 + k))
         .filter(move |(_, index)| *index <= relays)
 }
 
-/// What one relay brings along, as far as it is known.
+/// Known profile of one relay: its room and its power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
-    /// Where it may fly across the line.
+    /// Allowed region across the line.
     pub room: Room,
-    /// Its transmit power, W.
+    /// Transmit power, W.
     pub power_w: f32,
 }
 
 impl Seat {
-    /// That of a relay which was given nothing of its own.
+    /// Returns the seat of a relay without a profile of its own.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),
@@ -206,7 +199,7 @@ impl Seat {
         }
     }
 
-    /// That of a relay which holds `own`, and its altitude if it `holds` that.
+    /// Returns the seat of a relay with the profile `own`, at its altitude if it `holds` that.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

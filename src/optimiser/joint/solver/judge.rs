@@ -1,7 +1,7 @@
-//! The highest target of a chain as it is, and what comes after it is found.
+//! Search for the highest feasible target of a chain, and the steps that follow it.
 //!
-//! After a target the next start comes, with the shape that its chain begins with; after the last start the polish, in which one relay after
-//! the other tries another place, where the derivatives see none.
+//! After a target the next start follows, with its initial shape. After the last start the polish follows: each relay in turn
+//! tries another position, where the derivatives show no gain.
 
 use super::chain::{Seat, SolverContext, far_off, last_of};
 use super::state::Solver;
@@ -14,13 +14,13 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// How close to the optimum a start is judged, in ln gamma.
+/// Precision of the target of a start, in ln gamma.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// How close to the ceiling of the first or the last hop is close enough, in ln gamma.
+/// Distance from the ceiling of the first or the last hop at which the search ends, in ln gamma.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// How far above that ceiling the other hops are when a chain is probed first, in ln gamma.
+/// Distance of the target above that ceiling at the first probe, in ln gamma.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -42,8 +42,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.tried(chain, seek, purpose, met.then_some(false))
     }
 
-    /// One segment less till it is known whether all relays can stand where those after them need it; the last of this one is to
-    /// stand at `place_m`. Bounded by twenty relays.
+    /// Checks one more segment, from the last to the first, for positions that let all relays hold back. `place_m` is the
+    /// required x of the segment's last relay. Bounded by twenty relays.
     pub(super) fn stand(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -64,7 +64,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// What came of a target: that it is `met`, and whether relays have to hold back.
+    /// Records the result of a target: `met` is `Some` if it is feasible, true if relays have to hold back.
     pub(super) fn tried(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -74,7 +74,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     ) -> Poll<Result<f32, Infeasible>> {
         self.restart();
         if purpose == Purpose::Probe {
-            // If it does not meet the ceiling, its other hops have to be shorter.
+            // If the chain does not meet the ceiling, its other hops have to be shorter.
             self.work = if met.is_some() {
                 self.again = true;
                 let sigma = chain.ceiling() + 2.0 * CEILING;
@@ -108,10 +108,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 (Some((sigma, _)), Purpose::Last) => {
                     if self.best.is_none_or(|(best, _)| sigma > best) {
                         self.best = Some((sigma, self.number));
-                        // No pass by the rules of the sweep has changed them.
+                        // No pass with the sweep's rules has changed the cells.
                         self.best_cells = self.cells;
                         self.best_judged = self.judged_at;
-                        // An ascent that went astray came to less than it says.
+                        // A diverged ascent has not reached its target.
                         self.highest = self.ascent.sigma.min(sigma + 3.0 * JUDGED).max(sigma);
                     }
                     self.given_up()
@@ -171,7 +171,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// An ascent has come to `sigma`: by the rules of the sweep.
+    /// Returns the search for the highest target by the sweep's rules, after an ascent to `sigma`.
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -182,19 +182,19 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Whether the start may still be the best.
+    /// Returns true if the current start may still become the best.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Whether the start that goes on with `turn` is given up early: it cannot become the best.
+    /// Returns true if the current start, with `turn` next, is dropped early because it cannot become the best.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Whether no start can be better than the best one: it meets what the first or the last hop can have.
+    /// Returns true if no start can be better than the best one, which meets the ceiling.
     pub(super) fn is_complete(&self, ceiling: f32) -> bool {
         self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }
@@ -232,28 +232,28 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Most relays of a chain that is polished, but where some keep to an altitude: the way of the others has kinks there.
+/// Maximum number of relays of a polished chain; chains with fixed altitudes are always polished, since their path has kinks.
 const POLISHED: u16 = 5;
 
-/// How often the moves of a polish are halved, and the first of them, as a part of the room.
+/// Number of halvings of the polish's moves, and the first move as a fraction of the room.
 const HALVINGS: u16 = 12;
 const FIRST_MOVE: f32 = 0.25;
 
-/// What a move has to gain, in ln gamma, and how many are taken.
+/// Minimum gain of a move, in ln gamma, and maximum number of accepted moves.
 pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Whose move is tried, which of four ways, and how often it is halved.
+    /// Returns the relay of the current move, its direction (one of six), and its number of halvings.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
-        // A mission has relays; the compiler does not know that.
+        // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
         let tried = self.moving / 6;
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of a chain that is polished and meets `sigma`: each alone by a part of its room, and by less and less. What
-    /// the derivatives do not see, since something else binds there, it may.
+    /// Tries the next move of a polished chain that meets `sigma`: one relay by a fraction of its room, halved round by round. It
+    /// finds gains that the derivatives do not show because another constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -299,7 +299,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// The next start, or the end.
+    /// Starts the next start, or ends the search.
     pub(super) fn begin(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -307,7 +307,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let next = Start::number(self.number, Room::of(chain.mission));
         let complete = !self.again && self.is_complete(chain.ceiling());
         let Some(start) = next.filter(|_| !complete) else {
-            // All have been tried, or the others are no use.
+            // All starts are done, or the others cannot be better.
             let Some((_, number)) = self.best else {
                 return Poll::Ready(Err(Infeasible));
             };
@@ -366,13 +366,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Nothing came of the start.
     pub(super) fn given_up(&mut self) -> Work {
         self.number += 1;
         Work::Begin
     }
 
-    /// Where relay `index` is wanted on a pass that changes nothing, or gives the chain its first shape.
+    /// Returns the cross-section of relay `index` in a pass without changes or in an initial one.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

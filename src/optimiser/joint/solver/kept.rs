@@ -1,4 +1,4 @@
-//! Tests: the cells of the best start, as they were kept, against those of the same start done once more.
+//! Tests: stored cells of the best start against those of a repetition of that start.
 
 use core::task::Poll;
 
@@ -6,7 +6,7 @@ use super::{Seat, Solver};
 use crate::channel::{AirGround, Channel};
 use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
-/// Uniform in 0..1: Knuth's MMIX generator.
+/// Uniform random numbers in 0..1: Knuth's MMIX generator.
 struct Rng(u64);
 
 impl Rng {
@@ -22,7 +22,7 @@ impl Rng {
     }
 }
 
-/// A random mission, and the transmit powers and altitudes that some of its relays hold.
+/// Returns a random mission, and the fixed altitudes of some of its relays.
 fn random(rng: &mut Rng) -> (Mission, [Option<f32>; 50]) {
     let relays = [1, 2, 3, 5, 8, 13, 21, 50][(rng.next() * 8.0) as usize];
     let least_m = rng.between(10.0, 60.0);
@@ -65,7 +65,7 @@ fn random(rng: &mut Rng) -> (Mission, [Option<f32>; 50]) {
     (mission.expect("in range"), held)
 }
 
-/// The target and the places, in bits, and how many portions it took.
+/// Returns the target and the positions, in bits, and the number of portions.
 fn solved(mission: &Mission, held: &[Option<f32>; 50], once_more: bool) -> ([[u32; 2]; 51], u32) {
     let common = Seat::common(mission);
     let seat = |index: u16| match held[usize::from(index) - 1] {
@@ -95,7 +95,7 @@ fn solved(mission: &Mission, held: &[Option<f32>; 50], once_more: bool) -> ([[u3
     (bits, portions)
 }
 
-/// Random missions: `UAV_RELAY_KEPT` of them, 150 if that is not set.
+/// Random missions; their number is `UAV_RELAY_KEPT`, 150 by default.
 #[test]
 fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
     extern crate std;

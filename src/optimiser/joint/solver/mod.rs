@@ -1,19 +1,19 @@
-//! A whole chain by the joint method, without a message: what every relay that holds the mission works out by itself.
+//! Solver of a whole chain by the joint method, from the mission alone and without messages.
 //!
-//! Differential dynamic programming keeps a policy for every relay between the pass back and the pass forward. Here a relay takes six
-//! bytes: the chain is cut into segments, of each of which only the outlook at its end is kept, and the policies of one segment are
-//! worked out again when the pass forward comes to it.
+//! Differential dynamic programming stores a policy for every relay between the backward and the forward pass. To need only six
+//! bytes per relay, the chain is cut into segments: only the value function at the end of each is stored, and the policies of a
+//! segment are computed again in the forward pass.
 //!
-//! A start is given up as soon as it is about to end no higher than the best one, or its target has left the chain behind; all others are
-//! once a chain meets what its first or last hop can have.
+//! A start is dropped as soon as it will end no higher than the best one, or has diverged. The remaining starts are skipped once
+//! a chain meets the ceiling of its first or last hop.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `state` | what a solver keeps, and one portion of its work |
-//! | `work` | what it is at, and what for |
-//! | `passes` | the pass back and the pass forward of an ascent, a pass that changes nothing, and the rules of the sweep |
-//! | `judge` | what comes after a target is found: the next start, or the polish |
-//! | `chain` | what the passes have in common; ten relays of a chain; what one brings along |
+//! | `state` | the state of a solver, and one portion of its work |
+//! | `work` | the current work and its purpose |
+//! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
+//! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 
 mod chain;
 mod judge;

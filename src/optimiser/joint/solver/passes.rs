@@ -1,6 +1,7 @@
-//! The pass back, which works out the policies, and the pass forward, which tries them.
+//! Backward pass, which computes the policies, and forward pass, which tries them.
 //!
-//! A plain pass changes nothing, or gives a chain its first shape. A sweep finds where relays may stand, and where they have to hold back.
+//! A plain pass changes nothing, or gives a chain its initial shape. A pass with the sweep's rules finds the relays' positions,
+//! and whether they have to hold back.
 
 use super::chain::{SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of};
 use super::state::Solver;
@@ -23,7 +24,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Works out the policies of `segment`, whose relays come after one at `before`; what that one sees. Bounded by ten relays.
+    /// Computes the policies of `segment` after a relay at `before`; returns the value function there. Bounded by ten relays.
     pub(super) fn recall(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -90,7 +91,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Where the relay before `segment` is.
+    /// Returns the nominal position of the relay before `segment`.
     pub(super) fn nominal_before(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -107,7 +108,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.at(index, (chain.seat_of)(index)).at(x_m)
     }
 
-    /// One segment more of a pass with the policies, or what is needed for it.
+    /// Runs one more segment of a forward pass, or computes the policies for it.
     pub(super) fn forward(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -142,13 +143,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return;
         }
         if self.follow(chain, segment, target, share, kept).is_none() {
-            // Only of a trial: what is kept has been tried.
+            // Only a trial can fail: steps that are stored have been tried.
             let turn = self.ascent.failed();
             self.work = self.next(turn, chain);
         }
     }
 
-    /// The relays of `segment` take `share` of their steps.
+    /// Moves the relays of `segment` by `share` of their steps.
     pub(super) fn follow(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -183,14 +184,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Relays in one portion of a pass that changes nothing.
+/// Relays in one portion of a plain pass.
 const PLAIN: u16 = 20;
 
-/// What penalty a chain may have that is judged, in parts of D.
+/// Maximum penalty of a chain that is judged, in units of D.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Goes on with a pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
+    /// Continues a plain pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -226,7 +227,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 let step = self.least_step(chain.mission, chain.seat_of, index);
                 self.pass.end_m = Self::end_after(chain.mission, self.pass.end_m, step);
                 if let Some(mark) = self.mark(index) {
-                    // From one pass back to the next nobody sees anything, and there is room.
+                    // The slope is unused between two backward passes, so it stores x.
                     mark.slope = [from.x_m, 0.0, 0.0];
                 }
                 let hop = self.hop(chain, index, self.pass.end_m);
@@ -253,7 +254,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Relay `index`, fed from `from`, as the start has it.
+    /// Returns relay `index`, which receives from `from`, with the separation that the start requires.
     pub(super) fn link<'a>(
         &self,
         chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
@@ -270,7 +271,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// The hop to relay `index` of the chain as it is, by the rules of the sweep; no farther than `end_m`.
+    /// Returns the hop to relay `index` of the current chain by the sweep's rules; no farther than `end_m`.
     pub(super) fn hop(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -295,7 +296,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         .ending(end_m)
     }
 
-    /// The least step along x between relay `index` and the one before it, which keep their separation.
+    /// Returns the minimum step along x that keeps the separation of relay `index` and the one before.
     pub(super) fn least_step(
         &self,
         mission: &Mission,
@@ -310,8 +311,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission.step_with_room(across)
     }
 
-    /// The last place along x that leaves the relays after `index` of a solved chain their room, m: to the bit what the passes
-    /// by the rules of the sweep go by.
+    /// Returns the largest x of relay `index` of a solved chain that leaves the relays after it their separation, m.
+    ///
+    /// It equals the limit in the passes with the sweep's rules, to the bit.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
         let first = mission.config().distance_m - steps.clone().sum::<f32>();
@@ -324,7 +326,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (end_m + step).min(mission.config().distance_m)
     }
 
-    /// Where the relay before `segment` is to stand.
+    /// Returns the required x of the relay before `segment`; `place_m` is that of the segment's last relay.
     pub(super) fn stands(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -1,4 +1,4 @@
-//! The state of a solver, and one portion of its work after the other.
+//! State of a solver, and its work in portions.
 
 use core::task::Poll;
 
@@ -13,7 +13,7 @@ use crate::optimiser::joint::starts::Start;
 use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 
-/// A chain being solved, for at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
+/// Solver of a chain of at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
@@ -22,32 +22,32 @@ use crate::place::CrossSection;
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) number: u8,
     pub(super) start: Start,
-    /// The best so far: its target in ln gamma, and the number of its start.
+    /// Best target so far, in ln gamma, and the number of its start.
     pub(super) best: Option<(f32, u8)>,
-    /// What the ascent of that start came to, before it was judged.
+    /// Result of that start's ascent before it was judged, in ln gamma.
     pub(super) highest: f32,
-    /// Its cells, and the target at which it was judged, in ln gamma. `None` where doing the start once more would come to another chain: it was
-    /// judged before its ascent was over, or without an ascent.
+    /// Cells of that start, and the target at which it was judged, in ln gamma. `None` if a repetition of the start would give
+    /// another chain: it was judged before its ascent ended, or without an ascent.
     pub(super) best_cells: [Cell; RELAYS],
     pub(super) best_judged: Option<f32>,
-    /// The same target of the start that is being done.
+    /// Target at which the current start was judged, in ln gamma.
     pub(super) judged_at: Option<f32>,
-    /// True while the ascent that is being done would be the same with nothing to compare it with.
+    /// True while the current ascent is the same as without a best start to compare it with.
     pub(super) is_whole: bool,
     /// True once the best start is judged more finely, and polished.
     pub(super) again: bool,
     pub(super) ascent: Ascent,
     pub(super) work: Work,
     pub(super) pass: ForwardPass,
-    /// Whether relays have to hold back for what was found.
+    /// True if relays have to hold back for the target found.
     pub(super) holds_back: bool,
-    /// Whether any start came up against the least separation.
+    /// True if any start was limited by the minimum separation.
     pub(super) walled: bool,
-    /// Which move of the polish is tried, how many were taken, and where its relay was.
+    /// Current move of the polish, number of accepted moves, and the cell of the relay before the move.
     pub(super) moving: u16,
     pub(super) moved: u8,
     pub(super) kept: Cell,
-    /// The segment whose policies are at hand.
+    /// Segment whose policies are in memory.
     pub(super) held: Option<u8>,
     pub(super) stages: [Stage; STAGES],
     pub(super) marks: [Mark; SEGMENTS],
@@ -55,7 +55,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Begins; `None` in a field, where the chain has more than `RELAYS` relays, or without the feature `altitude`.
+    /// Creates a solver; `None` in a field, for more than `RELAYS` relays, or without the feature `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
         (fits && mission.interferer().is_some()).then(|| Self {
@@ -83,7 +83,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         })
     }
 
-    /// Where relay `index` is to fly across the line, once the chain is solved.
+    /// Returns the cross-section of relay `index`, once the chain is solved.
     pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
         self.cell(index).place(seat.room)
     }
@@ -94,11 +94,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Goes on for one portion: ten relays back and forward, or twenty without a change. The target, linear SIR, once the chain is
-    /// solved; `seat_of` gives what relay 1..=N brings along, and must answer the same every time.
+    /// Does one portion of the work: ten relays backward and forward, or twenty without a change.
+    ///
+    /// Ready with the target, a linear SIR, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and must be
+    /// constant.
     ///
     /// # Errors
-    /// [`Infeasible`] when no target can be met.
+    /// [`Infeasible`] if no target can be met.
     pub fn step(
         &mut self,
         mission: &Mission,
@@ -132,12 +134,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// A pass begins at Tx.
     pub(super) fn restart(&mut self) {
         self.pass = ForwardPass::default();
     }
 
-    /// Keeps the `cell` of relay `index`, which comes after one at `x_m`.
+    /// Stores the `cell` of relay `index`, which comes after one at `x_m`.
     #[inline(never)] // called from several places
     pub(super) fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -149,7 +150,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// The mark before relay `index`, the first of its segment.
+    /// Returns the mark before relay `index` if that is the first of its segment.
     pub(super) fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -157,7 +158,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             .filter(|_| at.is_multiple_of(SEGMENT))
     }
 
-    /// Whether relays have to hold back for the target that was found.
+    /// Returns true if relays have to hold back for the target found.
     pub const fn holds_back(&self) -> bool {
         self.holds_back
     }

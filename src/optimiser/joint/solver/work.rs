@@ -1,62 +1,58 @@
-//! What a solver is at.
+//! Current work of a solver.
 
 use crate::optimiser::joint::starts::Seek;
 use crate::place::Placement;
 
-/// A pass forward.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ForwardPass {
-    /// Relays that are behind it.
+    /// Relays that the pass has completed.
     pub(super) done: u16,
-    /// Where the last of them is, and where it was.
+    /// New and previous position of the last of them.
     pub(super) from: Placement,
     pub(super) old: Placement,
     pub(super) penalty: f32,
-    /// The last place that the next relay may take, m.
     pub(super) end_m: f32,
-    /// Whether a relay has to hold back.
     pub(super) holds_back: bool,
 }
 
-/// What is being worked out.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Work {
-    /// The next start.
+    /// Begin the next start.
     Begin,
-    /// The highest target of the chain as it is, and what for.
+    /// Search for the highest feasible target of the unchanged chain.
     Seek(Seek, Purpose),
-    /// The chain as it is for one target, to be kept.
+    /// Compute the chain for one target, and store it.
     Settle(f32, Purpose),
-    /// Whether the relays of this segment, the last of which is to stand there, can hold back as a target is met.
+    /// Check that relays can hold back: segment, required x of its last relay, m, and the search.
     Stand(u8, f32, Seek, Purpose),
-    /// The next move of a chain that meets this.
+    /// Try the next move of the polish; the chain meets this target.
     Polish(f32),
-    /// A pass back, at this segment.
+    /// Backward pass at this segment.
     Back(u8),
-    /// A pass forward with a part of the step and a target; to be kept if `true`.
+    /// Forward pass with a fraction of the step and a target; stored if `true`.
     Forward(f32, f32, bool),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Purpose {
-    /// A chain to begin with, of the shape of the start.
+    /// Initial chain with the shape of the start.
     Start,
-    /// A higher target during an ascent.
+    /// Higher target during an ascent.
     Raise,
-    /// The slack where less of it counts.
+    /// Slack after its limit has been reduced.
     Tighten,
-    /// What an ascent has come to.
+    /// Result of an ascent.
     Judge,
-    /// What that comes to by the rules of the sweep.
+    /// Result of an ascent by the sweep's rules.
     Last,
-    /// Whether the chain has all that can be had, by the same rules.
+    /// Check of the ceiling, by the sweep's rules.
     Probe,
-    /// Whether one relay's move gains something, by the same rules.
+    /// Check of one relay's move, by the sweep's rules.
     Move,
 }
 
 impl Purpose {
-    /// Whether relays go by the rules of the sweep.
+    /// Returns true if the pass uses the sweep's rules.
     pub(super) const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }

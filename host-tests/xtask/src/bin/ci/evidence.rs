@@ -1,26 +1,26 @@
-//! The part of a step's output that tells why it failed, repeated at the end of a run: a log that keeps only its last lines keeps it.
+//! Evidence of a failed step: the relevant output, repeated at the end of a run, so that a log's last lines contain it.
 
 use std::collections::VecDeque;
 use std::fmt::{Display, Formatter, Result as FormatResult};
 use std::io::{BufRead, Result, Write, stdout};
 
-/// Lines kept of a step that runs no tests.
+/// Number of last lines kept of a step that runs no tests.
 const LAST_LINES: usize = 20;
 
-/// Lines kept of one test binary's panics, and as many of the names of its failed tests.
+/// Number of lines kept of one test binary's panics, and of the names of its failed tests.
 const LINES_OF_FAILURES: usize = 100;
 
-/// Reasons why a step failed: each test binary's `failures:`, or else the last lines of the output.
+/// Relevant output of a failed step: each test binary's `failures:`, or else the last lines.
 #[derive(Default)]
 pub(crate) struct Evidence {
     failures: Vec<String>,
     last: VecDeque<String>,
-    /// Lines that the present list of failures may still take; `None` outside of one.
+    /// Remaining lines of the current list of failures; `None` outside a list.
     remaining: Option<usize>,
 }
 
 impl Evidence {
-    /// Copies `output` to the standard output, line by line, and keeps what tells of failures.
+    /// Copies `output` to the standard output, line by line, and keeps the lines about failures.
     pub(crate) fn read(&mut self, mut output: impl BufRead) -> Result<()> {
         let mut line = Vec::new();
         while output.read_until(b'\n', &mut line)? > 0 {
@@ -31,9 +31,8 @@ impl Evidence {
         Ok(())
     }
 
-    /// Takes one line of the output.
     pub(crate) fn add(&mut self, line: &str) {
-        // It stands twice: before the panics, and before the names.
+        // The heading appears twice: before the panics, and before the names.
         if line == "failures:" {
             self.remaining = Some(LINES_OF_FAILURES);
         }

@@ -1,4 +1,4 @@
-//! `cargo ci`: everything that must pass, one step after the other; the last lines name what failed, with its output.
+//! `cargo ci`: runs all checks one after the other; the last lines name the failed ones, with their output.
 
 mod evidence;
 mod prepare;
@@ -9,14 +9,14 @@ use std::time::Instant;
 
 use clap::Parser;
 
-/// Runs everything that must pass, one step after the other; the last lines name what failed, with its output.
+/// Runs all checks one after the other; the last lines name the failed ones, with their output.
 #[derive(Parser)]
 #[command(name = "cargo ci")]
 struct Options {
-    /// Only what every edit needs: formatting, lints of the host, the library's tests and those that are done in seconds.
+    /// Run only the quick checks: formatting, host lints, the library's tests and integration tests that take seconds.
     #[arg(long)]
     quick: bool,
-    /// Only the steps whose names contain this.
+    /// Run only the steps whose names contain this text.
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
 }

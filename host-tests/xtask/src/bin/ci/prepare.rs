@@ -1,4 +1,4 @@
-//! What the steps need, and how it is added where it is missing.
+//! Tools that the steps need, and their installation.
 
 use std::process::Command;
 
@@ -6,11 +6,11 @@ use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
 use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
-/// Programs of Debian's packages of the same name: the emulator that runs the firmware, and Wireshark without windows, which reads
-/// captures.
+/// Debian packages, each with a program of its name: the emulator that runs the firmware, Wireshark's command line, which reads
+/// captures, and a browser.
 const OF_DEBIAN: [&str; 3] = ["qemu-system-arm", "tshark", "chromium"];
 
-/// What it is called, a command that tells whether it is there, and what rustup adds it by.
+/// Component: its name, a command that succeeds if it is present, and the rustup arguments that add it.
 type Needed = (
     &'static str,
     &'static [&'static str],
@@ -74,10 +74,10 @@ const FOR_THE_REST: [Needed; 5] = [
     ),
 ];
 
-/// The fuzzer's version.
+/// Version of cargo-fuzz.
 const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
-/// Adds what the quick steps need, or all of them, and the machine lacks; or says what to type.
+/// Adds missing tools, for the quick steps or for all; returns the command to type for a tool that cannot be added.
 pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     add(&TO_EDIT)?;
     if quick {
@@ -88,7 +88,7 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     OF_DEBIAN.into_iter().try_for_each(prepare_program)
 }
 
-/// cargo-fuzz is built into the target folder: what it is for is this project alone.
+/// Builds cargo-fuzz into the target folder, because only this project uses it.
 fn prepare_fuzzer() -> Result<(), String> {
     if succeeds(CARGO_FUZZ, &["fuzz", "--version"]) {
         return Ok(());
@@ -139,7 +139,7 @@ fn add(needed: &[Needed]) -> Result<(), String> {
     Ok(())
 }
 
-/// Only root can add a package of Debian, so for anybody else this says what to type.
+/// Installs a Debian package. That needs root: for other users the error contains the command to type.
 fn prepare_program(program: &str) -> Result<(), String> {
     if succeeds(program, &["--version"]) {
         return Ok(());
@@ -153,7 +153,7 @@ fn prepare_program(program: &str) -> Result<(), String> {
             .status()
             .is_ok_and(|status| status.success())
     };
-    // What apt knows may be older than what there is to fetch.
+    // The package lists may be out of date.
     if apt_get(&install) || (apt_get(&["update"]) && apt_get(&install)) {
         Ok(())
     } else {
@@ -163,7 +163,7 @@ fn prepare_program(program: &str) -> Result<(), String> {
     }
 }
 
-/// rustc names the folder of a target whether it is there or not.
+/// Returns true if the target's folder exists: rustc prints its path even if it does not.
 fn target_is_there(arguments: &[&str]) -> bool {
     let output = Command::new("rustc").args(arguments).output();
     output.is_ok_and(|output| {

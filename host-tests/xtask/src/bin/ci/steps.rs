@@ -1,4 +1,4 @@
-//! The steps, in order.
+//! Steps of `cargo ci`, in order.
 
 use std::io::BufReader;
 use std::process::{Command, Stdio};
@@ -7,16 +7,16 @@ use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::evidence::Evidence;
 
-/// The target the firmware is built for.
+/// Target of the firmware.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The target of the Embassy board that is no STM32.
+/// Target of the Embassy board that is not an STM32.
 pub(crate) const TARGET_V8M: &str = "thumbv8m.main-none-eabihf";
 
-/// The oldest compiler the crate promises to build with, as `rust-version` in Cargo.toml has it.
+/// Oldest supported compiler: `rust-version` in Cargo.toml.
 pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 
-/// Sets of features that the library is tested with and a chain flies with, beside the full one of all other tests.
+/// Feature sets for the library's tests and a flight; all other tests use the full set.
 const SETS: [&str; 7] = [
     "",
     "guard",
@@ -27,8 +27,7 @@ const SETS: [&str; 7] = [
     "guard,upload",
 ];
 
-/// Tests that are done in seconds, one or two of each part: placements, the chain, what goes on the air, the links, the flash,
-/// the guard.
+/// Integration tests that take seconds, one or two for each part of the project.
 const QUICK_TESTS: [&str; 10] = [
     "asynch",
     "exact",
@@ -42,21 +41,21 @@ const QUICK_TESTS: [&str; 10] = [
     "wire",
 ];
 
-/// One command that must succeed.
+/// Command that must succeed.
 pub(crate) struct Step {
     pub(crate) name: String,
     pub(crate) command: String,
     environment: &'static [(&'static str, &'static str)],
 }
 
-/// The compiler of the fuzzer and of Miri: a dated one, so that a commit's verdict stays what it is.
+/// Compiler of the fuzzer and of Miri, with a fixed date, so that a commit's result does not change.
 pub(crate) const NIGHTLY: &str = "nightly-2026-10-30";
 
-/// The fuzzer, where [`super::prepare`] puts it.
+/// Path of the fuzzer that [`super::prepare`] installs.
 pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
-/// Executions of each fuzz target. With their seed they are the same ones each time: this finds what a commit broke, a long run
-/// finds what is new.
+/// Executions of each fuzz target. With a fixed seed they are the same each time: this finds regressions, a long run finds new
+/// faults.
 const EXECUTIONS: u32 = 10_000;
 
 fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
@@ -68,7 +67,7 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
 }
 
 impl Step {
-    /// Runs the command and passes its output on. `Err` holds the output that tells why it failed.
+    /// Runs the command and forwards its output. `Err` holds the evidence of the failure.
     pub(crate) fn run(&self) -> Result<(), Evidence> {
         let mut words = self.command.split_whitespace();
         let child = Command::new(words.next().unwrap_or("cargo"))
@@ -94,7 +93,7 @@ impl Step {
     }
 }
 
-/// What every edit needs.
+/// Returns the quick steps.
 pub(crate) fn quick() -> Vec<Step> {
     let tests: Vec<String> = QUICK_TESTS.map(|test| format!("--test {test}")).into();
     let mut steps = first();
@@ -108,7 +107,7 @@ pub(crate) fn quick() -> Vec<Step> {
     steps
 }
 
-/// Everything.
+/// Returns all steps.
 pub(crate) fn all() -> Vec<Step> {
     let mut steps = first();
     steps.extend(clippy());
@@ -180,7 +179,8 @@ fn clippy() -> Vec<Step> {
     ]
 }
 
-/// The Embassy examples, a workspace of their own: as the rest is checked, for each chip; the application on a PC too.
+/// Returns the steps of the Embassy examples, a separate workspace: checked like the rest, for each chip; the application on the
+/// host, too.
 fn embassy() -> Vec<Step> {
     const MANIFEST: &str = "--manifest-path examples/embassy/Cargo.toml";
     const HOST: &str = "-p relay-app --locked --target-dir target/embassy";
@@ -218,7 +218,7 @@ fn embassy() -> Vec<Step> {
     steps
 }
 
-/// The library and a chain, with these features alone.
+/// Returns the step that tests the library and flies a chain with only these features.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
@@ -244,7 +244,7 @@ fn firmware() -> Vec<Step> {
         step(name, command)
     };
     vec![
-        // As a user types it at the root, and as `cargo hack check --target` does: without --package, the default members.
+        // Checks the default members, as a user at the root and `cargo hack check --target` do without --package.
         step(
             "the default members, target",
             format!("cargo check --locked --target {TARGET}"),
@@ -256,11 +256,11 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// What needs more than a stable compiler: every fuzz target from its corpus on, the corpora under Miri.
+/// Returns the steps that need a nightly compiler: every fuzz target, starting with its corpus, and the corpora under Miri.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {
-        // What is found goes where it is not taken for a part of the corpus; of a missing folder libFuzzer makes an error.
+        // Findings go to a folder that is not part of the corpus; libFuzzer fails if the folder does not exist.
         let found = format!("target/fuzz/{target}");
         _ = std::fs::create_dir_all(&found);
         let fuzz = format!(
@@ -272,8 +272,8 @@ fn nightly() -> Vec<Step> {
         );
         steps.push(step(format!("fuzz smoke, {target}"), command));
     }
-    // With the width of the target's pointers; for x86 libm takes square roots in assembly, which Miri does not read. Isolated,
-    // it would not read the corpora either.
+    // Miri runs with the pointer width of the target: on x86 libm computes square roots in assembly, which Miri does not support.
+    // With isolation Miri could not read the corpora.
     steps.push(Step {
         environment: &[("MIRIFLAGS", "-Zmiri-disable-isolation")],
         ..step(

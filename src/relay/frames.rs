@@ -1,0 +1,198 @@
+//! Frames to and from the protocol: address and tag are checked before a message is decoded.
+
+use super::port::Port;
+use crate::node::Node;
+use crate::node::duplicate::Sender;
+use crate::side::Side;
+use crate::stats::bump;
+use crate::time::Instant;
+use crate::wire::endpoint::{Endpoint, Sent};
+use crate::wire::frame::{FrameBuf, Opened};
+use crate::wire::message::Message;
+#[cfg(feature = "auth")]
+use crate::wire::session::{Checked, Session};
+
+/// Questions to a silent neighbour of which one comes with a handshake that requests a reply. The reply shows whether the
+/// neighbour takes another node with this relay's index for this relay.
+#[cfg(feature = "auth")]
+const QUESTIONS: u16 = 4;
+
+/// Handles an intact frame of this relay's network.
+pub(super) fn receive(
+    node: &mut Node,
+    endpoint: &mut Endpoint,
+    now: Instant,
+    port: Port,
+    frame: &Opened<'_>,
+) {
+    let (own, header) = (node.member().node, frame.header);
+    let is_duplicate = header.sender == own;
+    if header.destination != own && port == Port::Shared {
+        bump(&mut node.stats_mut().overheard);
+        if is_duplicate {
+            receive_duplicate(node, endpoint, now, frame);
+        }
+        return;
+    }
+    let through = match port {
+        Port::Upstream => Some(Side::Upstream),
+        Port::Downstream => Some(Side::Downstream),
+        Port::Shared => None,
+    };
+    let side = node
+        .side_of(header.sender)
+        .filter(|side| through.is_none_or(|through| through == *side))
+        .filter(|_| header.destination == own);
+    if let Some(side) = side {
+        return receive_addressed(node, endpoint, now, side, frame);
+    }
+    bump(&mut node.stats_mut().misaddressed);
+    if is_duplicate {
+        receive_duplicate(node, endpoint, now, frame);
+    } else if let Some(through) = through {
+        node.hear_at_both(now, through, header.sender);
+    }
+}
+
+/// Handles a frame with this relay's own index as its sender.
+fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: &Opened<'_>) {
+    #[cfg(feature = "auth")]
+    if let Some(session) = endpoint.session() {
+        return node.hear_duplicate(now, session.sender(frame));
+    }
+    #[cfg(not(feature = "auth"))]
+    let _ = endpoint;
+    if frame.tag.is_some() {
+        return;
+    }
+    let sender = match Message::decode(frame.body) {
+        Err(_) => return,
+        Ok(Message::Claim(claim)) if claim.echo => return,
+        Ok(Message::Claim(claim)) => node.rival(claim),
+        Ok(_) => Sender::Unknown,
+    };
+    node.hear_duplicate(now, sender);
+}
+
+/// Handles a frame to this relay from a neighbour or a possible neighbour.
+fn receive_addressed(
+    node: &mut Node,
+    endpoint: &mut Endpoint,
+    now: Instant,
+    side: Side,
+    frame: &Opened<'_>,
+) {
+    #[cfg(feature = "auth")]
+    if let Some(checked) = endpoint.check(now, frame, node.stats_mut()) {
+        let rival = endpoint.session_mut().and_then(Session::poll_rival);
+        return receive_signed(node, rival, checked, now, side, frame);
+    }
+    #[cfg(not(feature = "auth"))]
+    let _ = endpoint;
+    if frame.tag.is_some() {
+        return bump(&mut node.stats_mut().version);
+    }
+    decode(node, now, side, frame);
+}
+
+#[cfg(feature = "auth")]
+fn receive_signed(
+    node: &mut Node,
+    rival: Option<crate::node::duplicate::Rival>,
+    checked: Checked,
+    now: Instant,
+    side: Side,
+    frame: &Opened<'_>,
+) {
+    // A passive relay waits for the other node itself: neighbours also show the nonce of a node that is gone.
+    if let Some(rival) = rival
+        && !node.is_passive()
+    {
+        node.hear_duplicate(now, Sender::Rival(rival));
+    }
+    let sender = frame.header.sender;
+    match checked {
+        Checked::Fresh { first } => {
+            node.is_signed_right(side, sender);
+            node.meet(side, sender, first);
+            decode(node, now, side, frame);
+        }
+        Checked::Handshake { first } => {
+            node.is_signed_right(side, sender);
+            node.meet(side, sender, first);
+        }
+        Checked::Unproven => node.called(side, sender),
+        // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.
+        Checked::Forged if frame.handshake => node.is_forged(side, sender),
+        Checked::WentBack => node.went_back(side, sender),
+        Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
+    }
+}
+
+fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
+    let Ok(message) = Message::decode(frame.body) else {
+        return bump(&mut node.stats_mut().malformed);
+    };
+    let counter = if node.handle_message(now, side, frame.header.sender, &message) {
+        &mut node.stats_mut().received
+    } else {
+        &mut node.stats_mut().misaddressed
+    };
+    bump(counter);
+}
+
+/// Writes the next frame; handshakes come before messages.
+pub(super) fn poll_transmit(
+    node: &mut Node,
+    endpoint: &mut Endpoint,
+    now: Instant,
+    frame: &mut FrameBuf,
+) -> Option<Sent> {
+    if endpoint.is_exhausted() {
+        return None;
+    }
+    #[cfg(feature = "auth")]
+    if let Some(session) = endpoint.session_mut() {
+        if node.is_passive() {
+            return None;
+        }
+        if let Some(number) = node.poll_sessions() {
+            session.restart(number);
+        }
+        if let Some((_, to)) = node.poll_claim() {
+            session.ask(to);
+        }
+        session.pin(node.neighbours());
+        let sent = endpoint.transmit_handshake(frame, node.stats_mut());
+        if sent.is_some() {
+            return sent;
+        }
+    }
+    let (_, to, message) = node.poll_message(now)?;
+    #[cfg(feature = "auth")]
+    if let Some(session) = endpoint.session_mut() {
+        schedule_handshake(node, session, to, &message);
+    }
+    endpoint.transmit(to, &message, frame, node.stats_mut())
+}
+
+/// Schedules the handshake that accompanies `message`, if there is one.
+#[cfg(feature = "auth")]
+fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
+    if let Message::Heartbeat { ask, .. } = message
+        && *ask != 0
+        && ask % QUESTIONS == 0
+    {
+        session.ask_silent(to);
+    }
+    if node.shows_its_nonce(message) {
+        session.show(to);
+    }
+    if let Message::Hello(hello) = message
+        && hello.ask
+        && !hello.is_heard(node.member().node, to)
+    {
+        // The node may have restarted: then it accepts only handshakes and sends nothing by itself.
+        session.ask_silent(to);
+    }
+}

@@ -1,0 +1,194 @@
+//! A node's end of its links: which received frames count, and how its own are addressed, numbered and signed.
+//!
+//! A relay and a ground station have one each. What a frame then means to them is theirs.
+
+#[cfg(feature = "auth")]
+use super::auth::Auth;
+use super::deframe::DeframeError;
+use super::frame::{self, FrameBuf, FrameError, Header, Opened};
+use super::message::Message;
+#[cfg(feature = "auth")]
+use super::session::{Checked, Session};
+use crate::stats::{Stats, bump};
+#[cfg(feature = "auth")]
+use crate::time::{Duration, Instant};
+
+/// A frame to send.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sent {
+    /// Node number of the receiver.
+    pub(crate) to: u16,
+    /// Length in bytes.
+    pub(crate) len: usize,
+}
+
+/// Identity, frame counter and sessions of one node.
+#[derive(Clone, Debug)]
+pub(crate) struct Endpoint {
+    network: u16,
+    node: u16,
+    counter: u32,
+    #[cfg(feature = "auth")]
+    session: Option<Session>,
+}
+
+impl Endpoint {
+    /// Node `node` of `network`, which does not sign.
+    pub(crate) const fn new(network: u16, node: u16) -> Self {
+        Self {
+            network,
+            node,
+            counter: 0,
+            #[cfg(feature = "auth")]
+            session: None,
+        }
+    }
+
+    /// Signs from now on, with the claim number `claim`. The session of a node that is silent for `gone_after` ends.
+    #[cfg(feature = "auth")]
+    pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
+        self.session = Some(Session::new(auth, claim, gone_after));
+    }
+
+    /// Opens what the deframer gives. Returns an intact frame of this network; anything else is counted in `stats`.
+    pub(crate) fn open<'a>(
+        &self,
+        decoded: Result<&'a [u8], DeframeError>,
+        stats: &mut Stats,
+    ) -> Option<Opened<'a>> {
+        let error = match decoded.map(frame::open) {
+            Ok(Ok(frame)) if frame.header.network == self.network => return Some(frame),
+            Ok(Ok(_)) => &mut stats.foreign,
+            Ok(Err(FrameError::Short)) | Err(DeframeError::Truncated) => &mut stats.truncated,
+            Ok(Err(FrameError::Crc)) => &mut stats.crc,
+            Ok(Err(FrameError::Version)) => &mut stats.version,
+            Ok(Err(FrameError::Message(_))) => &mut stats.malformed,
+            Err(DeframeError::Oversized) => &mut stats.oversized,
+        };
+        bump(error);
+        None
+    }
+
+    /// Checks the tag of `frame` and counts every result but a fresh message; `None` if this node does not sign.
+    #[cfg(feature = "auth")]
+    pub(crate) fn check(
+        &mut self,
+        now: Instant,
+        frame: &Opened<'_>,
+        stats: &mut Stats,
+    ) -> Option<Checked> {
+        let session = self.session.as_mut()?;
+        let checked = session.check(now, frame.header.sender, frame);
+        match checked {
+            Checked::Fresh { .. } => {}
+            Checked::Handshake { .. } | Checked::Unproven => bump(&mut stats.handshakes),
+            Checked::Unsigned => bump(&mut stats.unsigned),
+            Checked::Forged => bump(&mut stats.forged),
+            Checked::Replayed | Checked::WentBack => bump(&mut stats.replayed),
+        }
+        Some(checked)
+    }
+
+    /// Returns true once no more frames can be sent: a signed counter is used once, and after four billion frames a new epoch is due.
+    pub(crate) const fn is_exhausted(&self) -> bool {
+        #[cfg(feature = "auth")]
+        return self.counter == u32::MAX && self.session.is_some();
+        #[cfg(not(feature = "auth"))]
+        false
+    }
+
+    /// Writes `message` to node `to`. If that node could not check its tag yet, writes a handshake in its place: the message is due again
+    /// later.
+    pub(crate) fn transmit(
+        &mut self,
+        to: u16,
+        message: &Message,
+        frame: &mut FrameBuf,
+        stats: &mut Stats,
+    ) -> Option<Sent> {
+        #[cfg(feature = "auth")]
+        if let Some(session) = &mut self.session {
+            if !session.knows(to) {
+                session.greet(to);
+                return self.transmit_handshake(frame, stats);
+            }
+            let header = Header {
+                network: self.network,
+                sender: self.node,
+                destination: to,
+                counter: self.counter,
+            };
+            let len = frame::encode_signed(header, message, session.signer(to), frame);
+            return Some(self.sent(to, len, stats));
+        }
+        let len = frame::encode(self.header(to), message, frame);
+        Some(self.sent(to, len, stats))
+    }
+
+    /// Writes the next pending handshake.
+    #[cfg(feature = "auth")]
+    pub(crate) fn transmit_handshake(
+        &mut self,
+        frame: &mut FrameBuf,
+        stats: &mut Stats,
+    ) -> Option<Sent> {
+        let header = self.header(0);
+        let session = self.session.as_mut()?;
+        let to = session.take_handshake()?;
+        let header = Header {
+            destination: to,
+            ..header
+        };
+        let body = session.handshake(to);
+        let len = frame::encode_handshake(header, &body, session.signer(to), frame);
+        Some(self.sent(to, len, stats))
+    }
+
+    const fn header(&self, destination: u16) -> Header {
+        Header {
+            network: self.network,
+            sender: self.node,
+            destination,
+            counter: self.counter,
+        }
+    }
+
+    fn sent(&mut self, to: u16, len: usize, stats: &mut Stats) -> Sent {
+        self.counter = self.counter.wrapping_add(1);
+        bump(&mut stats.sent);
+        Sent { to, len }
+    }
+
+    /// Returns the sessions with other nodes; `None` if this node does not sign.
+    #[cfg(feature = "auth")]
+    pub(crate) const fn session(&self) -> Option<&Session> {
+        self.session.as_ref()
+    }
+
+    /// Returns the sessions with other nodes; `None` if this node does not sign.
+    #[cfg(feature = "auth")]
+    pub(crate) const fn session_mut(&mut self) -> Option<&mut Session> {
+        self.session.as_mut()
+    }
+
+    /// Schedules a handshake to node `to`.
+    #[cfg(feature = "upload")]
+    pub(crate) fn greet(&mut self, to: u16) {
+        if let Some(session) = &mut self.session {
+            session.greet(to);
+        }
+    }
+
+    /// Returns true if node `to` can check this node's tags, as far as is known.
+    #[cfg(feature = "upload")]
+    pub(crate) fn knows(&self, to: u16) -> bool {
+        self.session
+            .as_ref()
+            .is_some_and(|session| session.knows(to))
+    }
+
+    #[cfg(test)]
+    pub(crate) const fn counter_mut(&mut self) -> &mut u32 {
+        &mut self.counter
+    }
+}
