@@ -16,13 +16,13 @@ use uav_relay::flight::autopilot::{
 };
 use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Event, Instant, Placement, Relay, Sites};
+use uav_relay::{Band, Event, Instant, Placement, Relay, Sites};
 
 use crate::answers::{Answer, Answers};
 use crate::astray::{Astray, Off};
 use crate::datagrams::Datagrams;
+use crate::lost;
 use crate::relay::seed;
-use crate::{lost, waits};
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_scenario::endpoint::Endpoint;
@@ -77,7 +77,6 @@ enum Port {
 pub(crate) struct Companion {
     plan: AutopilotPlan,
     link: Autopilot,
-    between: Sites,
     port: Port,
     waiting: Vec<u8>,
     state: Option<&'static str>,
@@ -99,7 +98,6 @@ impl Companion {
         }
         Ok(Self {
             link,
-            between: plan.sites,
             plan: plan.clone(),
             port,
             waiting: Vec::new(),
@@ -162,42 +160,28 @@ impl Companion {
         self.astray.place(now)
     }
 
-    /// Exchanges bytes; passes position and control state to the relay, and its setpoint to the autopilot.
+    /// Exchanges bytes with the autopilot and data with the relay, and logs what has happened.
     pub(crate) fn drive(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
         if let Port::Tty(tty) = &mut self.port {
             tty.tend(now, log);
         }
-        self.follow(now, relay);
         let mut bytes = [0; 1_024];
         while let Some(count) = self.read(&mut bytes) {
             let bytes = bytes.get(..count).unwrap_or_default();
             self.link.handle_bytes(now, bytes);
         }
-        self.link.handle_timeout(now);
-        relay.handle_control(now, self.link.is_flown());
-        while let Some(position) = self.link.poll_position() {
+        if let (_, Some(position)) = self.link.exchange(relay, now) {
             self.astray.handle_place(now, position.place);
-            relay.handle_position(now, position.at, position.place);
         }
-        while let Some(sample) = self.link.poll_sample() {
-            relay.handle_sample(now, sample);
-        }
-        if let Some(side) = self.link.poll_cleared() {
-            relay.clear_lost(now, side);
-        }
-        self.link.handle_ready(now, relay.is_ready());
-        self.link.handle_hold(now, waits::reasons(relay));
-        self.link.handle_setpoint(now, relay.setpoint());
-        let sir_db = relay.target().map(|target| 10.0 * target.log10());
-        self.link.handle_values(now, sir_db, relay.setpoint());
         while let Some(frame) = self.link.poll_transmit(now) {
             self.send(&frame);
         }
         self.flush();
+        let sites = relay.sites().unwrap_or(self.plan.sites);
         while let Some(event) = self.link.poll_event() {
             match event {
                 AutopilotEvent::OffLine(off_line) => {
-                    if let Some(off) = self.astray.is_off_line(self.between, off_line) {
+                    if let Some(off) = self.astray.is_off_line(sites, off_line) {
                         self.tell_off(now, log, off);
                     }
                     continue;
@@ -209,7 +193,7 @@ impl Companion {
             said(now, log, event);
         }
         self.tell_unanswered(now, log);
-        self.tell_astray(now, log, relay);
+        self.tell_astray(now, log, sites, relay.mission().config().lateral);
     }
 
     /// Returns and removes the lost relays that the operator has cleared over MAVLink.
@@ -218,16 +202,13 @@ impl Companion {
     }
 
     /// Reports a drone far from its line to the log and the operator, if due.
-    fn tell_astray(&mut self, now: Instant, log: &Log, relay: &Relay) {
+    fn tell_astray(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
             State::Standby | State::Engaged | State::Blind => true,
         };
-        let lateral = relay.mission().config().lateral;
         let off_line = self.link.off_line(now);
-        let off = self
-            .astray
-            .look(now, self.between, lateral, off_line, is_in_air);
+        let off = self.astray.look(now, sites, lateral, off_line, is_in_air);
         if let Some(off) = off {
             self.tell_off(now, log, off);
         }
@@ -291,17 +272,6 @@ impl Companion {
                 "frames come by {}, none of them from a PX4 or an ArduCopter: is that the port of the autopilot itself (component 1)?",
                 self.plan.place
             ),
-        }
-    }
-
-    /// Switches to the sites of a newly adopted mission before any position along its line is sent.
-    fn follow(&mut self, now: Instant, relay: &Relay) {
-        let sites = relay.sites().unwrap_or(self.plan.sites);
-        // The relay has checked that these sites form a valid line.
-        if core::mem::replace(&mut self.between, sites) != sites
-            && let Ok(axis) = Axis::between(sites)
-        {
-            self.link.fly_along(now, axis);
         }
     }
 

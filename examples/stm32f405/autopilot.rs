@@ -16,11 +16,9 @@ use uav_relay::flight::autopilot::FrameBytes;
 use uav_relay::flight::autopilot::carrot::Pace;
 #[cfg(feature = "mavlink-signing")]
 use uav_relay::flight::autopilot::{Signing, Stamp};
-#[cfg(feature = "upload")]
-use uav_relay::flight::axis::Axis;
 use uav_relay::flight::course::Course;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Duration, Event, Instant, Mission, Relay, Side};
+use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
 use super::config::{self, Sites};
 use super::port::{self, OUTGOING, Port, Queues, Slot};
@@ -48,16 +46,7 @@ pub(crate) fn uart(usart: USART1, tx: PA9, rx: PA10, apb2_hz: u32, rcc: &mut Rcc
 
 pub(crate) struct Autopilot {
     link: Link,
-    /// Sites of the block, and sites of the line that is flown.
-    #[cfg(feature = "upload")]
-    loaded: uav_relay::Sites,
-    #[cfg(feature = "upload")]
-    between: uav_relay::Sites,
     port: Port,
-    /// Control state last reported to the relay: true if its setpoint is flown.
-    flown: Option<bool>,
-    /// Target SIR of the hop to this relay, as a factor and in decibels.
-    target: Option<(f32, f32)>,
 }
 
 impl Autopilot {
@@ -85,33 +74,16 @@ impl Autopilot {
         let course = Course::try_new(sites.on_earth(), sites.speed_m_s, mission);
         let course = course.map_err(log::off_course).ok()?;
         log::flies(&course);
-        Self::along(&course, uart, sites, now)
+        Self::along(&course, uart, now)
     }
 
     /// Creates the link along a course. A separate function keeps its stack frame out of the computation of the course.
     #[inline(never)]
-    fn along(
-        course: &Course,
-        uart: Uart,
-        #[cfg_attr(
-            not(feature = "upload"),
-            expect(unused_variables, reason = "nothing moves them")
-        )]
-        sites: &Sites,
-        now: Instant,
-    ) -> Option<&'static mut Self> {
+    fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;
-        #[cfg(feature = "upload")]
-        let loaded = sites.on_earth();
         let autopilot = singleton!(LINK: Autopilot = Autopilot {
             link: Link::new(course.axis, course.pace, now),
-            #[cfg(feature = "upload")]
-            loaded,
-            #[cfg(feature = "upload")]
-            between: loaded,
             port,
-            flown: None,
-            target: None,
         })?;
         autopilot.link.set_seed(board::seed());
         sign(&mut autopilot.link, now).ok()?;
@@ -122,26 +94,14 @@ impl Autopilot {
         Some(autopilot)
     }
 
-    /// Switches to the sites of a newly adopted mission before any position along its line is sent.
-    #[cfg(feature = "upload")]
-    #[inline(never)] // its stack frame is released
-    fn follow(&mut self, now: Instant, relay: &Relay) {
-        let sites = relay.sites().unwrap_or(self.loaded);
-        if sites == self.between {
-            return;
-        }
-        self.between = sites;
-        // The relay has checked that these sites form a valid line.
-        if let Ok(axis) = Axis::between(sites) {
-            self.link.fly_along(now, axis);
-        }
+    /// Processes received bytes, and exchanges data with the relay: its next frames carry the newest position.
+    pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
+        self.receive(now);
+        self.link.exchange(relay, now);
     }
 
-    /// Processes received bytes, and passes their results to the relay.
     #[inline(never)] // its stack frame is released
-    pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
-        #[cfg(feature = "upload")]
-        self.follow(now, relay);
+    fn receive(&mut self, now: Instant) {
         let mut bytes = [0; 64];
         // Bytes that arrive meanwhile wake the main loop again.
         for _ in 0..RECEIVED / bytes.len() {
@@ -155,21 +115,6 @@ impl Autopilot {
                 Err(_) => {}
             }
         }
-        self.link.handle_timeout(now);
-        let flown = Some(self.link.is_flown());
-        if self.flown != flown {
-            self.flown = flown;
-            relay.handle_control(now, self.link.is_flown());
-        }
-        while let Some(position) = self.link.poll_position() {
-            relay.handle_position(now, position.at, position.place);
-        }
-        while let Some(sample) = self.link.poll_sample() {
-            relay.handle_sample(now, sample);
-        }
-        if let Some(side) = self.link.poll_cleared() {
-            relay.clear_lost(now, side);
-        }
     }
 
     /// Shows an event of the relay on the operator's ground station.
@@ -178,16 +123,9 @@ impl Autopilot {
     }
 
     /// Sends frames for the relay's state; returns the time of the next call. `now` must be that of [`listen`](Self::listen).
-    pub(crate) fn fly(&mut self, now: Instant, relay: &Relay) -> Instant {
-        #[cfg(feature = "upload")]
-        self.follow(now, relay);
-        let setpoint = relay.setpoint();
-        self.link.handle_ready(now, relay.is_ready());
-        let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
-        self.link.handle_hold(now, holds);
-        self.link.handle_setpoint(now, setpoint);
-        let sir_db = relay.target().map(|target| self.decibels(target));
-        self.link.handle_values(now, sir_db, setpoint);
+    pub(crate) fn fly(&mut self, now: Instant, relay: &mut Relay) -> Instant {
+        // Its ports have been served since the last exchange: the newest setpoint is sent in this turn.
+        self.link.exchange(relay, now);
         while let Some(event) = self.link.poll_event() {
             log::autopilot(event);
         }
@@ -200,18 +138,6 @@ impl Autopilot {
             };
             // The port has room for a whole frame.
             let _ = self.port.write(&frame);
-        }
-    }
-
-    /// Returns the SIR in decibels, recomputed only after a change.
-    fn decibels(&mut self, target: f32) -> f32 {
-        match self.target {
-            Some((of, db)) if of.to_bits() == target.to_bits() => db,
-            _ => {
-                let db = 10.0 * libm::log10f(target);
-                self.target = Some((target, db));
-                db
-            }
         }
     }
 }

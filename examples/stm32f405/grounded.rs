@@ -41,7 +41,7 @@ impl Autopilot {
         match *self {}
     }
 
-    pub(crate) const fn fly(&mut self, _: Instant, _: &Relay) -> Instant {
+    pub(crate) const fn fly(&mut self, _: Instant, _: &mut Relay) -> Instant {
         match *self {}
     }
 }

@@ -15,14 +15,8 @@ use super::link::watched;
 use super::relay::{AsyncRelay, keep, wake};
 use crate::event::Event;
 use crate::flight::autopilot::{Autopilot, AutopilotEvent};
-#[cfg(feature = "upload")]
-use crate::flight::axis::Axis;
-#[cfg(feature = "upload")]
-use crate::relay::Relay;
 use crate::serial::READ_LIMIT;
-use crate::side::Side;
-use crate::sites::Sites;
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 
 /// So long a port that has failed, or is full, is left alone.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -33,13 +27,6 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// that runs the relay's ports, as [`AsyncRelay`] is.
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// The sites that it was made with, and those between which it flies.
-    #[cfg(feature = "upload")]
-    loaded: Sites,
-    #[cfg(feature = "upload")]
-    between: Cell<Sites>,
-    /// What the relay was told last of whether its setpoint is flown.
-    flown: Cell<Option<bool>>,
     /// Something has come in, or has happened.
     news: Signal,
     /// There may be something to send.
@@ -52,28 +39,15 @@ impl fmt::Debug for AsyncAutopilot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("AsyncAutopilot")
             .field("link", &self.link)
-            .field("flown", &self.flown)
             .finish_non_exhaustive()
     }
 }
 
 impl AsyncAutopilot {
-    /// The link, which was made for the line between `sites`.
-    pub const fn new(
-        link: Autopilot,
-        #[cfg_attr(
-            not(feature = "upload"),
-            expect(unused_variables, reason = "nothing moves them")
-        )]
-        sites: Sites,
-    ) -> Self {
+    /// Shares `link` between tasks.
+    pub const fn new(link: Autopilot) -> Self {
         Self {
             link: RefCell::new(link),
-            #[cfg(feature = "upload")]
-            loaded: sites,
-            #[cfg(feature = "upload")]
-            between: Cell::new(sites),
-            flown: Cell::new(None),
             news: Signal::new(),
             speech: Signal::new(),
             listener: Cell::new(None),
@@ -151,12 +125,13 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Hands each of the two what the other has, for good.
+    /// Exchanges data between the link and the relay, for good.
     async fn drive(&self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
         loop {
             self.news.settle();
             let now = clock.now();
-            if self.lend(|link| self.turn(link, now, relay)) == Some(true) {
+            let exchanged = self.lend(|link| relay.lend(|relay| link.exchange(relay, now)));
+            if exchanged.flatten().is_some_and(|(is_news, _)| is_news) {
                 relay.poke();
             }
             wake(&self.listener);
@@ -166,53 +141,6 @@ impl AsyncAutopilot {
             let due = self.lend(|link| link.poll_timeout(now)).unwrap_or(now);
             let due = due.max(now + PAUSE);
             select(self.news.raised(), clock.sleep_until(due)).await;
-        }
-    }
-
-    /// One turn; whether the relay was handed something.
-    fn turn(&self, link: &mut Autopilot, now: Instant, relay: &AsyncRelay<'_>) -> bool {
-        link.handle_timeout(now);
-        let handed = relay.lend(|relay| {
-            #[cfg(feature = "upload")]
-            self.follow(link, now, relay);
-            let flown = link.is_flown();
-            let mut handed = self.flown.replace(Some(flown)) != Some(flown);
-            if handed {
-                relay.handle_control(now, flown);
-            }
-            while let Some(position) = link.poll_position() {
-                relay.handle_position(now, position.at, position.place);
-                handed = true;
-            }
-            while let Some(sample) = link.poll_sample() {
-                relay.handle_sample(now, sample);
-                handed = true;
-            }
-            if let Some(side) = link.poll_cleared() {
-                relay.clear_lost(now, side);
-                handed = true;
-            }
-            let setpoint = relay.setpoint();
-            link.handle_ready(now, relay.is_ready());
-            let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
-            link.handle_hold(now, holds);
-            link.handle_setpoint(now, setpoint);
-            let sir_db = relay.target().map(|target| 10.0 * libm::log10f(target));
-            link.handle_values(now, sir_db, setpoint);
-            handed
-        });
-        handed.unwrap_or(false)
-    }
-
-    /// Between the sites of a mission that has just been adopted, before anything is told that is along its line.
-    #[cfg(feature = "upload")]
-    fn follow(&self, link: &mut Autopilot, now: Instant, relay: &Relay) {
-        let sites = relay.sites().unwrap_or(self.loaded);
-        // The relay has found that they make a line.
-        if self.between.replace(sites) != sites
-            && let Ok(axis) = Axis::between(sites)
-        {
-            link.fly_along(now, axis);
         }
     }
 

@@ -102,13 +102,13 @@ impl Steering {
         }
     }
 
-    /// Sets whether the drone flies to the setpoints from `now` on.
-    pub(crate) fn control(&mut self, now: Instant, flown: bool) {
-        if let Some(guard) = self.guard()
-            && guard.control(now, flown)
-        {
+    /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know it.
+    pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
+        let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
+        if is_news {
             self.remind_at = Some(now + REMINDER);
         }
+        is_news
     }
 
     /// Changes the line of the positions at time `now`, or after a start if `None`.

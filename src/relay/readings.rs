@@ -39,8 +39,7 @@ impl Relay {
 
     /// Returns true unless the drone is known to be out of order with a flown neighbour.
     ///
-    /// If false, its pilot must fly it to its own side along the line before engaging. Pass the value to
-    /// `Autopilot::handle_ready`.
+    /// If false, its pilot must fly it to its own side along the line before engaging. `Autopilot::exchange` passes the value on.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -246,7 +245,12 @@ impl Relay {
     /// relay.handle_control(Instant::from_millis(9_000), true);
     /// ```
     pub fn handle_control(&mut self, now: Instant, flown: bool) {
-        self.node.handle_control(self.clock.advance(now), flown);
+        self.control(now, flown);
+    }
+
+    /// As [`handle_control`](Self::handle_control). Returns true if the relay has a guard that did not know this control state.
+    pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
+        self.node.handle_control(self.clock.advance(now), flown)
     }
 
     /// Reports that lost or unflown relays on `side` ([`handle_control`](Self::handle_control)) have landed or were removed.

@@ -261,7 +261,7 @@ impl Scene {
                 let link = || AsyncLink::new(Uart::default(), Uart::default(), BAUD);
                 let mut ports = AsyncPair::new(link(), link());
                 let link = Autopilot::new(axis(), Pace::default(), time.now());
-                let autopilot = AsyncAutopilot::new(link, sites());
+                let autopilot = AsyncAutopilot::new(link);
                 let relays = async {
                     loop {
                         let event = relay.next_event().await;

@@ -11,7 +11,7 @@ use uav_relay::flight::autopilot::carrot::Pace;
 
 use super::real::{Mode, Real};
 use super::runner::Runner;
-use super::vehicle::{axis, sites};
+use super::vehicle::axis;
 use super::*;
 
 const STEP: Duration = Duration::from_millis(20);
@@ -152,7 +152,7 @@ impl Flight {
         let link = Autopilot::new(axis(), Pace::default(), self.now);
         self.started = self.now;
         self.companion = Some(if self.is_async {
-            Companion::Async(Runner::new(link, sites(), self.now))
+            Companion::Async(Runner::new(link, self.now))
         } else {
             Companion::Polled(Box::new(link))
         });

@@ -3,6 +3,7 @@
 mod any;
 mod arducopter;
 mod clearance;
+mod exchange;
 mod flights;
 mod motion;
 mod px4;

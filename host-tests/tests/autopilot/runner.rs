@@ -12,7 +12,7 @@ use embedded_io_async::{ErrorType, Read, Write};
 use host_tests::fixtures;
 use uav_relay::asynch::{AsyncAutopilot, AsyncRelay, Clock};
 use uav_relay::flight::autopilot::Autopilot;
-use uav_relay::{Instant, Settings, Sites};
+use uav_relay::{Instant, Settings};
 
 /// Polls per step: enough for a received frame, a turn and a dozen sent frames.
 const POLLS: u32 = 64;
@@ -81,10 +81,10 @@ pub(crate) struct Runner {
 }
 
 impl Runner {
-    pub(crate) fn new(link: Autopilot, sites: Sites, now: Instant) -> Self {
+    pub(crate) fn new(link: Autopilot, now: Instant) -> Self {
         let now = Rc::new(Cell::new(now));
         let (incoming, outgoing) = (Uart::default(), Uart::default());
-        let link = Rc::new(AsyncAutopilot::new(link, sites));
+        let link = Rc::new(AsyncAutopilot::new(link));
         let (mut rx, mut tx) = (incoming.clone(), outgoing.clone());
         let (runs, clock) = (link.clone(), Now(now.clone()));
         let task = Box::pin(async move {

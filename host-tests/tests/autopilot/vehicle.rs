@@ -189,6 +189,12 @@ impl Vehicle {
     }
 
     pub(crate) fn step(&mut self) {
+        self.step_alone();
+        self.drive();
+    }
+
+    /// Flies for one step and sends messages to the link, which answers in [`drive`](Self::drive) or [`answer`](Self::answer).
+    pub(crate) fn step_alone(&mut self) {
         self.now = Instant::from_micros(self.now.as_micros() + STEP_MS * 1_000);
         let ms = self.now.as_micros() / 1_000;
         self.fly();
@@ -207,7 +213,6 @@ impl Vehicle {
                 self.say_position();
             }
         }
-        self.drive();
     }
 
     /// Runs a firmware's main loop once.
@@ -216,11 +221,16 @@ impl Vehicle {
         if self.link.poll_timeout(self.now) <= self.now {
             self.link.handle_timeout(self.now);
         }
-        while let Some(frame) = self.link.poll_transmit(self.now) {
-            self.hear(&frame);
-        }
+        self.answer();
         while let Some(position) = self.link.poll_position() {
             self.positions.push((self.now, position));
+        }
+    }
+
+    /// Receives the link's frames and events.
+    pub(crate) fn answer(&mut self) {
+        while let Some(frame) = self.link.poll_transmit(self.now) {
+            self.hear(&frame);
         }
         while let Some(event) = self.link.poll_event() {
             self.events.push(event);

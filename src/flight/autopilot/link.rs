@@ -28,6 +28,8 @@ use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::side::Side;
+#[cfg(feature = "upload")]
+use crate::sites::Sites;
 use crate::time::{Duration, Instant, MonotonicClock};
 
 /// An onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
@@ -61,12 +63,15 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 /// # Contract
 /// - *Inputs* take anything, never fail and do a bounded amount of work.
 /// - *Time* is an argument. After a backward step of the caller's clock timers go on as if no time had passed between the two calls.
-/// - After every input call [`poll_transmit`](Self::poll_transmit), [`poll_position`](Self::poll_position), [`poll_cleared`](Self::poll_cleared) and
-///   [`poll_event`](Self::poll_event) until each gives `None`, and hand the relay what [`is_flown`](Self::is_flown) says; then sleep
-///   until [`poll_timeout`](Self::poll_timeout) or the next byte.
+/// - After every input call [`exchange`](Self::exchange), then [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event) until
+///   each returns `None`; then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte. `exchange` calls
+///   [`handle_timeout`](Self::handle_timeout), and the other inputs and outputs that concern the relay.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
-    axis: Axis,
+    pub(super) axis: Axis,
+    /// Sites of the line that the link was created with.
+    #[cfg(feature = "upload")]
+    pub(super) loaded: Sites,
     pace: Pace,
     clock: MonotonicClock,
     began: Instant,
@@ -113,6 +118,8 @@ impl Autopilot {
     /// The link to the autopilot of a drone that flies along `axis`, at most as fast as `pace` says.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
+            #[cfg(feature = "upload")]
+            loaded: axis.sites(),
             axis,
             pace,
             clock: MonotonicClock::new(now),

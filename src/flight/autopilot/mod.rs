@@ -10,6 +10,7 @@
 //! | `echo` | how late the link is |
 //! | `mode` | flight modes, why the drone was released, why it cannot be engaged|
 //! | `event` | events that the firmware is told of |
+//! | `exchange` | what the link and the relay hand each other in one turn |
 //! | `streams` | the messages that it is asked for |
 //! | `target` | what it is told to fly to, and how often |
 //! | [`carrot`] | the target on its way to the setpoint |
@@ -26,6 +27,7 @@ mod clearance;
 mod clock;
 mod echo;
 mod event;
+mod exchange;
 mod kind;
 mod link;
 mod mode;

@@ -53,6 +53,8 @@ const TOLERANCE_M: f64 = 0.05;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
+    #[cfg(feature = "upload")]
+    sites: Sites,
     middle: Vector,
     /// Unit vectors toward the receiver, to the right, and up.
     along: Vector,
@@ -114,6 +116,8 @@ impl Axis {
         let up = normal.minus(along.times(normal.dot(along))).unit();
         let radius_m = radius(normal, along);
         Ok(Self {
+            #[cfg(feature = "upload")]
+            sites: Sites { tx, rx },
             middle,
             along,
             right: along.cross(up),
@@ -132,6 +136,12 @@ impl Axis {
     #[inline] // a line is returned through the stack
     pub fn between(sites: Sites) -> Result<Self, AxisError> {
         Self::try_new(sites.tx, sites.rx)
+    }
+
+    /// Returns the sites at the two ends.
+    #[cfg(feature = "upload")]
+    pub(super) const fn sites(&self) -> Sites {
+        self.sites
     }
 
     /// Distance D from transmitter to receiver along the ground, m.

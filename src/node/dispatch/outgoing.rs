@@ -132,9 +132,13 @@ impl Node {
         self.steer(now);
     }
 
-    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) {
-        self.steering.control(now, flown);
-        self.steer(now);
+    /// Takes the control state of the drone: true while it flies to the setpoints. Returns true if the guard did not know it.
+    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
+        let is_news = self.steering.control(now, flown);
+        if is_news {
+            self.steer(now);
+        }
+        is_news
     }
 
     /// Handles the report that the lost relays at `side` are not in the air any more. The others of the view at that side are not

@@ -85,8 +85,7 @@ pub(crate) fn begin<F: NorFlash>(
     let autopilot = match &said.sites {
         Some(_) if !flies => return Err(Refused::NoAutopilot),
         Some(sites) => {
-            let ends = sites.on_earth();
-            let course = Course::try_new(ends, sites.speed_m_s, &said.mission);
+            let course = Course::try_new(sites.on_earth(), sites.speed_m_s, &said.mission);
             let Course { axis, pace } = course.map_err(Refused::Course)?;
             log::flies(axis.distance_m(), pace.speed_m_s);
             let mut link = Autopilot::new(axis, pace, now);
@@ -100,7 +99,7 @@ pub(crate) fn begin<F: NorFlash>(
                 // The empty queue has room for the line.
                 let _ = link.say("relay: restarted by its watchdog");
             }
-            Some(AsyncAutopilot::new(link, ends))
+            Some(AsyncAutopilot::new(link))
         }
         None => {
             log::unguarded();

@@ -127,28 +127,14 @@ impl Chain {
             }
             return;
         }
-        vehicle.follow(now, member.relay.sites());
-        vehicle.link.handle_timeout(now);
-        // Report the control state before the position: a drone that is engaged again begins with the next position.
+        vehicle.sites = member.relay.sites();
+        let (is_news, _) = vehicle.link.exchange(&mut member.relay, now);
         let is_flown = vehicle.link.is_flown();
-        member.relay.handle_control(now, is_flown);
-        vehicle.link.handle_ready(now, member.relay.is_ready());
-        let holds = [Side::Upstream, Side::Downstream].map(|side| member.relay.hold_reason(side));
-        vehicle.link.handle_hold(now, holds);
-        vehicle.link.handle_setpoint(now, member.relay.setpoint());
         while let Some(frame) = vehicle.link.poll_transmit(now) {
             vehicle.hear(now, &frame);
         }
-        // A rebooted relay sees a change of the control state even if nothing changed for the drone.
         let due = member.relay.poll_timeout();
         let is_sooner = due.is_some_and(|at| member.wake.is_none_or(|wake| at < wake));
-        let mut has_said = is_flown != member.lent || is_sooner;
-        while let Some(position) = vehicle.link.poll_position() {
-            member
-                .relay
-                .handle_position(now, position.at, position.place);
-            has_said = true;
-        }
         let mut turnings = Vec::new();
         while let Some(event) = vehicle.link.poll_event() {
             match event {
@@ -165,7 +151,7 @@ impl Chain {
         for turning in turnings {
             self.tell(index, turning, None);
         }
-        if has_said {
+        if is_news || is_sooner {
             self.drain(index);
         }
     }

@@ -56,7 +56,7 @@ pub(in crate::simulator) struct Vehicle {
     spec: FleetSpec,
     pub(in crate::simulator) link: Autopilot,
     /// Sites of the relay's mission if they differ from the run's line.
-    sites: Option<Sites>,
+    pub(in crate::simulator) sites: Option<Sites>,
     pilot: Pilot,
     body: Body,
     gust: Point,
@@ -134,14 +134,6 @@ impl Vehicle {
             interval,
             due: now,
         })
-    }
-
-    /// Follows the relay's mission to new `sites`; `None` for the run's own line.
-    pub(in crate::simulator) fn follow(&mut self, now: Instant, sites: Option<Sites>) {
-        if self.sites != sites {
-            self.sites = sites;
-            self.link.fly_along(now, self.line());
-        }
     }
 
     /// Returns the line of the relay's placements.

@@ -1,0 +1,271 @@
+//! Exchange between the link and the relay of one drone.
+
+use uav_relay::flight::autopilot::{Autopilot, WaitReason};
+use uav_relay::flight::axis::Axis;
+use uav_relay::{
+    Auth, Event, GuardConfig, Key, MAX_FRAME, Mission, MissionConfig, Port, Relay, Settings, Side,
+    Sites, Upload,
+};
+
+use host_tests::fixtures;
+use mavlink::dialects::common::{
+    COMMAND_LONG_DATA, MavCmd, MavLandedState, MavMessage, RADIO_STATUS_DATA,
+};
+
+use super::*;
+
+/// Returns a relay with a guard, alone between the sites of the vehicle's line.
+fn relay(settings: Settings) -> Relay {
+    of(1, 1, settings)
+}
+
+/// Returns relay `index` of `relays`, with a guard.
+fn of(relays: u16, index: u16, settings: Settings) -> Relay {
+    let mut config = fixtures::paper(relays);
+    config.distance_m = 1343.795;
+    let mission = Mission::try_new(config).unwrap();
+    let guard = GuardConfig::of(&mission, config.common);
+    let settings = Settings {
+        guard: Some(guard),
+        sited: true,
+        ..settings
+    };
+    fixtures::relay(mission, index, settings)
+}
+
+/// Returns the link after the relay's outputs have been handed to it once more.
+fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
+    let mut link = link.clone();
+    link.handle_ready(now, relay.is_ready());
+    let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
+    link.handle_hold(now, holds);
+    link.handle_setpoint(now, relay.setpoint());
+    let sir_db = relay.target().map(|target| 10.0 * libm::log10f(target));
+    link.handle_values(now, sir_db, relay.setpoint());
+    link
+}
+
+/// Runs the vehicle, and checks each exchange.
+fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
+    let mut positions = Vec::new();
+    for _ in 0..ms / 20 {
+        vehicle.step_alone();
+        let now = vehicle.now;
+        if relay.poll_timeout().is_some_and(|at| at <= now) {
+            relay.handle_timeout(now);
+        }
+        let mut expected = relay.clone();
+        let (is_news, position) = vehicle.link.exchange(relay, now);
+        // Control before the position: the first position of an engaged drone is where its relay starts.
+        expected.handle_control(now, vehicle.link.is_flown());
+        if let Some(position) = position {
+            assert!(is_news);
+            expected.handle_position(now, position.at, position.place);
+            positions.push(position.place);
+        }
+        assert!(format!("{relay:?}") == format!("{expected:?}"));
+        // The link has what the relay has computed from the newest position.
+        let told = told_again(&vehicle.link, relay, now);
+        assert_eq!(format!("{:?}", vehicle.link), format!("{told:?}"));
+        let before = format!("{:?} {relay:?}", vehicle.link);
+        let again = vehicle.link.exchange(relay, now);
+        assert_eq!(again, (false, None));
+        assert_eq!(before, format!("{:?} {relay:?}", vehicle.link), "no effect");
+        vehicle.answer();
+    }
+    positions
+}
+
+fn flies(kind: Kind, settings: Settings) -> (Vehicle, Relay) {
+    let (mut vehicle, mut relay) = (Vehicle::new(kind), relay(settings));
+    run(&mut vehicle, &mut relay, 2_000);
+    vehicle.armed = true;
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    run(&mut vehicle, &mut relay, 2_000);
+    (vehicle, relay)
+}
+
+#[test]
+fn a_relay_has_a_setpoint_while_its_drone_is_engaged_and_the_drone_flies_there() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let (mut vehicle, mut relay) = flies(kind, Settings::default());
+        assert_eq!(vehicle.link.state(), State::Standby);
+        assert!(relay.final_setpoint().is_some());
+        assert_eq!(relay.setpoint(), None, "its pilot flies");
+
+        vehicle.mode = Mode::Companion;
+        let positions = run(&mut vehicle, &mut relay, 2_000);
+        assert!(positions.len() >= 9, "{positions:?}");
+        assert_eq!(vehicle.link.state(), State::Engaged);
+        run(&mut vehicle, &mut relay, 120_000);
+        let (place, agreed) = (vehicle.place, relay.final_setpoint().unwrap());
+        assert_eq!(relay.setpoint(), Some(agreed));
+        assert!(
+            (place.x_m - agreed.x_m).abs() < 0.05,
+            "{place:?}, {agreed:?}"
+        );
+        let value = |of: &str| {
+            let mut newest = vehicle.said.iter().rev();
+            newest.find_map(|(_, said)| match said {
+                Said::Value { name, value } if name == of => Some(*value),
+                _ => None,
+            })
+        };
+        assert_eq!(value("relay_x"), Some(agreed.x_m));
+        let sir_db = relay.target().map(|target| 10.0 * libm::log10f(target));
+        assert_eq!(value("sir_db"), sir_db);
+
+        vehicle.mode = Mode::Position;
+        run(&mut vehicle, &mut relay, 1_100);
+        assert_eq!(relay.setpoint(), None, "its pilot flies again");
+
+        vehicle.mode = Mode::Companion;
+        run(&mut vehicle, &mut relay, 2_000);
+        assert!(relay.setpoint().is_some());
+        vehicle.mute = true;
+        run(&mut vehicle, &mut relay, 4_000);
+        assert_eq!(vehicle.link.state(), State::Silent);
+        assert_eq!(relay.setpoint(), None, "nobody knows who flies");
+    }
+}
+
+/// A relay that does not listen refuses the sample, and counts it.
+#[test]
+fn a_relay_is_handed_what_the_radio_hears() {
+    let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
+    assert_eq!(relay.stats().samples_refused, 0);
+    let said = RADIO_STATUS_DATA {
+        noise: 100,
+        ..RADIO_STATUS_DATA::DEFAULT
+    };
+    vehicle.say_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
+    assert!(vehicle.link.exchange(&mut relay, vehicle.now).0);
+    assert_eq!(relay.stats().samples_refused, 1);
+}
+
+/// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
+fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_silent: bool) {
+    let mut frame = [0; MAX_FRAME];
+    while let Some(sent) = first.poll_transmit(now, &mut frame) {
+        if sent.port == Port::Downstream && !is_silent {
+            second.handle_bytes(now, Port::Upstream, &frame[..sent.len]);
+        }
+    }
+    if is_silent {
+        return;
+    }
+    second.handle_timeout(now);
+    let at = second.setpoint().unwrap_or(place(start_m));
+    second.handle_position(now, now, at);
+    while let Some(sent) = second.poll_transmit(now, &mut frame) {
+        if sent.port == Port::Upstream {
+            first.handle_bytes(now, Port::Downstream, &frame[..sent.len]);
+        }
+    }
+}
+
+#[test]
+fn a_relay_is_handed_the_side_that_an_operator_clears() {
+    let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.armed = true;
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    let side = Side::Downstream;
+    let mut lost = None;
+    for tenths in 0..600 {
+        if tenths == 50 {
+            vehicle.mode = Mode::Companion;
+        }
+        run(&mut vehicle, &mut first, 100);
+        if tenths == 250 {
+            // The pilot of the second drone takes the sticks, and its relay is switched off later.
+            second.handle_control(vehicle.now, false);
+        }
+        talk(&mut first, &mut second, vehicle.now, 900.0, tenths > 300);
+        while let Some(event) = first.poll_event() {
+            vehicle.link.handle_event(event);
+            if matches!(event, Event::NeighbourLost { .. }) {
+                lost = Some(event);
+            }
+        }
+    }
+    assert_eq!(vehicle.link.state(), State::Engaged);
+    assert_eq!(lost, Some(Event::NeighbourLost { side, node: 2 }));
+    let command = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        param1: 2.0,
+        command: MavCmd::MAV_CMD_USER_1,
+        target_system: vehicle::SYSTEM,
+        target_component: 191,
+        ..COMMAND_LONG_DATA::DEFAULT
+    });
+    let before = first.clone();
+    vehicle.say_from([255, 190], &command);
+    assert!(vehicle.link.exchange(&mut first, vehicle.now).0);
+    // The guard forgets where the second drone may be.
+    let mut expected = before.clone();
+    expected.clear_lost(vehicle.now, side);
+    assert!(format!("{before:?}") != format!("{expected:?}"));
+    assert!(format!("{first:?}") == format!("{expected:?}"));
+}
+
+/// The second of two drones is in the air on the wrong side of the first one.
+#[test]
+fn a_drone_out_of_order_cannot_be_engaged() {
+    let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.armed = true;
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    for _ in 0..200 {
+        run(&mut vehicle, &mut first, 100);
+        talk(&mut first, &mut second, vehicle.now, 50.0, false);
+    }
+    assert!(!first.is_ready());
+    let waits = AutopilotEvent::Waits(WaitReason::NotReady);
+    assert_eq!(vehicle.events.last(), Some(&waits));
+}
+
+/// A mission between other sites, then one between those that the link was created with.
+#[test]
+fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
+    let auth = Some(Auth {
+        key: Key::new([7; 32]),
+        epoch: 1,
+    });
+    let settings = Settings {
+        auth,
+        ..Settings::default()
+    };
+    let (mut vehicle, mut relay) = flies(Kind::Px4, settings);
+    let base = *relay.mission();
+    let loaded = vehicle::sites();
+    let tx = vehicle::axis()
+        .point(Placement::on_line(-60.0, 0.0))
+        .unwrap();
+    let moved = Sites { tx, ..loaded };
+    let longer = Axis::between(moved).unwrap();
+    let config = MissionConfig {
+        distance_m: longer.distance_m() as f32,
+        ..*base.config()
+    };
+    let uploads = [
+        (
+            Upload::new(&base, 1, config)
+                .unwrap()
+                .with_sites(moved)
+                .unwrap(),
+            longer,
+        ),
+        (
+            Upload::new(&base, 2, *base.config()).unwrap(),
+            vehicle::axis(),
+        ),
+    ];
+    for (upload, axis) in uploads {
+        relay.handle_upload(vehicle.now, &upload).unwrap();
+        run(&mut vehicle, &mut relay, 2_000);
+        assert_eq!(relay.version(), upload.version());
+        let positions = run(&mut vehicle, &mut relay, 1_000);
+        let at = vehicle::axis().point(vehicle.place).unwrap();
+        assert_eq!(positions.last(), axis.place(at).as_ref());
+    }
+}
