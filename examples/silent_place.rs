@@ -5,7 +5,6 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use uav_relay::channel::{AirGround, Channel};
-use uav_relay::planning::silent_place;
 use uav_relay::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
 /// 2 GHz, excess losses of 0.1 dB and 21 dB as factors. A number out of range fails the build.
@@ -38,12 +37,12 @@ const MISSION: Mission = Mission::new(MissionConfig {
 #[cfg(not(target_os = "none"))]
 fn main() {
     for index in 1..=MISSION.relays() {
-        match silent_place(&MISSION, index) {
-            Ok(place) => println!(
+        match MISSION.silent_place(index) {
+            Some(place) => println!(
                 "relay {index}: {:.3} m from Tx, {} m high",
                 place.x_m, place.altitude_m
             ),
-            Err(error) => println!("relay {index}: {error}"),
+            None => println!("relay {index}: no target SIR can be met by this chain"),
         }
     }
 }
@@ -57,7 +56,7 @@ use stm32f4xx_hal as _;
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let place = silent_place(&MISSION, 3);
+    let place = MISSION.silent_place(3);
     loop {
         core::hint::black_box(&place);
         cortex_m::asm::wfi();

@@ -48,6 +48,14 @@ pub struct ChannelLoad {
 }
 
 impl ChannelLoad {
+    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4: an overhead of 12 bytes per frame.
+    pub const fn of_radios(in_range: u16) -> Self {
+        Self {
+            in_range,
+            overhead: 12,
+        }
+    }
+
     /// Returns the bits of keep-alive traffic in one `probe_after`, in bit µs/s, divided by the allowed fraction of the channel.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;

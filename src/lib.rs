@@ -92,7 +92,7 @@ pub use wire::auth::Auth;
 pub use wire::auth::Key;
 pub use wire::crc::CRC_32C;
 pub use wire::digest::MissionId;
-pub use wire::frame::{FrameBuf, MAX_FRAME};
+pub use wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]
 pub use wire::upload::{Upload, UploadError};
 pub use without_quorum::WithoutQuorum;

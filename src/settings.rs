@@ -1,5 +1,6 @@
 //! Identity and settings of a relay, checked once at start-up.
 
+use crate::channel_load::ChannelLoad;
 use crate::guard::config::GuardConfig;
 use crate::mission::{Mission, Profile};
 use crate::optimiser::joint::MOST_SOLVED;
@@ -8,6 +9,9 @@ use crate::optimiser::search::Schedule;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 use crate::without_quorum::WithoutQuorum;
+
+/// Time for computing and for the buffers of a link, in the `hop_time` of a preset.
+const LATENCY: Duration = Duration::from_millis(10);
 
 /// Identity of a relay in its network.
 ///
@@ -199,24 +203,97 @@ pub struct Settings {
 impl Default for Settings {
     /// Bracketed with prediction, two links of 57 600 baud or faster, neighbours lost after 15 s of silence.
     fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+impl Settings {
+    /// The default settings, for `const` functions.
+    const DEFAULT: Self = Self {
+        profile: None,
+        hold_altitude: false,
+        method: Method::Align,
+        measure: None,
+        listen: None,
+        schedule: Schedule::Bracketed,
+        predict: true,
+        wiring: Wiring::Pair,
+        auth: None,
+        hop_time: Duration::from_millis(30),
+        probe_after: Duration::from_millis(5_000),
+        dead_after: Duration::from_millis(15_000),
+        quorum: true,
+        without_quorum: WithoutQuorum::Hold,
+        guard: None,
+        sited: false,
+    };
+
+    /// Settings for a UART of `baud` bit/s to each neighbour: the defaults, with a longer `hop_time` below 57 600 bit/s.
+    ///
+    /// `hop_time` has 10 ms for computing and for the buffers on the way. Set it for a link that needs more, such as a USB adapter.
+    ///
+    /// ```
+    /// use uav_relay::{Method, Settings};
+    ///
+    /// const SETTINGS: Settings = Settings { method: Method::Joint, ..Settings::wires(115_200) };
+    /// assert_eq!(SETTINGS.hop_time, Settings::default().hop_time);
+    /// ```
+    pub const fn wires(baud: u32) -> Self {
+        let alone = ChannelLoad {
+            in_range: 1,
+            overhead: 0,
+        };
+        Self::DEFAULT.with_hop_time(alone, baud)
+    }
+
+    /// Settings for one half-duplex radio channel of `baud` bit/s that `load` shares.
+    ///
+    /// `probe_after` is 5 s, or the least that lets the channel carry the relays ([`ChannelLoad::carried`]), and `dead_after` three times
+    /// that. `hop_time` is at least 30 ms, and otherwise [`ChannelLoad::hop_time`] with a latency of 10 ms; set it for a radio that
+    /// buffers a frame longer. All relays of a chain have the same settings.
+    ///
+    /// ```
+    /// use uav_relay::{ChannelLoad, Duration, Settings, Wiring};
+    ///
+    /// // Thirty relays in range of each other, on 57 600 bit/s.
+    /// const SETTINGS: Settings = Settings::radio(57_600, ChannelLoad::of_radios(30));
+    /// assert_eq!(SETTINGS.wiring, Wiring::Shared);
+    /// assert_eq!(SETTINGS.probe_after, Duration::from_millis(11_815));
+    /// assert_eq!(SETTINGS.dead_after, SETTINGS.probe_after.times(3));
+    /// ```
+    pub const fn radio(baud: u32, load: ChannelLoad) -> Self {
+        let probe_after = match load.carried(baud, Self::DEFAULT.probe_after) {
+            Ok(()) => Self::DEFAULT.probe_after,
+            Err(full) => full.least_probe_after,
+        };
+        let shared = Self {
+            wiring: Wiring::Shared,
+            ..Self::DEFAULT
+        };
+        shared
+            .with_hop_time(load, baud)
+            .with_probe_after(probe_after)
+    }
+
+    /// Returns the settings with another `probe_after`, and with three times that as `dead_after`.
+    #[must_use]
+    pub const fn with_probe_after(self, probe_after: Duration) -> Self {
         Self {
-            profile: None,
-            hold_altitude: false,
-            method: Method::Align,
-            measure: None,
-            listen: None,
-            schedule: Schedule::Bracketed,
-            predict: true,
-            wiring: Wiring::Pair,
-            auth: None,
-            hop_time: Duration::from_millis(30),
-            probe_after: Duration::from_millis(5_000),
-            dead_after: Duration::from_millis(15_000),
-            quorum: true,
-            without_quorum: WithoutQuorum::Hold,
-            guard: None,
-            sited: false,
+            probe_after,
+            dead_after: probe_after.times(3),
+            ..self
         }
+    }
+
+    /// Returns the settings with the longer of their own `hop_time` and that of the channel.
+    const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
+        let needed = load.hop_time(baud, LATENCY);
+        let hop_time = if needed.as_micros() > self.hop_time.as_micros() {
+            needed
+        } else {
+            self.hop_time
+        };
+        Self { hop_time, ..self }
     }
 }
 
@@ -354,4 +431,58 @@ pub(crate) fn check(
         return Err(SetupError::Guard);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LATENCY, Settings, Wiring};
+    use crate::channel_load::ChannelLoad;
+    use crate::time::Duration;
+
+    const RATES: [u32; 7] = [0, 300, 9_600, 57_600, 115_200, 250_000, 921_600];
+
+    #[test]
+    fn a_preset_for_a_radio_has_the_timing_that_provisioning_asks_for() {
+        let usual = Settings::default();
+        for baud in RATES {
+            for in_range in [0, 1, 2, 5, 9, 10, 24, 25, 50, 100, 1_000] {
+                let load = ChannelLoad::of_radios(in_range);
+                let settings = Settings::radio(baud, load);
+                let expected = match load.carried(baud, usual.probe_after) {
+                    Ok(()) => usual.probe_after,
+                    Err(full) => full.least_probe_after,
+                };
+                assert_eq!(settings.probe_after, expected, "{baud} {in_range}");
+                assert_eq!(settings.dead_after, settings.probe_after.times(3));
+                if baud > 0 {
+                    assert_eq!(load.carried(baud, settings.probe_after), Ok(()));
+                }
+                let hop_time = load.hop_time(baud, LATENCY).max(usual.hop_time);
+                let rest = Settings {
+                    wiring: Wiring::Shared,
+                    probe_after: settings.probe_after,
+                    dead_after: settings.dead_after,
+                    hop_time,
+                    ..usual
+                };
+                assert_eq!(settings, rest);
+            }
+        }
+    }
+
+    #[test]
+    fn a_preset_for_wires_is_the_default_from_57_600_baud_on() {
+        for baud in RATES {
+            let settings = Settings::wires(baud);
+            let usual = Settings::default();
+            assert_eq!(settings == usual, baud >= 57_600, "{baud}");
+            assert_eq!(
+                (settings.wiring, settings.probe_after),
+                (usual.wiring, usual.probe_after)
+            );
+        }
+        let sweep = if cfg!(feature = "auth") { 108 } else { 100 };
+        let slow = Duration::from_micros(sweep * 1_000_000 / 960 + 10_000);
+        assert_eq!(Settings::wires(9_600).hop_time, slow);
+    }
 }

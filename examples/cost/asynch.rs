@@ -10,20 +10,23 @@ use cortex_m_semihosting::hprintln;
 use embedded_io_async::{ErrorType, Read, Write};
 use uav_relay::MAX_FRAME;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
-use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, byte_time};
-use uav_relay::{FrameBuf, Instant, Mission, Phase, Relay, Settings};
+use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort};
+use uav_relay::{Instant, Mission, Phase, Relay, Settings};
 
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
+/// Bit rate of the ports, bit/s.
+const BAUD: u32 = 115_200;
+
 /// Port in memory: the frame to receive with its read range, and the number of bytes sent.
 struct Memory {
-    coming: Cell<(FrameBuf, usize, usize)>,
+    coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,
 }
 
 impl Memory {
-    const fn new(frame: FrameBuf, len: usize) -> Self {
+    const fn new(frame: [u8; MAX_FRAME], len: usize) -> Self {
         Self {
             coming: Cell::new((frame, 0, len)),
             gone: Cell::new(0),
@@ -106,7 +109,7 @@ impl Clock for Still {
 }
 
 /// Returns the middle of three relays, and the first relay's sweep for it.
-fn before() -> Option<(Relay, FrameBuf, usize, Instant)> {
+fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
         predict: false,
@@ -124,14 +127,13 @@ fn before() -> Option<(Relay, FrameBuf, usize, Instant)> {
 
 /// Measures both runners, from the same moment on.
 pub(crate) fn runners() {
-    let byte_time = byte_time(115_200);
     let Some((mut middle, frame, len, now)) = before() else {
         return;
     };
     let (up, down) = (Memory::new(frame, len), Memory::new([0; MAX_FRAME], 0));
     let mut ports = Pair::new(
-        SerialLink::new(End(&up), byte_time),
-        SerialLink::new(End(&down), byte_time),
+        SerialLink::new(End(&up), BAUD),
+        SerialLink::new(End(&down), BAUD),
     );
     let mut polls = 0;
     let mut polled = 0;
@@ -149,10 +151,10 @@ pub(crate) fn runners() {
     );
     let polled_size = size_of_val(&ports);
     hprintln!("polled_size {}", polled_size);
-    awaited(byte_time);
+    awaited();
 }
 
-fn awaited(byte_time: uav_relay::Duration) {
+fn awaited() {
     let Some((mut middle, frame, len, now)) = before() else {
         return;
     };
@@ -163,8 +165,8 @@ fn awaited(byte_time: uav_relay::Duration) {
     let time = Still(now);
     let relay = AsyncRelay::new(&mut middle);
     let mut ports = AsyncPair::new(
-        AsyncLink::new(End(&up), End(&up), byte_time),
-        AsyncLink::new(End(&down), End(&down), byte_time),
+        AsyncLink::new(End(&up), End(&up), BAUD),
+        AsyncLink::new(End(&down), End(&down), BAUD),
     );
     let run = ports.run(&relay, &time);
     hprintln!("async_size {}", size_of_val(&run));

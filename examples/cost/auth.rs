@@ -2,7 +2,6 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::FrameBuf;
 use uav_relay::Instant;
 use uav_relay::MAX_FRAME;
 use uav_relay::Mission;
@@ -73,7 +72,7 @@ pub(crate) fn auth() {
     let mut sent = None;
     let through = instructions(|| {
         middle.handle_bytes(now, Port::Upstream, bytes);
-        let mut out: FrameBuf = [0; MAX_FRAME];
+        let mut out = [0; MAX_FRAME];
         sent = middle.poll_transmit(now, &mut out);
         black_box(&out);
     });

@@ -3,7 +3,6 @@
 use core::hint::black_box;
 use cortex_m::peripheral::SYST;
 use cortex_m_semihosting::debug;
-use uav_relay::FrameBuf;
 use uav_relay::Identity;
 use uav_relay::Instant;
 use uav_relay::MAX_FRAME;
@@ -36,8 +35,8 @@ pub(crate) fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
 }
 
 /// Returns the next frame that `relay` sends, if any.
-pub(crate) fn sends(relay: &mut Relay, now: Instant) -> Option<(FrameBuf, usize)> {
-    let mut frame: FrameBuf = [0; MAX_FRAME];
+pub(crate) fn sends(relay: &mut Relay, now: Instant) -> Option<([u8; MAX_FRAME], usize)> {
+    let mut frame = [0; MAX_FRAME];
     let transmit = relay.poll_transmit(now, &mut frame)?;
     Some((frame, transmit.len))
 }

@@ -2,7 +2,6 @@
 
 use cortex_m_semihosting::hprintln;
 use uav_relay::Adjust;
-use uav_relay::FrameBuf;
 use uav_relay::Instant;
 use uav_relay::MAX_FRAME;
 use uav_relay::Method;
@@ -33,7 +32,7 @@ impl Flight {
     }
 
     fn drain(&mut self, at: usize, now: Instant) {
-        let mut frame: FrameBuf = [0; MAX_FRAME];
+        let mut frame = [0; MAX_FRAME];
         loop {
             let Some(sender) = self.relays.get_mut(at) else {
                 return;

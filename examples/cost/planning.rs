@@ -4,7 +4,7 @@ use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
 use uav_relay::optimiser::joint::{Seat, Solver};
-use uav_relay::planning::fleet;
+use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::{free, given_altitude, given_x};
 
 use super::counter::instructions;
@@ -22,7 +22,7 @@ pub(crate) fn planning() {
     hprintln!("theorem_3 {}", third);
     let mut relays = 0;
     let count = instructions(|| {
-        relays = fleet::fewest(black_box(&MISSION), black_box(5.0), |_| common)
+        relays = Fewest::of(black_box(&MISSION), black_box(5.0), |_| common)
             .map_or(0, |found| found.relays);
     });
     hprintln!("fewest {}", count);

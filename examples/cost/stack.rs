@@ -2,7 +2,6 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::FrameBuf;
 use uav_relay::Instant;
 use uav_relay::MAX_FRAME;
 use uav_relay::Mission;
@@ -36,7 +35,7 @@ pub(crate) fn stack() {
 }
 
 pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant) {
-    let mut frame: FrameBuf = [0; MAX_FRAME];
+    let mut frame = [0; MAX_FRAME];
     while let Some(transmit) = from.poll_transmit(now, &mut frame) {
         to.handle_bytes(now, at, frame.get(..transmit.len).unwrap_or_default());
     }

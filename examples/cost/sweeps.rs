@@ -2,7 +2,6 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::FrameBuf;
 use uav_relay::Instant;
 use uav_relay::MAX_FRAME;
 use uav_relay::Mission;
@@ -96,7 +95,7 @@ pub(crate) fn sweep() {
         let mut again = middle.clone();
         through = through.max(instructions(|| {
             middle.handle_bytes(now, Port::Upstream, bytes);
-            let mut out: FrameBuf = [0; MAX_FRAME];
+            let mut out = [0; MAX_FRAME];
             black_box(middle.poll_transmit(now, &mut out));
             black_box(&out);
         }));
@@ -106,7 +105,7 @@ pub(crate) fn sweep() {
             break;
         };
         let bytes = frame.get(..len).unwrap_or_default();
-        let mut answer: FrameBuf = [0; MAX_FRAME];
+        let mut answer = [0; MAX_FRAME];
         let mut answered = None;
         at_tail = at_tail.max(instructions(|| {
             tail.handle_bytes(now, Port::Upstream, bytes);
@@ -114,7 +113,7 @@ pub(crate) fn sweep() {
         }));
         let Some(transmit) = answered else { break };
         let bytes = answer.get(..transmit.len).unwrap_or_default();
-        let mut onward: FrameBuf = [0; MAX_FRAME];
+        let mut onward = [0; MAX_FRAME];
         let mut passed = None;
         back = back.max(instructions(|| {
             middle.handle_bytes(now, Port::Downstream, bytes);

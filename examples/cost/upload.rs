@@ -2,7 +2,6 @@
 
 use cortex_m_semihosting::hprintln;
 use uav_relay::Auth;
-use uav_relay::FrameBuf;
 use uav_relay::Ground;
 use uav_relay::Instant;
 use uav_relay::MAX_FRAME;
@@ -31,7 +30,7 @@ pub(crate) fn upload() {
     let Ok(upload) = Upload::new(&THREE, 1, *THREE.config()) else {
         return;
     };
-    let mut frame: FrameBuf = [0; MAX_FRAME];
+    let mut frame = [0; MAX_FRAME];
     if ground.upload(now, upload).is_err() {
         return;
     }

@@ -1,6 +1,5 @@
 //! Answers of the golden image, byte by byte the same on the target and on the host.
 
-use uav_relay::FrameBuf;
 use uav_relay::optimiser::verdict::Verdict;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
@@ -43,7 +42,7 @@ impl Answerer {
             Err(FrameError::Message(MessageError::Value)) => return send(b"7\0"),
             Err(_) => return send(b"8\0"),
         };
-        let mut buffer: FrameBuf = [0; MAX_FRAME];
+        let mut buffer = [0; MAX_FRAME];
         let mut say = |message: &Message| {
             let len = frame::encode(header, message, &mut buffer);
             send(buffer.get(..len).unwrap_or_default());

@@ -5,9 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use uav_relay::GuardConfig;
-use uav_relay::MAX_FRAME;
 use uav_relay::flight::autopilot::carrot::Pace;
-use uav_relay::serial::byte_time;
 use uav_relay::{
     Adjust, ChannelLoad, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings,
     Wiring,
@@ -27,9 +25,6 @@ use uav_relay_scenario::key;
 
 /// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
 const LATENCY: Duration = Duration::from_millis(40);
-
-/// Overhead of a frame on a radio channel, bytes: its header, and the turnaround of the radio.
-const RADIO: u16 = 12;
 
 /// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
 #[derive(Parser, Debug)]
@@ -205,9 +200,8 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
         Ttys::Pair { .. } => Wiring::Pair,
         Ttys::Shared(_) => Wiring::Shared,
     };
-    let frame = u32::try_from(MAX_FRAME).unwrap_or(u32::MAX);
-    let turns = match wiring {
-        Wiring::Pair => byte_time(options.baud).times(frame),
+    let load = match wiring {
+        Wiring::Pair => ChannelLoad::of_radios(1),
         Wiring::Shared => carried(options)?,
     };
     let mission = mission(options, beyond)?;
@@ -233,7 +227,7 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
         wiring,
         sited: options.autopilot.is_some(),
         profile: own.map(|_| profile),
-        hop_time: Duration::from_micros(turns.as_micros() + LATENCY.as_micros()),
+        hop_time: load.hop_time(options.baud, LATENCY),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
         ..Settings::default()
@@ -281,18 +275,15 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// Returns the hop time on a shared channel, and checks that the channel can carry all relays.
-fn carried(options: &Options) -> Result<Duration, String> {
-    let load = ChannelLoad {
-        in_range: options.of,
-        overhead: RADIO,
-    };
+/// Returns the load of a shared channel, and checks that the channel can carry all relays.
+fn carried(options: &Options) -> Result<ChannelLoad, String> {
+    let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
         .map_err(|full| {
             let (baud, least) = (options.baud, full.least_baud);
             format!("--baud {baud}: must be within {least} to 4000000: {full}")
         })?;
-    Ok(load.hop_time(options.baud, Duration::from_micros(0)))
+    Ok(load)
 }
 
 fn secret(options: &Options) -> Result<Option<Secret>, String> {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use rustix::event::PollFlags;
 use rustix::io::Errno;
 use serde_json::{Value, json};
-use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
+use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared};
 use uav_relay::{Instant, Relay};
 
 use crate::gate::Gate;
@@ -52,7 +52,7 @@ impl Ports {
             let tty = path
                 .map(|path| Replug::open(option, path, baud))
                 .transpose()?;
-            Ok::<_, String>(SerialLink::new(End(tty, gate.clone()), byte_time(baud)))
+            Ok::<_, String>(SerialLink::new(End(tty, gate.clone()), baud))
         };
         Ok(match ttys {
             Ttys::Pair {

@@ -63,25 +63,12 @@ fn switch_on(
     wiring: Wiring,
     now: Instant,
 ) -> Option<&'static mut Relay> {
-    let common = config.mission.config().common;
-    let [probe_after, dead_after] = config.silence();
     let settings = Settings {
         auth,
-        // A profile equal to the common one may change with an upload.
-        profile: Some(config.profile)
-            .filter(|own| !cfg!(feature = "upload") || config.hold_altitude || *own != common),
-        hold_altitude: config.hold_altitude,
-        method: config.method,
-        measure: config.measure,
-        listen: config.listen,
-        wiring,
         guard: config.sites.as_ref().and_then(|sites| {
             Autopilot::guard(sites, GuardConfig::of(&config.mission, config.profile))
         }),
-        sited: config.sites.is_some(),
-        probe_after,
-        dead_after,
-        ..Settings::default()
+        ..config.settings(wiring)
     };
     // Other errors were ruled out by the check of the configuration.
     let slot = cortex_m::singleton!(RELAY: Option<Relay> = None)?;

@@ -14,8 +14,11 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `main.rs` | entry point of this variant |
-//! | `wires.rs` | pins and interrupts |
+//! | `main.rs` | entry point with a serial port to each neighbour |
+//! | `main_radio.rs` | entry point of `stm32f405_radio`, with one serial port to a radio |
+//! | `main_async.rs` | entry point of `stm32f405_async`, on asynchronous ports |
+//! | `wires.rs`, `radio.rs` | pins and interrupts, for either wiring |
+//! | `executor.rs`, `ports.rs` | executor and asynchronous ports of `stm32f405_async` |
 //! | `drone.rs` | drone as defined by its configuration block, for either wiring |
 //! | `turns.rs` | main loop |
 //! | `autopilot.rs`, `grounded.rs` | autopilot link with the feature `flight`, and its replacement |
@@ -80,13 +83,12 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
-    use uav_relay::serial::{Pair, SerialLink, byte_time};
+    use uav_relay::serial::{Pair, SerialLink};
 
     let (clock, upstream, downstream, uart) = wires::start()?;
-    let byte_time = byte_time(port::BAUD);
     let links = cortex_m::singleton!(
         LINKS: Links =
-            Pair::new(SerialLink::new(upstream, byte_time), SerialLink::new(downstream, byte_time))
+            Pair::new(SerialLink::new(upstream, port::BAUD), SerialLink::new(downstream, port::BAUD))
     )?;
     Some((clock, links, uart))
 }

@@ -4,7 +4,6 @@ use host_tests::fixtures::mission;
 use host_tests::flights::settle;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use uav_relay::optimiser::plan;
 use uav_relay::{Duration, Instant, Profile, Schedule, Side};
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
@@ -146,7 +145,7 @@ fn silent_places_equal_those_by_messages() {
         let outcome = run(Setup::new(mission)).unwrap();
         for (index, relay) in (1..).zip(&outcome.relays) {
             assert_eq!(
-                plan::silent_place(&mission, index).ok(),
+                mission.silent_place(index),
                 relay.setpoint,
                 "relay {index} of {link:?}"
             );

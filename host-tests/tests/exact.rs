@@ -7,7 +7,6 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::pass::{self, Behind};
 use uav_relay::optimiser::plan;
-use uav_relay::planning::fleet;
 use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
@@ -104,10 +103,7 @@ impl Tally {
         let agreed = agreed.unwrap_or_else(|_| panic!("nothing of {best}: {told}"));
         let target = f64::from(agreed.target);
         let mut places = vec![Placement::default(); usize::from(mission.relays())];
-        assert!(
-            fleet::places(mission, agreed.target, of, &mut places),
-            "{told}"
-        );
+        assert!(mission.places_for(agreed.target, of, &mut places), "{told}");
         let reached = sir(&places);
         assert!(
             reached >= target * (1.0 - 3e-5),

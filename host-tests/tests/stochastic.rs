@@ -4,7 +4,6 @@ use host_tests::flights::settle;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::retreat::Retreat;
-use uav_relay::planning::silent_place;
 use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
@@ -201,7 +200,7 @@ fn silent_places_equal_those_by_messages() {
         let outcome = settle(Setup::new(mission));
         for (index, relay) in (1..).zip(&outcome.relays) {
             assert_eq!(
-                silent_place(&mission, index).unwrap(),
+                mission.silent_place(index).unwrap(),
                 relay.setpoint.unwrap()
             );
         }

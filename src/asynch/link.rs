@@ -14,7 +14,7 @@ use super::clock::Clock;
 use super::frames::Frames;
 use super::relay::AsyncRelay;
 use crate::relay::Port;
-use crate::serial::{Fault, NoPin, READ_LIMIT};
+use crate::serial::{Fault, NoPin, READ_LIMIT, byte_time};
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::MAX_FRAME;
@@ -53,26 +53,25 @@ struct Sender<W, D> {
 }
 
 impl<R: Read, W: Write> AsyncLink<R, W> {
-    /// Creates a link over a reader and a writer with `byte_time` per byte, at least 1 us
-    /// ([`byte_time`](crate::serial::byte_time)).
-    pub fn new(rx: R, tx: W, byte_time: Duration) -> Self {
-        Self::with_pin(rx, tx, byte_time, None)
+    /// Creates a link over a reader and a writer at `baud` bit/s, with 10 bits per byte.
+    pub fn new(rx: R, tx: W, baud: u32) -> Self {
+        Self::with_pin(rx, tx, baud, None)
     }
 }
 
 impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
     /// Creates a link with a pin that is high while this relay sends.
-    pub fn half_duplex(rx: R, tx: W, byte_time: Duration, pin: D) -> Self {
-        Self::with_pin(rx, tx, byte_time, Some(pin))
+    pub fn half_duplex(rx: R, tx: W, baud: u32, pin: D) -> Self {
+        Self::with_pin(rx, tx, baud, Some(pin))
     }
 
-    fn with_pin(rx: R, tx: W, byte_time: Duration, pin: Option<D>) -> Self {
+    fn with_pin(rx: R, tx: W, baud: u32, pin: Option<D>) -> Self {
         Self {
             rx,
             tx: Sender {
                 tx,
                 pin,
-                byte_time: byte_time.max(Duration::from_micros(1)),
+                byte_time: byte_time(baud),
                 quiet_at: Instant::ZERO,
                 cut: false,
             },

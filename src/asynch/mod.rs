@@ -20,7 +20,7 @@
 //! being written. With [`AsyncPair`] a frame that does not fit is dropped and counted in
 //! [`SerialStats::dropped`](crate::serial::SerialStats::dropped); with [`AsyncShared`] it stays in the relay.
 //!
-//! Each poll of the future reads every port once ([`READ_LIMIT`](crate::serial::READ_LIMIT) bytes at most), handles one timeout
+//! Each poll of the future reads every port once (64 bytes at most), handles one timeout
 //! of the relay, and passes pending frames to the writers. After an operation that was ready at once it yields to the executor.
 //!
 //! # Cancellation
@@ -40,7 +40,6 @@
 //! use embassy_futures::select::{Either, select};
 //! use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
 //! use uav_relay::channel::{AirGround, Channel};
-//! use uav_relay::serial::byte_time;
 //! use uav_relay::{Band, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
 //!
 //! # struct Uart;
@@ -90,9 +89,9 @@
 //!     tolerance: 1e-4,
 //! })?;
 //! let identity = Identity { network: 7, index: 1 };
-//! let mut relay = Relay::new(mission, identity, Settings::default(), 1, Time.now())?;
+//! let mut relay = Relay::new(mission, identity, Settings::wires(115_200), 1, Time.now())?;
 //! let relay = AsyncRelay::new(&mut relay);
-//! let link = || AsyncLink::new(Uart, Uart, byte_time(115_200)); // the halves of a UART
+//! let link = || AsyncLink::new(Uart, Uart, 115_200); // the halves of a UART
 //! let mut ports = AsyncPair::new(link(), link());
 //!
 //! let firmware = async {

@@ -30,12 +30,6 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Minimum number of samples of an estimate.
-///
-/// With so few samples and a true alpha below 1.5, most estimates exist because alpha is overestimated by chance, and are too
-/// low.
-pub const MIN_SAMPLES: u32 = 100;
-
 /// Fixed-point 1: 2^32 samples of it sum to 2^63, and their squares, times their number, to 2^126.
 const ONE: f32 = 2_147_483_648.0;
 
@@ -80,6 +74,12 @@ pub struct Estimate {
 }
 
 impl Estimator {
+    /// Minimum number of samples of an estimate.
+    ///
+    /// With so few samples and a true alpha below 1.5, most estimates exist because alpha is overestimated by chance, and are
+    /// too low.
+    pub const MIN_SAMPLES: u32 = 100;
+
     /// Creates an estimator without samples, for interference that never exceeds `i_max_w`, W: 1e-30 to 1e6.
     ///
     /// With any other `i_max_w` it rejects every sample and never gives an estimate.
@@ -130,7 +130,7 @@ impl Estimator {
 
     /// Returns the estimate of the samples so far.
     ///
-    /// `None` with fewer than [`MIN_SAMPLES`], without variance, if alpha is not above 1 by more than two of its standard errors
+    /// `None` with fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES), without variance, if alpha is not above 1 by more than two of its standard errors
     /// (E[1/I] may then be infinite), or if the mean is below 1e-6 `I_max` or Upsilon above 1e32. Constant work, at most 1000
     /// instructions on a Cortex-M4F; 408 were counted.
     ///
@@ -189,7 +189,7 @@ struct Fit {
 
 impl Fit {
     fn of(samples: &Estimator) -> Option<Self> {
-        if samples.accepted < MIN_SAMPLES {
+        if samples.accepted < Estimator::MIN_SAMPLES {
             return None;
         }
         let count = u64::from(samples.accepted);

@@ -2,15 +2,12 @@
 //!
 //! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times Upsilon(x) = E[1
 //! / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of Upsilon along x. If I / `I_max`
-//! has a Beta distribution there is a closed form, [`beta_upsilon`]; from measurements, [`estimate::Estimator`] fits one.
+//! has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; from measurements, [`estimate::Estimator`] fits one.
 
 pub mod estimate;
 mod in_noise;
 
 pub(crate) use in_noise::InNoise;
-
-/// Maximum number of points of a field.
-pub const MAX_POINTS: usize = 1024;
 
 /// Allowed range of Upsilon, 1/W: interference between 1e9 W and 1e-32 W, far outside of what is measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
@@ -30,7 +27,7 @@ pub struct FieldPoint {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FieldError {
-    /// The table has no point, or more than [`MAX_POINTS`].
+    /// The table has no point, or more than [`Field::MAX_POINTS`].
     Points,
     /// The `x_m` of a point is not within -1e7 to 1e7.
     Place,
@@ -63,6 +60,9 @@ pub struct Field {
 }
 
 impl Field {
+    /// Maximum number of points of a field.
+    pub const MAX_POINTS: usize = 1024;
+
     /// Creates a field from a table, after checking every point.
     ///
     /// Usable in a constant, where [`Field::new`] turns an error into a failed build.
@@ -72,7 +72,7 @@ impl Field {
     /// # Errors
     /// [`FieldError`] names the first value that is outside its range.
     pub const fn try_new(points: &'static [FieldPoint]) -> Result<Self, FieldError> {
-        if points.is_empty() || points.len() > MAX_POINTS {
+        if points.is_empty() || points.len() > Self::MAX_POINTS {
             return Err(FieldError::Points);
         }
         let (mut smallest, mut largest) = (f32::MAX, 0.0);
@@ -208,35 +208,35 @@ pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
     upsilon_per_w >= UPSILON.0 && upsilon_per_w <= UPSILON.1
 }
 
-/// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution with shapes `alpha` and `beta`.
-///
-/// (alpha + beta - 1) / ((alpha - 1) `I_max`); the paper prints it without `I_max`, for I relative to it. `i_max_w` in W. `None`
-/// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,
-/// since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is free. Accuracy:
-/// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
-pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
-    let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
-    if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
-        return None;
-    }
-    let upsilon = ((alpha - 1.0) + beta) / (alpha - 1.0) / i_max_w;
-    if upsilon.is_finite() {
-        Some(upsilon)
-    } else {
-        None
-    }
-}
-
 impl FieldPoint {
+    /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution with shapes `alpha` and `beta`.
+    ///
+    /// (alpha + beta - 1) / ((alpha - 1) `I_max`); the paper prints it without `I_max`, for I relative to it. `i_max_w` in W. `None`
+    /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,
+    /// since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is free. Accuracy:
+    /// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
+    pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
+        let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
+        if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
+            return None;
+        }
+        let upsilon = ((alpha - 1.0) + beta) / (alpha - 1.0) / i_max_w;
+        if upsilon.is_finite() {
+            Some(upsilon)
+        } else {
+            None
+        }
+    }
+
     /// Returns a point at `x_m` metres where I / `i_max_w` has a Beta distribution.
     ///
-    /// `None` where [`beta_upsilon`] is. Constant work.
+    /// `None` where [`beta_upsilon`](Self::beta_upsilon) is. Constant work.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a field refuses what does not fit"
     )]
     pub const fn from_beta(x_m: f32, alpha: f64, beta: f64, i_max_w: f64) -> Option<Self> {
-        match beta_upsilon(alpha, beta, i_max_w) {
+        match Self::beta_upsilon(alpha, beta, i_max_w) {
             Some(upsilon) => Some(Self {
                 x_m,
                 upsilon_per_w: upsilon as f32,

@@ -30,7 +30,7 @@ use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
 use crate::wire::endpoint::{Endpoint, Sent};
-use crate::wire::frame::FrameBuf;
+use crate::wire::frame::{FrameBuf, MAX_FRAME};
 use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
@@ -434,7 +434,7 @@ impl Ground {
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
-    pub fn poll_transmit(&mut self, frame: &mut FrameBuf) -> Option<usize> {
+    pub fn poll_transmit(&mut self, frame: &mut [u8; MAX_FRAME]) -> Option<usize> {
         if self.endpoint.is_exhausted() {
             return None;
         }

@@ -4,8 +4,8 @@ use crate::channel::Channel;
 use crate::field::Field;
 use crate::place::{CrossSection, Station};
 
-/// Maximum number of relays of a mission; addresses on the wire are 12 bits wide.
-pub const MAX_RELAYS: u16 = 1000;
+/// Value of [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
+pub(crate) const MAX_RELAYS: u16 = 1000;
 
 /// Two f32 steps just below the distance, as a fraction of it: positions this far apart near Rx remain distinct.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
@@ -20,7 +20,7 @@ pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionConfig {
-    /// Number of relays N, 1 to [`MAX_RELAYS`].
+    /// Number of relays N, 1 to [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
     pub relays: u16,
     /// Distance D from transmitter to receiver, m: 1 to 1e6.
     pub distance_m: f32,
@@ -64,7 +64,7 @@ impl MissionConfig {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MissionError {
-    /// `relays` is not within 1 to [`MAX_RELAYS`](crate::mission::MAX_RELAYS).
+    /// `relays` is not within 1 to [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
     Relays,
     /// `distance_m` is not within 1 to 1e6.
     Distance,

@@ -10,7 +10,8 @@ mod config;
 pub(crate) mod tests;
 mod validated;
 
+pub(crate) use config::MAX_RELAYS;
+pub use config::MissionConfig;
 pub use config::MissionError;
 pub use config::{Band, Heading, Interference, Interferer, Profile};
-pub use config::{MAX_RELAYS, MissionConfig};
 pub use validated::Mission;

@@ -31,6 +31,9 @@ pub struct Mission {
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
+    /// Maximum number of relays of a mission; addresses on the wire are 12 bits wide.
+    pub const MAX_RELAYS: u16 = super::config::MAX_RELAYS;
+
     /// Creates a mission after checking every parameter.
     ///
     /// Usable in a constant, where [`Mission::new`] turns an error into a failed build.

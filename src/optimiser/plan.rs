@@ -192,15 +192,14 @@ pub fn place(
         .or_else(|| placed(mission, target, true, index, &profile_of))
 }
 
-/// Returns the position that relay `index` computes without messages, if every relay has the mission's common profile.
-///
-/// It equals the agreement by messages to the bit: `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`.
-///
-/// # Errors
-/// [`Infeasible`] if no target can be met.
-pub fn silent_place(mission: &Mission, index: u16) -> Result<Placement, Infeasible> {
-    let common = |_| mission.config().common;
-    let agreed = solve(mission, Schedule::Bracketed, common)?;
-    let plain = agreed.ladder.is_plain();
-    placed(mission, agreed.target, plain, index, common).ok_or(Infeasible)
+impl Mission {
+    /// Returns the position that relay `index` computes without messages, if every relay has the mission's common profile.
+    ///
+    /// It equals the agreement by messages to the bit: `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`.
+    /// `None` if no target can be met.
+    pub fn silent_place(&self, index: u16) -> Option<Placement> {
+        let common = |_| self.config().common;
+        let agreed = solve(self, Schedule::Bracketed, common).ok()?;
+        placed(self, agreed.target, agreed.ladder.is_plain(), index, common)
+    }
 }

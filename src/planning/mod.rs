@@ -3,6 +3,7 @@
 //! | purpose | files |
 //! | --- | --- |
 //! | one relay | `single`: Theorems 1 to 3, Algorithm 3 |
+//! | one relay of a chain, without messages | [`Mission::silent_place`](crate::Mission::silent_place) |
 //! | number of relays | [`fleet`]: the minimum for a target, and the maximum SIR of any number |
 
 pub mod fleet;
@@ -11,6 +12,3 @@ mod single;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod single;
-
-pub use crate::optimiser::plan::silent_place;
-pub use crate::optimiser::search::Infeasible;

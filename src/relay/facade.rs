@@ -10,7 +10,7 @@ use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::time::{Instant, MonotonicClock};
 use crate::wire::deframe::Deframer;
 use crate::wire::endpoint::Endpoint;
-use crate::wire::frame::FrameBuf;
+use crate::wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
@@ -236,7 +236,7 @@ impl Relay {
     /// }
     /// ```
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
-    pub fn poll_transmit(&mut self, now: Instant, frame: &mut FrameBuf) -> Option<Transmit> {
+    pub fn poll_transmit(&mut self, now: Instant, frame: &mut [u8; MAX_FRAME]) -> Option<Transmit> {
         let now = self.clock.advance(now);
         let sent = frames::poll_transmit(&mut self.node, &mut self.endpoint, now, frame)?;
         let port = match self.wiring {

@@ -1,5 +1,6 @@
 //! Serial link: received bytes, the transmit queue, the driver-enable pin, and counters of local faults.
 
+use super::READ_LIMIT;
 use super::port::{Fault, SerialPort};
 use crate::relay::{Port, Relay};
 use crate::stats::bump;
@@ -8,9 +9,6 @@ use crate::wire::frame::MAX_FRAME;
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
-
-/// Maximum number of bytes, or failed reads, of one port per poll.
-pub const READ_LIMIT: usize = 64;
 
 /// Capacity for two frames: one in transmission, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
@@ -39,7 +37,7 @@ impl OutputPin for NoPin {
 /// Minimum time of a byte of 10 bits (start bit, 8 data bits, stop bit) at `baud` bit/s, rounded up to a microsecond.
 ///
 /// `baud` is at least 1; 0 counts as 1.
-pub const fn byte_time(baud: u32) -> Duration {
+pub(crate) const fn byte_time(baud: u32) -> Duration {
     let baud = if baud == 0 { 1 } else { baud as u64 };
     Duration::from_micros(10_000_000_u64.div_ceil(baud))
 }
@@ -70,26 +68,26 @@ pub struct SerialLink<P, D = NoPin> {
 }
 
 impl<P: SerialPort> SerialLink<P> {
-    /// Creates a link over `port` with `byte_time` (see [`byte_time`]; at least 1 us).
-    pub fn new(port: P, byte_time: Duration) -> Self {
-        Self::with_pin(port, byte_time, None)
+    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte.
+    pub fn new(port: P, baud: u32) -> Self {
+        Self::with_pin(port, baud, None)
     }
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Creates a link over `port` with `byte_time` (at least 1 us) and a pin that is high while this relay sends.
+    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte, and a pin that is high while this relay sends.
     ///
     /// The first poll sets the pin low, unless it has something to send.
-    pub fn half_duplex(port: P, byte_time: Duration, pin: D) -> Self {
-        Self::with_pin(port, byte_time, Some(pin))
+    pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
+        Self::with_pin(port, baud, Some(pin))
     }
 
-    fn with_pin(port: P, byte_time: Duration, pin: Option<D>) -> Self {
+    fn with_pin(port: P, baud: u32, pin: Option<D>) -> Self {
         Self {
             port,
             pin,
             level: None,
-            byte_time: byte_time.max(Duration::from_micros(1)),
+            byte_time: byte_time(baud),
             waiting: Deque::new(),
             clock: MonotonicClock::new(Instant::ZERO),
             moved_at: Instant::ZERO,

@@ -9,7 +9,7 @@
 //! [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One call
-//! `poll` reads up to [`READ_LIMIT`] bytes per port into the relay, lets it handle due timers, polls its frames, and writes as
+//! `poll` reads up to 64 bytes per port into the relay, lets it handle due timers, polls its frames, and writes as
 //! many bytes as fit. Afterwards poll the relay's events, and sleep until the returned time or until a byte is received,
 //! whichever is first. The time is always later than `now`. With bytes still to be written or read, or a pin to be set low, it is
 //! one byte time ahead, which keeps a line without a FIFO busy. A port that accepts nothing is tried less and less often, at last
@@ -30,7 +30,7 @@
 //! used through its [`embedded_hal_nb`] traits.
 //! ```
 //! use uav_relay::channel::{AirGround, Channel};
-//! use uav_relay::serial::{Nb, Pair, SerialLink, byte_time};
+//! use uav_relay::serial::{Nb, Pair, SerialLink};
 //! use uav_relay::{Band, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
 //! use embedded_hal_nb::{nb, serial};
 //!
@@ -74,8 +74,8 @@
 //! })?;
 //! let identity = Identity { network: 7, index: 1 };
 //! let mut now = Instant::ZERO; // a firmware reads its clock
-//! let mut relay = Relay::new(mission, identity, Settings::default(), 1, now)?;
-//! let link = || SerialLink::new(Nb(Uart::default()), byte_time(115_200));
+//! let mut relay = Relay::new(mission, identity, Settings::wires(115_200), 1, now)?;
+//! let link = || SerialLink::new(Nb(Uart::default()), 115_200);
 //! let mut ports = Pair::new(link(), link());
 //!
 //! while now < Instant::from_millis(100) {
@@ -95,14 +95,23 @@
 pub mod link;
 pub mod port;
 pub mod queue;
+mod read_limit;
 mod ring;
 
 use embedded_hal::digital::OutputPin;
 
 pub use link::SerialStats;
-pub use link::{NoPin, READ_LIMIT, SerialLink, byte_time};
+#[cfg(feature = "async")]
+pub(crate) use link::byte_time;
+pub use link::{NoPin, SerialLink};
 pub use port::{Fault, Io, Nb, SerialPort};
 pub use queue::{ByteQueues, InterruptEnd, Pend, QueuedPort, queue_depth};
+#[cfg(not(any(doc, feature = "internals")))]
+pub(crate) use read_limit::READ_LIMIT;
+// Documentation of public functions links to it.
+#[cfg(any(doc, feature = "internals"))]
+#[doc(hidden)]
+pub use read_limit::READ_LIMIT;
 
 use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;
@@ -161,7 +170,7 @@ macro_rules! polled {
         impl<$($of)*> $ports {
             /// Moves all bytes that can be moved, and returns the latest time of the next call, always later than `now`.
             ///
-            /// Work: at most [`READ_LIMIT`] bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and
+            /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and
             /// the relay's pending frames; for a shared port, as many as fit.
             pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
                 self.poll_keeping(now, relay, &mut |_| {})

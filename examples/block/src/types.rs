@@ -3,7 +3,15 @@
 use uav_relay::channel::{AirGround, Channel, ChannelError};
 use uav_relay::field::FieldError;
 use uav_relay::mission::MissionError;
-use uav_relay::{Duration, Geodetic, Identity, Listen, Measure, Method, Mission, Profile};
+use uav_relay::{
+    ChannelLoad, Duration, Geodetic, Identity, Listen, Measure, Method, Mission, Profile, Settings,
+    Wiring,
+};
+
+use super::BAUD;
+
+/// Silence until a neighbour is probed where the block has 0, ms.
+const USUAL_PROBE_AFTER_MS: u64 = 5_000;
 
 /// Checked content of a block.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -29,13 +37,27 @@ pub struct Config {
 }
 
 impl Config {
-    /// Returns the silence until a neighbour is probed, and until it counts as lost.
-    pub const fn silence(&self) -> [Duration; 2] {
-        let ms = match self.probe_after_ms {
-            0 => 5_000,
-            ms => ms as u64,
+    /// Returns the settings of the relay, without the key and the guard.
+    pub fn settings(&self, wiring: Wiring) -> Settings {
+        let common = self.mission.config().common;
+        let preset = match wiring {
+            Wiring::Pair => Settings::wires(BAUD),
+            Wiring::Shared => Settings::radio(BAUD, ChannelLoad::of_radios(self.mission.relays())),
         };
-        [Duration::from_millis(ms), Duration::from_millis(3 * ms)]
+        let probe_after_ms = match self.probe_after_ms {
+            0 => USUAL_PROBE_AFTER_MS,
+            ms => ms.into(),
+        };
+        Settings {
+            // A profile equal to the common one may change with an upload.
+            profile: Some(self.profile).filter(|own| self.hold_altitude || *own != common),
+            hold_altitude: self.hold_altitude,
+            method: self.method,
+            measure: self.measure,
+            listen: self.listen,
+            sited: self.sites.is_some(),
+            ..preset.with_probe_after(Duration::from_millis(probe_after_ms))
+        }
     }
 }
 

@@ -1,6 +1,5 @@
 //! Fuzz target: arbitrary bytes with a valid CRC. A frame that can be decoded is encoded identically.
 
-use uav_relay::mission::MAX_RELAYS;
 use uav_relay::sensing::belief::Belief;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
@@ -233,7 +232,7 @@ fn look_at(message: &Message) {
             assert!(
                 indices
                     .clone()
-                    .all(|index| index > roster.after && index <= MAX_RELAYS)
+                    .all(|index| index > roster.after && index <= Mission::MAX_RELAYS)
             );
             for seat in &roster.seats {
                 assert!(seat.held_m.to_bits() == 0 || is_flown(seat.held_m));
@@ -258,7 +257,7 @@ fn look_at(message: &Message) {
         }
         Message::Hello(hello) => {
             assert!(
-                hello.neighbour <= MAX_RELAYS && hello.hears < 16,
+                hello.neighbour <= Mission::MAX_RELAYS && hello.hears < 16,
                 "{hello:?}"
             );
         }
@@ -303,7 +302,7 @@ fn look_at(message: &Message) {
 }
 
 fn is_count(relays: u16) -> bool {
-    (1..=MAX_RELAYS).contains(&relays)
+    (1..=Mission::MAX_RELAYS).contains(&relays)
 }
 
 fn is_proposed(view: ViewId) -> bool {

@@ -1,7 +1,7 @@
 //! Interferers: powers and positions, along the line or geographic.
 
 use serde::Deserialize;
-use uav_relay::flight::axis::AROUND_M;
+use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Placement};
 
 use crate::check::mistake;
@@ -85,7 +85,10 @@ fn on_earth(
     };
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
     let Some(place) = point.and_then(|point| line.axis.place(point)) else {
-        let allowed = format!("up to {AROUND_M} m from the line of [site] and from its ends");
+        let allowed = format!(
+            "up to {} m from the line of [site] and from its ends",
+            Axis::AROUND_M
+        );
         return fail(Problem::OutOfRange, &allowed);
     };
     let Placement {

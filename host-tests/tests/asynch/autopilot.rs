@@ -29,7 +29,7 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Instant, Mission, Placement, Relay, Settings, Side, Sites};
 
 use crate::time::Time;
-use crate::wire::BYTE_TIME;
+use crate::wire::BAUD;
 
 const START: Placement = Placement::on_line(100.0, 20.0);
 
@@ -258,7 +258,7 @@ impl Scene {
             async move {
                 let mut relay = relay(relays);
                 let relay = AsyncRelay::new(&mut relay);
-                let link = || AsyncLink::new(Uart::default(), Uart::default(), BYTE_TIME);
+                let link = || AsyncLink::new(Uart::default(), Uart::default(), BAUD);
                 let mut ports = AsyncPair::new(link(), link());
                 let link = Autopilot::new(axis(), Pace::default(), time.now());
                 let autopilot = AsyncAutopilot::new(link);

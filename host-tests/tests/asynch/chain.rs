@@ -11,7 +11,7 @@ use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Instant, Mission, Placement, Port, Relay, Settings, Wiring};
 
 use crate::time::Time;
-use crate::wire::{BYTE_TIME, Fate, Heard, Rx, Shared, Tx, line};
+use crate::wire::{BAUD, Fate, Heard, Rx, Shared, Tx, line};
 
 /// Creates relay `index` of `relays` in the paper's scenario.
 pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
@@ -86,12 +86,8 @@ pub(crate) fn fly(
             Wiring::Pair => {
                 let [from_up, to_down] = [&lines[at - 1], &lines[at]];
                 let [to_up, from_down] = [&lines[count + at], &lines[count + 1 + at]];
-                let up = AsyncLink::new(rx(from_up, 1), tx(to_up, 0, Port::Upstream), BYTE_TIME);
-                let down = AsyncLink::new(
-                    rx(from_down, 1),
-                    tx(to_down, 0, Port::Downstream),
-                    BYTE_TIME,
-                );
+                let up = AsyncLink::new(rx(from_up, 1), tx(to_up, 0, Port::Upstream), BAUD);
+                let down = AsyncLink::new(rx(from_down, 1), tx(to_down, 0, Port::Downstream), BAUD);
                 let mut ports = AsyncPair::new(up, down);
                 let time = time.clone();
                 Box::pin(async move {
@@ -118,7 +114,7 @@ pub(crate) fn fly(
                         time: time.clone(),
                         fate: fate(trouble, index, Port::Shared),
                     },
-                    BYTE_TIME,
+                    BAUD,
                 );
                 let mut ports = AsyncShared::new(link);
                 let time = time.clone();

@@ -11,7 +11,7 @@ use uav_relay::serial::{Nb, Pair, SerialLink, Shared};
 use uav_relay::{Instant, Placement, Relay, Wiring};
 
 use crate::chain::relay;
-use crate::wire::BYTE_TIME;
+use crate::wire::{BAUD, BYTE_TIME};
 
 type Bytes = Rc<RefCell<VecDeque<u8>>>;
 
@@ -47,7 +47,7 @@ impl Write<u8> for End {
 
 fn link(from: &Bytes, to: Vec<Bytes>) -> SerialLink<Nb<End>> {
     let from = Rc::clone(from);
-    SerialLink::new(Nb(End { from, to }), BYTE_TIME)
+    SerialLink::new(Nb(End { from, to }), BAUD)
 }
 
 type Polled = Box<dyn FnMut(Instant, &mut Relay) -> Option<Instant>>;

@@ -15,7 +15,7 @@ use uav_relay::{Instant, Port, Wiring};
 
 use crate::chain::relay;
 use crate::time::Time;
-use crate::wire::{BYTE_TIME, Fate, Rx, Tx, line};
+use crate::wire::{BAUD, BYTE_TIME, Fate, Rx, Tx, line};
 
 /// Writer that accepts part of each write, or blocks, or fails.
 #[derive(Default)]
@@ -118,8 +118,8 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
         };
         let up = Taker::default();
         let mut ports = AsyncPair::new(
-            AsyncLink::new(Silent, up, BYTE_TIME),
-            AsyncLink::new(Silent, down, BYTE_TIME),
+            AsyncLink::new(Silent, up, BAUD),
+            AsyncLink::new(Silent, down, BAUD),
         );
         let mut relay = relay(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
@@ -163,8 +163,8 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
         ..Taker::default()
     };
     let mut ports = AsyncPair::new(
-        AsyncLink::new(Silent, Taker::default(), BYTE_TIME),
-        AsyncLink::new(Silent, down, BYTE_TIME),
+        AsyncLink::new(Silent, Taker::default(), BAUD),
+        AsyncLink::new(Silent, down, BAUD),
     );
     let mut relay = relay(2, 1, Wiring::Pair);
     let relay = AsyncRelay::new(&mut relay);
@@ -200,8 +200,8 @@ fn a_port_that_is_always_ready_starves_nobody() {
             ..Taker::default()
         };
         let mut ports = AsyncPair::new(
-            AsyncLink::new(Flood { fails }, Taker::default(), BYTE_TIME),
-            AsyncLink::new(Silent, down, BYTE_TIME),
+            AsyncLink::new(Flood { fails }, Taker::default(), BAUD),
+            AsyncLink::new(Silent, down, BAUD),
         );
         let mut relay = relay(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
@@ -280,7 +280,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
         let task = {
             let time = time.clone();
             async move {
-                let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BYTE_TIME, pin));
+                let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
                 let mut relay = relay(2, 1, Wiring::Shared);
                 let relay = AsyncRelay::new(&mut relay);
                 let counted = poll_fn(|_| {

@@ -9,12 +9,14 @@ use std::task::{Poll, Waker};
 
 use embedded_io_async::{ErrorType, Read, Write};
 use uav_relay::asynch::Clock;
-use uav_relay::serial::byte_time;
 use uav_relay::{Duration, Instant};
 
 use crate::time::Time;
 
-pub(crate) const BYTE_TIME: Duration = byte_time(115_200);
+pub(crate) const BAUD: u32 = 115_200;
+
+/// Time of a byte at [`BAUD`].
+pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
 /// Frame with the arrival time of its last byte.
 pub(crate) type Heard = (Instant, Vec<u8>);

@@ -1,6 +1,6 @@
 //! Closed form of Upsilon compared with the integral of the moment-generating function.
 
-use uav_relay::field::{FieldPoint, beta_upsilon};
+use uav_relay::FieldPoint;
 use uav_relay_oracle::reference::stochastic::upsilon_by_mgf;
 
 use super::off;
@@ -60,7 +60,7 @@ fn upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf() {
         for beta in [0.5, 1.0, 3.3, 20.0] {
             for i_max_w in [1.0, 3.476_175_5e-7] {
                 let integral = upsilon_by_mgf(|t| beta_mgf(alpha, beta, -t * i_max_w)).unwrap();
-                let closed = beta_upsilon(alpha, beta, i_max_w).unwrap();
+                let closed = FieldPoint::beta_upsilon(alpha, beta, i_max_w).unwrap();
                 worst = worst.max(off(closed, integral));
             }
         }
@@ -104,11 +104,11 @@ fn the_integral_finds_what_is_known_of_other_distributions() {
 
 #[test]
 fn the_closed_form_has_the_values_of_a_separate_program() {
-    assert!(off(beta_upsilon(2.0, 2.0, 1.0).unwrap(), 3.0) < 1e-12);
-    let found = beta_upsilon(1.5, 2.0, 3.476_175_5e-7).unwrap();
+    assert!(off(FieldPoint::beta_upsilon(2.0, 2.0, 1.0).unwrap(), 3.0) < 1e-12);
+    let found = FieldPoint::beta_upsilon(1.5, 2.0, 3.476_175_5e-7).unwrap();
     assert!(off(found, 14_383_623.611_638_71) < 1e-12);
     // The mean is infinite.
-    assert_eq!(beta_upsilon(1.0, 2.0, 1.0), None);
+    assert_eq!(FieldPoint::beta_upsilon(1.0, 2.0, 1.0), None);
 }
 
 #[test]
@@ -129,12 +129,12 @@ fn where_there_is_no_mean_there_is_none() {
         (2.0, 2.0, f64::MIN_POSITIVE / 8.0),
     ] {
         assert_eq!(
-            beta_upsilon(alpha, beta, i_max_w),
+            FieldPoint::beta_upsilon(alpha, beta, i_max_w),
             None,
             "{alpha} {beta} {i_max_w}"
         );
         assert_eq!(FieldPoint::from_beta(0.0, alpha, beta, i_max_w), None);
     }
-    let next = beta_upsilon(1.0_f64.next_up(), 2.0, 1.0).unwrap();
+    let next = FieldPoint::beta_upsilon(1.0_f64.next_up(), 2.0, 1.0).unwrap();
     assert!(off(next, 2.0 / f64::EPSILON) < 1e-12);
 }

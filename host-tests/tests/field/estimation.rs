@@ -2,8 +2,8 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use uav_relay::field::beta_upsilon;
-use uav_relay::field::estimate::{Estimate, Estimator, MIN_SAMPLES};
+use uav_relay::FieldPoint;
+use uav_relay::field::estimate::{Estimate, Estimator};
 use uav_relay_oracle::random::seed;
 
 use super::off;
@@ -39,7 +39,7 @@ fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> 
 
 /// Estimates from `samples` samples each, in [`SEEDS`] seeds.
 fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
-    let truth = beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
+    let truth = FieldPoint::beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
     let mut found = Found::default();
     // Every pair of shapes has its own samples.
     let first = first.wrapping_mul(1_000_003) ^ alpha.to_bits() ^ beta.to_bits().rotate_left(32);
@@ -108,7 +108,7 @@ fn the_standard_error_holds() {
 fn it_holds_for_few_samples_too() {
     let first = seed(3);
     let (mut made, mut covered) = (0, 0);
-    for samples in [MIN_SAMPLES, 1_000] {
+    for samples in [Estimator::MIN_SAMPLES, 1_000] {
         for alpha in [1.2, 1.5, 2.0, 4.0, 20.0] {
             for beta in [0.5, 3.0, 20.0] {
                 let found = found(alpha, beta, samples, first);

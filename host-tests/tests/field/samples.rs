@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use uav_relay::field::Field;
 use uav_relay::field::FieldPoint;
-use uav_relay::field::estimate::{Estimate, Estimator, MIN_SAMPLES};
+use uav_relay::field::estimate::{Estimate, Estimator};
 use uav_relay_oracle::random::seed;
 
 use super::off;
@@ -63,9 +63,13 @@ fn cleared_it_is_as_new() {
 
 #[test]
 fn no_estimate_without_enough_samples_or_spread() {
-    let few = filled(4.0, 3.0, 1e-6, MIN_SAMPLES - 1);
+    let few = filled(4.0, 3.0, 1e-6, Estimator::MIN_SAMPLES - 1);
     assert_eq!(few.estimate(), None);
-    assert!(filled(4.0, 3.0, 1e-6, MIN_SAMPLES).estimate().is_some());
+    assert!(
+        filled(4.0, 3.0, 1e-6, Estimator::MIN_SAMPLES)
+            .estimate()
+            .is_some()
+    );
     for level in [1e-6, 3e-7] {
         let mut still = Estimator::new(1e-6);
         for _ in 0..1_000 {

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::field::{Field, FieldError, FieldPoint, MAX_POINTS};
+use uav_relay::field::{Field, FieldError, FieldPoint};
 use uav_relay_oracle::random::{log_uniform, seed};
 
 use super::off;
@@ -88,7 +88,7 @@ fn every_number_is_checked_at_both_ends_and_for_nan() {
 
     let rising = |n: u16| (0..n).map(|k| at(f32::from(k), 1.0)).collect();
     assert_eq!(field(rising(0)).unwrap_err(), FieldError::Points);
-    let most = u16::try_from(MAX_POINTS).unwrap();
+    let most = u16::try_from(Field::MAX_POINTS).unwrap();
     assert!(field(rising(most)).is_ok());
     assert_eq!(field(rising(most + 1)).unwrap_err(), FieldError::Points);
 

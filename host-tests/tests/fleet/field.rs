@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::planning::fleet::{self, ranges};
+use uav_relay::planning::fleet::{Fewest, ranges};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
@@ -106,7 +106,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
         // The grid needs no fewer relays; with longer hops it needs no more.
         let at_most = on_a_grid(&link, target, MOST, 0.0);
         let at_least = on_a_grid(&link, target, MOST, 1.0);
-        let told = fleet::fewest(&mission, target as f32, |_| common)
+        let told = Fewest::of(&mission, target as f32, |_| common)
             .map_or(0, |found| usize::from(found.relays));
         if at_least == 0 {
             assert!(told == 0 || told > MOST, "{told} {link:?} {target}");
@@ -131,7 +131,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
         let mut places = vec![Placement::default(); told];
         let mission = mission.with_relays(told as u16).unwrap();
         assert!(
-            fleet::places(&mission, target as f32, |_| common, &mut places),
+            mission.places_for(target as f32, |_| common, &mut places),
             "{link:?} {target}"
         );
         let all = StochasticLink {
@@ -189,12 +189,7 @@ fn the_best_of_equals_in_a_field() {
         }
         // The target is met, and a slightly higher one is not even with the grid's longer hops.
         let mut places = vec![Placement::default(); n];
-        assert!(fleet::places(
-            &mission,
-            best as f32,
-            |_| mission.config().common,
-            &mut places
-        ));
+        assert!(mission.places_for(best as f32, |_| mission.config().common, &mut places));
         let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
         assert!(link.chain_sir(&x) >= best * (1.0 - 5e-6));
         let fewest = on_a_grid(&link, best * 1.03, n, 0.0);
@@ -217,27 +212,22 @@ fn what_differs_in_a_field_is_not_proven() {
         power_w: if index == 2 { 0.5 } else { common.power_w },
         ..common
     };
-    let found = fleet::fewest(&mission, 1000.0, profile_of).unwrap();
+    let found = Fewest::of(&mission, 1000.0, profile_of).unwrap();
     assert!(!found.proven && found.relays > 2);
     let mission = mission.with_relays(found.relays).unwrap();
     let mut places = vec![Placement::default(); usize::from(found.relays)];
-    assert!(fleet::places(&mission, 1000.0, profile_of, &mut places));
+    assert!(mission.places_for(1000.0, profile_of, &mut places));
     assert!(
         places
             .windows(2)
             .all(|pair| pair[1].x_m - pair[0].x_m >= 4.0)
     );
     // A list that is too short is not written.
-    assert!(!fleet::places(
-        &mission,
-        1000.0,
-        profile_of,
-        &mut places[1..]
-    ));
+    assert!(!mission.places_for(1000.0, profile_of, &mut places[1..]));
     let config = MissionConfig {
         relays: 1,
         ..*mission.config()
     };
     let alone = Mission::try_new(config).unwrap();
-    assert!(!fleet::places(&alone, 1000.0, profile_of, &mut places));
+    assert!(!alone.places_for(1000.0, profile_of, &mut places));
 }

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::planning::fleet;
+use uav_relay::planning::fleet::{Fewest, Most};
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
@@ -84,7 +84,7 @@ fn as_few_as_an_exhaustive_count() {
         };
         let expected = exhaustive(&link, target, MOST);
         let (mission, profile_of) = briefed(&link);
-        let found = fleet::fewest(&mission, target as f32, &profile_of);
+        let found = Fewest::of(&mission, target as f32, &profile_of);
         let told = found.map_or(0, |found| usize::from(found.relays));
         if expected == 0 {
             assert!(
@@ -113,12 +113,7 @@ fn as_few_as_an_exhaustive_count() {
         // The positions form such a chain.
         let mission = mission.with_relays(found.unwrap().relays).unwrap();
         let mut places = vec![Placement::default(); told];
-        assert!(fleet::places(
-            &mission,
-            target as f32,
-            &profile_of,
-            &mut places
-        ));
+        assert!(mission.places_for(target as f32, &profile_of, &mut places));
         let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
         let sir = with(&link, told).chain_sir(&x);
         assert!(sir >= target * (1.0 - ROUNDING), "{sir} {target} {link:?}");
@@ -152,7 +147,7 @@ fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
             continue;
         };
         let (mission, profile_of) = briefed(&link);
-        let Ok(found) = fleet::fewest(&mission, target as f32, &profile_of) else {
+        let Some(found) = Fewest::of(&mission, target as f32, &profile_of) else {
             none += 1;
             continue;
         };
@@ -166,12 +161,7 @@ fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
         }
         let mut places = vec![Placement::default(); n];
         let mission = mission.with_relays(found.relays).unwrap();
-        assert!(fleet::places(
-            &mission,
-            target as f32,
-            &profile_of,
-            &mut places
-        ));
+        assert!(mission.places_for(target as f32, &profile_of, &mut places));
         let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
         let sir = with(&link, n).chain_sir(&x);
         assert!(
@@ -206,20 +196,19 @@ fn the_most_is_what_no_number_of_relays_exceeds() {
         };
         let link = as_relays_know_it(&link);
         let (mission, profile_of) = briefed(&link);
-        let Some(most) = fleet::most(&mission, &profile_of) else {
+        let Some(most) = Most::of(&mission, &profile_of) else {
             assert!(link.sir_rx(0.0).unwrap() <= 0.0, "{link:?}");
             continue;
         };
         met += 1;
-        let found = fleet::fewest(&mission, most.target, &profile_of).unwrap();
+        let found = Fewest::of(&mission, most.target, &profile_of).unwrap();
         assert_eq!(found.relays, most.relays);
         if link.min_separation_m > 0.0 {
             // A chain with a separation may reach more than one with a lower target.
-            exceeded +=
-                u32::from(fleet::fewest(&mission, most.target * 1.001, &profile_of).is_ok());
+            exceeded += u32::from(Fewest::of(&mission, most.target * 1.001, &profile_of).is_some());
             continue;
         }
-        assert!(fleet::fewest(&mission, most.target * 1.001, &profile_of).is_err());
+        assert!(Fewest::of(&mission, most.target * 1.001, &profile_of).is_none());
         if most.relays < 900 {
             // Only the outer hops limit the target.
             let d = link.distance_m;

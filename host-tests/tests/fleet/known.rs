@@ -1,7 +1,7 @@
 //! Values of an independent program, and errors of the printed rules.
 
 use uav_relay::Placement;
-use uav_relay::planning::fleet;
+use uav_relay::planning::fleet::Fewest;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
@@ -15,7 +15,7 @@ fn the_reference_cases_hold() {
     for case in cases::of("min_uavs").unwrap() {
         let (link, target) = (case.link(1), case.arg("gamma").unwrap());
         let (mission, profile_of) = briefed(&link);
-        let found = fleet::fewest(&mission, target as f32, &profile_of).unwrap();
+        let found = Fewest::of(&mission, target as f32, &profile_of).unwrap();
         assert!(found.proven);
         assert!(
             (f64::from(found.relays) - case.part("N").unwrap()).abs() < 0.5,
@@ -24,12 +24,7 @@ fn the_reference_cases_hold() {
         );
         let mission = mission.with_relays(found.relays).unwrap();
         let mut places = vec![Placement::default(); usize::from(found.relays)];
-        assert!(fleet::places(
-            &mission,
-            target as f32,
-            &profile_of,
-            &mut places
-        ));
+        assert!(mission.places_for(target as f32, &profile_of, &mut places));
         let expected = case.part_list("x").unwrap();
         assert_eq!(expected.len(), places.len());
         for (place, expected) in places.iter().zip(expected) {
@@ -57,7 +52,7 @@ fn the_reference_cases_hold() {
         };
         let mission = of_stochastic_link(&link, 0.0).unwrap();
         let common = mission.config().common;
-        let found = fleet::fewest(&mission, target as f32, |_| common).unwrap();
+        let found = Fewest::of(&mission, target as f32, |_| common).unwrap();
         assert!(found.proven);
         assert!(
             (f64::from(found.relays) - case.part("N").unwrap()).abs() < 0.5,
@@ -66,12 +61,7 @@ fn the_reference_cases_hold() {
         );
         let mission = mission.with_relays(found.relays).unwrap();
         let mut places = vec![Placement::default(); usize::from(found.relays)];
-        assert!(fleet::places(
-            &mission,
-            target as f32,
-            |_| common,
-            &mut places
-        ));
+        assert!(mission.places_for(target as f32, |_| common, &mut places));
         let sirs = StochasticLink {
             relays: vec![link.relays[0]; places.len()],
             ..link
@@ -92,7 +82,7 @@ fn the_reference_cases_hold() {
     let (mission, profile_of) = briefed(&Link::paper(1));
     for (target, relays) in [(5.0, 22), (10.0, 40), (20.0, 65), (40.0, 100)] {
         assert_eq!(
-            fleet::fewest(&mission, target, &profile_of).unwrap().relays,
+            Fewest::of(&mission, target, &profile_of).unwrap().relays,
             relays
         );
     }
@@ -101,5 +91,5 @@ fn the_reference_cases_hold() {
     case.tx_w = 1.0;
     let mission = of_stochastic_link(&case, 0.0).unwrap();
     let common = mission.config().common;
-    assert_eq!(fleet::fewest(&mission, 1.0, |_| common).unwrap().relays, 12);
+    assert_eq!(Fewest::of(&mission, 1.0, |_| common).unwrap().relays, 12);
 }

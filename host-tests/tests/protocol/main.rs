@@ -6,8 +6,8 @@ use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Event, FrameBuf, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Phase,
-    Port, Relay, Settings,
+    Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Phase, Port, Relay,
+    Settings,
 };
 
 mod lost;
@@ -19,7 +19,7 @@ fn relay(mission: Mission, index: u16) -> Relay {
 
 /// Returns the port, message and bytes of each pending frame.
 fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
-    let mut buffer: FrameBuf = [0; MAX_FRAME];
+    let mut buffer = [0; MAX_FRAME];
     let mut sent = Vec::new();
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
         let bytes = buffer[..transmit.len].to_vec();
@@ -55,7 +55,7 @@ fn first_sweep(head: &mut Relay) -> (Instant, Vec<u8>) {
 }
 
 fn encode(sender: u16, destination: u16, message: &Message) -> Vec<u8> {
-    let mut buffer: FrameBuf = [0; MAX_FRAME];
+    let mut buffer = [0; MAX_FRAME];
     let len = frame::encode(
         Header {
             network: NETWORK,

@@ -2,14 +2,17 @@
 
 use host_tests::fixtures;
 use uav_relay::MAX_FRAME;
-use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared, byte_time};
+use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared};
 use uav_relay::{
-    Duration, Event, FrameBuf, Instant, Mission, Placement, Port, Relay, Settings, Side, Wiring,
+    Duration, Event, Instant, Mission, Placement, Port, Relay, Settings, Side, Wiring,
 };
 
 use crate::pipe::{End, IoEnd, NbEnd, Trouble};
 
-pub(crate) const BYTE_TIME: Duration = byte_time(115_200);
+pub(crate) const BAUD: u32 = 115_200;
+
+/// Time of a byte at [`BAUD`].
+pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
 /// Creates relay `index` of `relays` in the paper's scenario.
 pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
@@ -66,11 +69,11 @@ impl Node {
     pub(crate) fn new(kind: Kind, relay: Relay, ends: &[End], trouble: &Trouble) -> Self {
         let nb = |end: &End| {
             let (end, trouble) = (end.clone(), trouble.clone());
-            SerialLink::new(Nb(NbEnd { end, trouble }), BYTE_TIME)
+            SerialLink::new(Nb(NbEnd { end, trouble }), BAUD)
         };
         let io = |end: &End| {
             let (end, trouble) = (end.clone(), trouble.clone());
-            SerialLink::new(Io(IoEnd { end, trouble }), BYTE_TIME)
+            SerialLink::new(Io(IoEnd { end, trouble }), BAUD)
         };
         let driver: Box<dyn Driver> = match (kind, ends) {
             (Kind::Nb, [up, down]) => Box::new(Pair::new(nb(up), nb(down))),
@@ -158,7 +161,7 @@ pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
         .collect();
     let mut now = Instant::ZERO;
     while chain.iter().any(|relay| relay.setpoint().is_none()) {
-        let mut frame: FrameBuf = [0; MAX_FRAME];
+        let mut frame = [0; MAX_FRAME];
         let mut mail = Vec::new();
         for (at, relay) in chain.iter_mut().enumerate() {
             relay.handle_timeout(now);

@@ -6,13 +6,13 @@ use std::rc::Rc;
 use uav_relay::serial::{Io, Nb, SerialLink, SerialPort, Shared};
 use uav_relay::{Instant, Wiring};
 
-use crate::chain::{BYTE_TIME, relay};
+use crate::chain::{BAUD, BYTE_TIME, relay};
 use crate::uart::{Bench, IoUart, Pin, Uart};
 
 /// Runs a relay that calls a missing neighbour for `millis` of real time. Returns the pin's error count.
 fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     let pin = Pin(Rc::clone(bench));
-    let mut driver = Shared::new(SerialLink::half_duplex(port, BYTE_TIME, pin));
+    let mut driver = Shared::new(SerialLink::half_duplex(port, BAUD, pin));
     let mut relay = relay(2, 1, Wiring::Shared);
     let mut now = Instant::ZERO;
     while now < Instant::from_millis(millis) {

@@ -46,9 +46,6 @@ use error::{LONGEST_M, SHORTEST_M};
 #[doc(hidden)]
 pub use error::{LONGEST_M, SHORTEST_M};
 
-/// Maximum distance of a position beside the line, and before and beyond its ends, m.
-pub const AROUND_M: f32 = 5_000.0;
-
 /// Allowed difference between the mission's distance and that of the sites, m, for the rounding of the sites and of f32.
 const TOLERANCE_M: f64 = 0.05;
 
@@ -72,6 +69,9 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Maximum distance of a position beside the line, and before and beyond its ends, m.
+    pub const AROUND_M: f32 = 5_000.0;
+
     /// Creates the line between two sites on the ground.
     ///
     /// Poles and the antimeridian need no special case. Constant work.
@@ -157,7 +157,7 @@ impl Axis {
 
     /// Converts a geodetic position to mission coordinates.
     ///
-    /// `None` if it is invalid, or farther than [`AROUND_M`] from the line or its ends. Constant work.
+    /// `None` if it is invalid, or farther than [`AROUND_M`](Self::AROUND_M) from the line or its ends. Constant work.
     pub fn place(&self, point: Geodetic) -> Option<Placement> {
         if !point.is_valid() {
             return None;
@@ -173,7 +173,7 @@ impl Axis {
         };
         // A point on the far side of the earth has a small x and y as well, but is too deep.
         let is_near = self.is_around(place)
-            && from.dot(self.up).abs() <= self.half_chord_m + f64::from(AROUND_M);
+            && from.dot(self.up).abs() <= self.half_chord_m + f64::from(Self::AROUND_M);
         is_near.then_some(place)
     }
 
@@ -218,7 +218,7 @@ impl Axis {
 
     /// Converts mission coordinates to a geodetic position.
     ///
-    /// `None` if they are not finite, or farther than [`AROUND_M`] from the line or its ends. Constant work.
+    /// `None` if they are not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line or its ends. Constant work.
     pub fn point(&self, place: Placement) -> Option<Geodetic> {
         if !self.is_around(place) {
             return None;
@@ -297,8 +297,10 @@ impl Axis {
             y_m,
             altitude_m,
         } = place;
-        let beyond = narrow(self.distance_m) + AROUND_M;
-        (-AROUND_M..=beyond).contains(&x_m) && y_m.abs() <= AROUND_M && altitude_m.abs() <= AROUND_M
+        let beyond = narrow(self.distance_m) + Self::AROUND_M;
+        (-Self::AROUND_M..=beyond).contains(&x_m)
+            && y_m.abs() <= Self::AROUND_M
+            && altitude_m.abs() <= Self::AROUND_M
     }
 
     fn datum_m(&self, x: f64) -> f64 {

@@ -106,26 +106,14 @@ pub(crate) fn begin<F: NorFlash>(
             None
         }
     };
-    let common = said.mission.config().common;
-    let [probe_after, dead_after] = said.silence();
     let settings = Settings {
         auth,
-        // A profile equal to the common one may change with an upload.
-        profile: Some(said.profile).filter(|own| said.hold_altitude || *own != common),
-        hold_altitude: said.hold_altitude,
-        method: said.method,
-        measure: said.measure,
-        listen: said.listen,
-        wiring,
         guard: said.sites.map(|sites| GuardConfig {
             hover_m: POSITION_ERROR_M,
             lag: Pace::of_speed(sites.speed_m_s).stopping_time(),
             ..GuardConfig::of(&said.mission, said.profile)
         }),
-        sited: said.sites.is_some(),
-        probe_after,
-        dead_after,
-        ..Settings::default()
+        ..said.settings(wiring)
     };
     let (slot, identity) = (&mut room.relay, said.identity);
     let relay = Relay::new_in(slot, &said.mission, identity, &settings, board.seed, now);

@@ -29,7 +29,6 @@ use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
-use uav_relay::serial::byte_time;
 use uav_relay::{Instant, Relay, Wiring};
 use uav_relay_chip::watchdog;
 
@@ -108,8 +107,8 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     } = begin(room, board, Wiring::Pair, autopilot.is_some())?;
     let relay = AsyncRelay::new(relay);
     let mut ports = AsyncPair::new(
-        AsyncLink::new(up_rx, up_tx, byte_time(BAUD)),
-        AsyncLink::new(down_rx, down_tx, byte_time(BAUD)),
+        AsyncLink::new(up_rx, up_tx, BAUD),
+        AsyncLink::new(down_rx, down_tx, BAUD),
     );
     let beside = beside(&relay, link.as_ref(), autopilot);
     let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
@@ -135,7 +134,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
         autopilot: link,
     } = begin(room, board, Wiring::Shared, autopilot.is_some())?;
     let relay = AsyncRelay::new(relay);
-    let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, byte_time(BAUD), pin));
+    let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
     let beside = beside(&relay, link.as_ref(), autopilot);
     let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
     let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);

@@ -23,9 +23,7 @@ use stm32f4xx_hal::pac::{self, Interrupt, USART2, USART3, interrupt};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Config, Error, Event as UartEvent, Instance, Serial};
 use stm32f4xx_hal::{nb, rcc, signature::Uid};
-use uav_relay::serial::{
-    ByteQueues, Fault, InterruptEnd, Pair, SerialLink, byte_time, queue_depth,
-};
+use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, Pair, SerialLink, queue_depth};
 use uav_relay::{Duration, Event, Instant, Relay, Settings};
 
 /// Queue sizes: 10 ms of received bytes, and more than the longest frame to send.
@@ -88,12 +86,12 @@ fn main() -> ! {
     }
 
     let mut ports = Pair::new(
-        SerialLink::new(up_port, byte_time(BAUD)),
-        SerialLink::new(down_port, byte_time(BAUD)),
+        SerialLink::new(up_port, BAUD),
+        SerialLink::new(down_port, BAUD),
     );
     let id = Uid::get();
     let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
-    let mut relay = Relay::new(MISSION, IDENTITY, Settings::default(), seed, now()).unwrap();
+    let mut relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
     loop {
         ports.poll(now(), &mut relay);
         while let Some(event) = relay.poll_event() {

@@ -23,7 +23,6 @@ use mission::{BAUD, IDENTITY, MISSION};
 use panic_halt as _;
 use static_cell::StaticCell;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
-use uav_relay::serial::byte_time;
 use uav_relay::{Event, Instant, Relay, Settings};
 
 bind_interrupts!(struct Irqs {
@@ -88,11 +87,11 @@ async fn main(_spawner: Spawner) {
     let seed = seed(embassy_stm32::uid::uid());
     let slot = RELAY.init(None);
     let now = EmbassyClock.now();
-    let relay = Relay::new_in(slot, &MISSION, IDENTITY, &Settings::default(), seed, now).unwrap();
+    let relay = Relay::new_in(slot, &MISSION, IDENTITY, &Settings::wires(BAUD), seed, now).unwrap();
     let relay = AsyncRelay::new(relay);
     let mut ports = AsyncPair::new(
-        AsyncLink::new(up_rx, up_tx, byte_time(BAUD)),
-        AsyncLink::new(down_rx, down_tx, byte_time(BAUD)),
+        AsyncLink::new(up_rx, up_tx, BAUD),
+        AsyncLink::new(down_rx, down_tx, BAUD),
     );
     let firmware = async {
         loop {

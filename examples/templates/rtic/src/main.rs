@@ -26,7 +26,7 @@ mod app {
     use stm32f4xx_hal::serial::{Config, Error, Event as UartEvent, Instance, Serial};
     use stm32f4xx_hal::{nb, rcc, signature::Uid};
     use uav_relay::serial::{
-        ByteQueues, Fault, InterruptEnd, Pair, Pend, QueuedPort, SerialLink, byte_time, queue_depth,
+        ByteQueues, Fault, InterruptEnd, Pair, Pend, QueuedPort, SerialLink, queue_depth,
     };
     use uav_relay::{Duration, Event, Instant, Relay, Settings};
 
@@ -81,13 +81,13 @@ mod app {
         let (up_end, up_port) = cx.local.up.split(Request(Interrupt::USART2));
         let (down_end, down_port) = cx.local.down.split(Request(Interrupt::USART3));
         let ports = Pair::new(
-            SerialLink::new(up_port, byte_time(BAUD)),
-            SerialLink::new(down_port, byte_time(BAUD)),
+            SerialLink::new(up_port, BAUD),
+            SerialLink::new(down_port, BAUD),
         );
 
         let id = Uid::get();
         let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
-        let relay = Relay::new(MISSION, IDENTITY, Settings::default(), seed, now()).unwrap();
+        let relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
         let local = Local {
             upstream: Served {
                 uart: usart2,

@@ -2,7 +2,7 @@
 
 use libm::lgamma;
 use serde::Serialize;
-use uav_relay::field::beta_upsilon;
+use uav_relay::FieldPoint;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::sheet::{Sheet, Table};
@@ -33,7 +33,7 @@ pub struct Row {
 pub fn data(steps: u32) -> Vec<Row> {
     let mut rows = Vec::new();
     for (alpha, beta) in SHAPES {
-        let Some(upsilon_times_i_max) = beta_upsilon(alpha, beta, 1.0) else {
+        let Some(upsilon_times_i_max) = FieldPoint::beta_upsilon(alpha, beta, 1.0) else {
             continue;
         };
         for step in 0..=steps {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::planning::fleet;
+use uav_relay::planning::fleet::Fewest;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::paper;
@@ -70,9 +70,7 @@ fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, Tr
             interferer_y_m: y_m,
             relay_w,
             target_linear: target,
-            relays: fleet::fewest(&mission, f32::from(target), |_| common)
-                .ok()
-                .map(|fewest| fewest.relays),
+            relays: Fewest::of(&mission, f32::from(target), |_| common).map(|fewest| fewest.relays),
         };
         Ok(targets.iter().map(row).collect())
     };

@@ -4,7 +4,6 @@
 
 use core::task::Poll;
 
-use uav_relay::mission::MAX_RELAYS;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::optimiser::pass::{Behind, Link};
@@ -17,7 +16,7 @@ use super::found::{NoPlan, Plan, Why};
 use super::source;
 use uav_relay_scenario::Scenario;
 
-type Chain = Solver<{ MAX_RELAYS as usize }, { MAX_RELAYS as usize / 10 }>;
+type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;
 
 /// Returns the best positions of `relays` relays with free altitudes and sides, by the joint method.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {

@@ -8,7 +8,7 @@ use uav_relay_sim::report::hop_sirs;
 use super::found::{NoPlan, Plan};
 
 /// Largest number of relays while the number is not yet known.
-pub(super) const MOST_RELAYS: u16 = uav_relay::mission::MAX_RELAYS;
+pub(super) const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
 /// A mission, the relays' own profiles and the indices of relays with a fixed altitude.
 pub(super) struct Briefed {

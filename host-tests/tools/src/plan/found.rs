@@ -1,6 +1,5 @@
 //! Results of planning.
 
-use uav_relay::mission::MAX_RELAYS;
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;
 use uav_relay_scenario::mission::Refusal;
@@ -79,13 +78,14 @@ impl Why {
                 most,
                 relays,
             } => {
+                let limit = Mission::MAX_RELAYS;
                 let (target, most) = (unit.asked(*target), unit.say(*most));
                 match relays {
                     Some(relays) => format!(
-                        "no number of relays, up to {MAX_RELAYS}, gives every hop an SIR of {target}: the most is {most}, with {relays}"
+                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the most is {most}, with {relays}"
                     ),
                     None => format!(
-                        "no number of relays that was tried, up to {MAX_RELAYS}, gives every hop an SIR of {target}: the most found is {most}"
+                        "no number of relays that was tried, up to {limit}, gives every hop an SIR of {target}: the most found is {most}"
                     ),
                 }
             }

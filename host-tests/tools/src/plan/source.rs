@@ -1,7 +1,7 @@
 //! Plans against one interferer: one relay by a theorem, several at their own altitudes.
 
 use uav_relay::optimiser::plan as silent;
-use uav_relay::planning::fleet;
+use uav_relay::planning::fleet::{Fewest, Most};
 use uav_relay::planning::single::{Found, aside, free, given_altitude, given_x};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
@@ -146,7 +146,10 @@ pub(super) fn solved(briefed: &Briefed) -> Result<f32, NoPlan> {
 pub(super) fn placed(briefed: &Briefed, target: f32) -> Option<Vec<Placement>> {
     let mut places = vec![Placement::default(); usize::from(briefed.mission.relays())];
     let profile_of = |index| briefed.profile(index);
-    fleet::places(&briefed.mission, target, profile_of, &mut places).then_some(places)
+    briefed
+        .mission
+        .places_for(target, profile_of, &mut places)
+        .then_some(places)
 }
 
 /// Returns the fewest relays at their own altitudes, and their positions for the target.
@@ -174,11 +177,11 @@ pub(super) fn enough(
         ..alone
     };
     let profile_of = |index| own.profile(index);
-    if let Ok(found) = fleet::fewest(&own.mission, narrow(target), profile_of) {
+    if let Some(found) = Fewest::of(&own.mission, narrow(target), profile_of) {
         let briefed = Briefed::new(scenario, found.relays, tolerance)?;
         return Ok((briefed, found.proven));
     }
-    let most = fleet::most(&own.mission, profile_of).ok_or_else(nothing)?;
+    let most = Most::of(&own.mission, profile_of).ok_or_else(nothing)?;
     let best = f64::from(most.target);
     let why = Why::Short {
         target,

@@ -7,15 +7,11 @@ use super::config::{BAUD, MOST_PROBE_AFTER_MS};
 
 /// Returns the silence after which a neighbour is probed and that after which it is lost; 0 selects the default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
-    let Settings {
-        probe_after,
-        dead_after,
-        ..
-    } = Settings::default();
-    match u64::from(probe_after_ms) {
-        0 => [probe_after, dead_after],
-        ms => [ms, 3 * ms].map(Duration::from_millis),
-    }
+    let settings = match u64::from(probe_after_ms) {
+        0 => Settings::default(),
+        ms => Settings::default().with_probe_after(Duration::from_millis(ms)),
+    };
+    [settings.probe_after, settings.dead_after]
 }
 
 /// Returns `probe_after_ms` for the block: the command line's `given_ms`, else the section's; 0 for the firmware's default.

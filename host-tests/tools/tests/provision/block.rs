@@ -1,6 +1,6 @@
 //! Content of a block against the table of `config/mod.rs`, byte by byte, and as a drone reads it.
 
-use uav_relay::{Adjust, Local, Measure, Method};
+use uav_relay::{Adjust, ChannelLoad, Local, Measure, Method, Settings, Wiring};
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{ConfigError, LEN, MAX_POINTS};
@@ -83,16 +83,19 @@ fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
     let block = flight.asking_after(0x0102).block(3).unwrap();
     assert_eq!(block[..372], usual[..372]);
     assert_eq!(block[372..376], [2, 1, 0, 0]);
-    let ms = |block| {
-        reads(&block)
-            .unwrap()
-            .silence()
-            .map(uav_relay::Duration::as_micros)
+    let ms = |block, wiring| {
+        let settings = reads(&block).unwrap().settings(wiring);
+        [settings.probe_after, settings.dead_after].map(|time| time.as_micros() / 1_000)
     };
-    assert_eq!(ms(block), [258_000, 774_000]);
-    let settings = uav_relay::Settings::default();
-    let times = [settings.probe_after, settings.dead_after];
-    assert_eq!(ms(usual), times.map(uav_relay::Duration::as_micros));
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        assert_eq!(ms(block, wiring), [258, 774]);
+        assert_eq!(ms(usual, wiring), [5_000, 15_000]);
+    }
+    let settings = reads(&usual).unwrap().settings(Wiring::Shared);
+    assert_eq!(
+        settings,
+        Settings::radio(115_200, ChannelLoad::of_radios(5))
+    );
 }
 
 #[test]

@@ -12,7 +12,6 @@ use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command::{self, Failure};
-use uav_relay_sim::simulator::medium::access::OVERHEAD;
 use uav_relay_tools::plan::carried::is_current;
 use uav_relay_tools::plan::flown::{Flown, flown};
 use uav_relay_tools::provision::block::Flight;
@@ -313,11 +312,7 @@ fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), St
         return Ok(());
     }
     let in_range = options.in_range.unwrap_or(uavs).min(uavs);
-    let load = ChannelLoad {
-        in_range,
-        overhead: u16::try_from(OVERHEAD).unwrap_or(u16::MAX),
-    };
-    command::carries(options.baud, load, probe_after)
+    command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after)
         .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
 }
 

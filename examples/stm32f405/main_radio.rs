@@ -4,45 +4,34 @@
 //! ```text
 //! cargo run --profile firmware --target thumbv7em-none-eabihf --example stm32f405_radio     # flashes, with probe-rs
 //! ```
-//! `radio.rs` has the pins; everything else, and the configuration of a drone, is that of `examples/stm32f405`.
+//! `radio.rs` has the pins; everything else, and the configuration of a drone, is that of `main.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cfg_attr(feature = "flight", path = "../stm32f405/autopilot.rs")]
-#[cfg_attr(not(feature = "flight"), path = "../stm32f405/grounded.rs")]
+#[cfg_attr(not(feature = "flight"), path = "grounded.rs")]
 mod autopilot;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/board.rs"]
 mod board;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/chip.rs"]
 mod chip;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/clock.rs"]
 mod clock;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/drone.rs"]
 mod drone;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/flash.rs"]
 mod flash;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/kept.rs"]
 mod kept;
 #[cfg(target_os = "none")]
-#[cfg_attr(feature = "defmt", path = "../stm32f405/log.rs")]
-#[cfg_attr(not(feature = "defmt"), path = "../stm32f405/silent.rs")]
+#[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
 mod log;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/port.rs"]
 mod port;
 #[cfg(target_os = "none")]
 mod radio;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/turns.rs"]
 mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
-#[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
 
@@ -68,12 +57,11 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
-    use uav_relay::serial::{SerialLink, Shared, byte_time};
+    use uav_relay::serial::{SerialLink, Shared};
 
     let (clock, channel, driver_enable, uart) = radio::start()?;
-    let byte_time = byte_time(port::BAUD);
     let channel = cortex_m::singleton!(
-        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, byte_time, driver_enable))
+        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, port::BAUD, driver_enable))
     )?;
     Some((clock, channel, uart))
 }

@@ -4,56 +4,41 @@
 //! It serves for comparison with the polled one (`cargo cost`), and for the emulator (`cargo test --test qemu`), where Embassy
 //! would wait for good for a clock that QEMU lacks. For a board of your own begin with `examples/embassy`. It has no autopilot
 //! link: a drone whose block has sites takes no part.
-//!
-//! | file | content |
-//! | --- | --- |
-//! | `main.rs` | entry point of this variant |
-//! | `executor.rs` | executor of one task, with its unsafe code |
-//! | `ports.rs` | asynchronous halves of an interrupt-driven port |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/grounded.rs"]
-#[allow(dead_code, reason = "what only polled ports call")]
-mod autopilot;
-#[cfg(target_os = "none")]
-#[path = "../stm32f405/board.rs"]
 mod board;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/chip.rs"]
 mod chip;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/clock.rs"]
 mod clock;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/drone.rs"]
 mod drone;
 #[cfg(target_os = "none")]
 mod executor;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/flash.rs"]
 mod flash;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/kept.rs"]
+#[allow(dead_code, reason = "what only polled ports call")]
+mod grounded;
+#[cfg(target_os = "none")]
 mod kept;
 #[cfg(target_os = "none")]
-#[cfg_attr(feature = "defmt", path = "../stm32f405/log.rs")]
-#[cfg_attr(not(feature = "defmt"), path = "../stm32f405/silent.rs")]
+#[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
 #[allow(dead_code, reason = "what only an autopilot logs")]
 mod log;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/port.rs"]
 mod port;
 #[cfg(target_os = "none")]
 mod ports;
 #[cfg(all(target_os = "none", feature = "upload"))]
-#[path = "../stm32f405/uploads.rs"]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
 #[cfg(target_os = "none")]
-#[path = "../stm32f405/wires.rs"]
 mod wires;
 
+#[cfg(target_os = "none")]
+use grounded as autopilot;
 #[cfg(target_os = "none")]
 use uav_relay_block as config;
 
@@ -84,7 +69,6 @@ fn fly(
 
     use embassy_futures::select::select;
     use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay};
-    use uav_relay::serial::byte_time;
 
     let time = executor::Time::new(clock);
     let drone::Drone {
@@ -99,7 +83,7 @@ fn fly(
     let (upstream, downstream) = (RefCell::new(upstream), RefCell::new(downstream));
     let link = |port| {
         let (rx, tx) = ports::halves(port, &time);
-        AsyncLink::new(rx, tx, byte_time(port::BAUD))
+        AsyncLink::new(rx, tx, port::BAUD)
     };
     let mut ports = AsyncPair::new(link(&upstream), link(&downstream));
     let mut keep = |relay: &uav_relay::Relay| views.keep(relay);
