@@ -107,7 +107,8 @@ impl Field {
 
     /// Creates a field that is a constant of the firmware; otherwise as [`Field::try_new`].
     ///
-    /// # Panics Panics on an invalid table: in a `const` this is a failed build, as intended. For values known at run time use
+    /// # Panics
+    /// Panics on an invalid table: in a `const` this is a failed build, as intended. For values known at run time use
     /// [`Field::try_new`].
     #[expect(
         clippy::panic,

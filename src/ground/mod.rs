@@ -64,7 +64,7 @@ const QUESTIONS: u8 = 3;
 /// let now = Instant::ZERO;
 /// ground.upload(now, upload)?;
 ///
-/// One turn of the main loop.
+/// // One turn of the main loop.
 /// ground.handle_bytes(received);
 /// ground.handle_timeout(now);
 /// let mut frame = [0; MAX_FRAME];
@@ -256,7 +256,7 @@ impl Ground {
                     match self.endpoint.check(now, &frame, &mut self.stats) {
                         Some(Checked::Fresh { .. }) => {
                             let message = Message::decode(frame.body);
-                            self.handle_message(header.sender, distance, message.ok());
+                            self.handle_message(header.sender, distance, message.as_ref().ok());
                         }
                         Some(Checked::Handshake { first: true }) => {
                             self.due |= self.is_under_way() || self.is_asking();
@@ -272,15 +272,15 @@ impl Ground {
     }
 
     /// Handles a message of relay `sender`; `None` if it is malformed.
-    fn handle_message(&mut self, sender: u16, distance: u16, message: Option<Message>) {
+    fn handle_message(&mut self, sender: u16, distance: u16, message: Option<&Message>) {
         let counter = match message {
             Some(Message::Hello(hello)) if hello.mission == self.base => {
-                self.answered(sender, distance, hello);
+                self.answered(sender, distance, *hello);
                 &mut self.stats.received
             }
             Some(Message::Hello(_)) => &mut self.stats.mission,
-            Some(Message::Offer { upload, answer }) if self.is_answer(&upload, answer) => {
-                self.told(sender, upload);
+            Some(Message::Offer { upload, answer }) if self.is_answer(upload, *answer) => {
+                self.told(sender, *upload);
                 &mut self.stats.received
             }
             _ => &mut self.stats.malformed,

@@ -199,8 +199,9 @@ impl Mission {
     /// # assert_eq!(MISSION.relays(), 0);
     /// ```
     ///
-    /// # Panics Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at
-    /// run time use [`Mission::try_new`].
+    /// # Panics
+    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at run time
+    /// use [`Mission::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"

@@ -154,7 +154,7 @@ impl Relay {
     /// use uav_relay::{Instant, Port, Settings};
     ///
     /// let mut relay = relay(Settings::default());
-    /// Bytes from a UART, split anywhere. Noise is counted and has no other effect.
+    /// // Bytes from a UART, split anywhere. Noise is counted and has no other effect.
     /// relay.handle_bytes(Instant::from_millis(5), Port::Upstream, &[0x11, 0x22, 0x33, 0]);
     /// assert_eq!(relay.stats().truncated, 1);
     /// ```
@@ -190,7 +190,7 @@ impl Relay {
     /// use uav_relay::Settings;
     ///
     /// let mut relay = relay(Settings::default());
-    /// Relay 1 starts by itself: call it for each portion of work until it has its position.
+    /// // Relay 1 starts by itself: call it for each portion of work until it has its position.
     /// while let (None, Some(due)) = (relay.setpoint(), relay.poll_timeout()) {
     ///     relay.handle_timeout(due);
     /// }

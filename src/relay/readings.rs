@@ -240,7 +240,7 @@ impl Relay {
     /// use uav_relay::{Instant, Settings};
     ///
     /// let mut relay = relay(Settings::default());
-    /// The pilot has taken control; later the autopilot follows setpoints again.
+    /// // The pilot has taken control; later the autopilot follows setpoints again.
     /// relay.handle_control(Instant::from_millis(1_000), false);
     /// relay.handle_control(Instant::from_millis(9_000), true);
     /// ```
