@@ -3,7 +3,7 @@
 //! The field does not depend on the altitude, and the outer hops are best at the lowest one, so free altitudes reduce to that.
 
 use uav_relay::planning::fleet::ranges;
-use uav_relay::planning::single::stochastic;
+use uav_relay::planning::single::without_interferer;
 
 use super::ask::{Ask, Number};
 use super::briefed::{Briefed, is_free};
@@ -38,7 +38,8 @@ fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);
     if relays == 1 {
-        let found = stochastic::best_place(&briefed.mission, profile).ok_or_else(nothing)?;
+        let found =
+            without_interferer::best_in_field(&briefed.mission, profile).ok_or_else(nothing)?;
         return Ok(briefed.plan(&[found.place], "Algorithm 3", true));
     }
     if !briefed.own.is_empty() {
