@@ -9,7 +9,7 @@ use super::tag;
 use crate::field::is_upsilon;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::{Ladder, TARGETS};
-use crate::optimiser::verdict::Verdict;
+use crate::optimiser::pass::Verdict;
 use crate::place::{CrossSection, Station};
 
 /// Sweep of targets along the chain, from one relay to the next.
