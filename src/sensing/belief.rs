@@ -9,11 +9,9 @@
 //! | too few positions, or no source | a source that contradicts the measurements | spread evenly |
 //! | too few positions, or no source | a source | keep the estimate |
 
-use super::ends::{judge, v_at_end};
+use super::doubt::{judge_ends, v_at_end};
 use super::fit::{Fit, FoundSource, Unfit, misfit};
-use super::level::{EndsOff, Level, Levels, is_level};
-use super::sums::Sums;
-use super::terms::{coefficients, expected_v, terms};
+use super::sums::{EndsOff, Level, Levels, Sums, coefficients, expected_v, is_level, terms};
 use super::track::Track;
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;
@@ -239,7 +237,7 @@ fn fitted(
     listen: &Listen,
 ) -> Result<(Fit, FoundSource), Unfit> {
     let mut fit = Fit::of(sums, listen.relative_error)?;
-    levels.off = judge(mission, &fit, levels, listen.relative_error);
+    levels.off = judge_ends(mission, &fit, levels, listen.relative_error);
     if levels.off.transmitter {
         levels.transmitter = Level::default();
     }

@@ -2,7 +2,7 @@
 
 use super::parts::{MessageError, Word, read, write};
 use super::tag;
-use crate::sensing::level::is_level;
+use crate::sensing::sums::is_level;
 
 pub(super) fn encode(mission: u16, power_w: f32, buffer: &mut [u8]) -> Option<usize> {
     write(&(tag::LEVEL, Word::new(mission), power_w), buffer)
