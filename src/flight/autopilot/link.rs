@@ -12,14 +12,12 @@ use super::state::{Observed, State};
 use super::streams::Streams;
 use super::target::Target;
 use super::trust::Trust;
-use super::vehicle::RadioNoise;
-use super::vehicle::{Position, Vehicle, VehicleUpdate};
+use super::vehicle::{Position, RadioNoise, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
-use crate::flight::mavlink::incoming::Incoming;
+use crate::flight::mavlink::incoming::{Counters, Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing};
-use crate::flight::mavlink::parser::{Counters, Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 use crate::geodetic::Geodetic;
