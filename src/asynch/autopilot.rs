@@ -17,11 +17,11 @@ use crate::event::Event;
 use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 #[cfg(feature = "upload")]
 use crate::flight::axis::Axis;
+use crate::geodetic::Sites;
 #[cfg(feature = "upload")]
 use crate::relay::Relay;
 use crate::serial::READ_LIMIT;
 use crate::side::Side;
-use crate::sites::Sites;
 use crate::time::{Duration, Instant};
 
 /// So long a port that has failed, or is full, is left alone.

@@ -45,9 +45,8 @@
 //! view, its lease and its proposal along, as after a restart with the record of its votes; no relay takes part in a pulse before it has
 //! agreed on its place in the view; and a decision that does not follow the views that a relay knows makes it ask for a later one.
 
-use crate::jitter::Jitter;
 use crate::settings::{Settings, Wiring};
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 
 /// What a frame under this relay's own number says of its sender.

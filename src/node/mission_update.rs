@@ -30,20 +30,18 @@ use super::context::Member;
 #[cfg(feature = "upload")]
 use super::timing::earliest;
 #[cfg(feature = "upload")]
-use crate::jitter::Jitter;
-#[cfg(feature = "upload")]
-use crate::line::LineError;
+use crate::geodetic::{LineError, Sites};
 use crate::mission::Mission;
 #[cfg(feature = "upload")]
 use crate::settings::Settings;
 #[cfg(feature = "upload")]
 use crate::side::Side;
 use crate::time::Instant;
+#[cfg(feature = "upload")]
+use crate::time::Jitter;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
-use crate::wire::upload::{Upload, UploadError};
-#[cfg(feature = "upload")]
-use crate::{line, sites::Sites};
+use crate::wire::upload::{Upload, UploadError, check_line};
 
 /// Whether this crate was built to take a newer mission in flight.
 const UPLOAD: bool = cfg!(feature = "upload");
@@ -357,7 +355,7 @@ fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
         .map_err(UploadError::Line)?;
     match upload.sites() {
         // Every relay checks that, whether it flies along a line on earth or not: all hold it, or none does.
-        Some(sites) => line::check(sites, config.distance_m).map_err(UploadError::Line),
+        Some(sites) => check_line(sites, config.distance_m).map_err(UploadError::Line),
         None if member.settings.sited && is_other => Err(UploadError::Line(LineError::Distance)),
         None => Ok(()),
     }

@@ -16,8 +16,7 @@
 //! | `sums` | the terms of a position; the levels of the transmitter and the receiver; the sums that a pass collects |
 //! | `listener` | the measurements of one relay by position, with fading |
 //! | `fit` | the source that fits the sums, or the closest one, its uncertainty, and the reasons for no source |
-//! | [`belief`] | the chain's interference estimate, and the rules for its replacement |
-//! | `track` | the velocity of a moving interferer |
+//! | [`belief`] | the chain's interference estimate, and the rules for its replacement; the velocity of a moving interferer |
 //! | `doubt` | the relay whose measurements do not fit those of the others; the same for the transmitter and the receiver |
 //!
 //! Errors of measured powers are assumed to be *relative*: the mean of K independent samples has an error of 1 / sqrt(K), and
@@ -37,6 +36,5 @@ pub(crate) mod sums;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod sums;
-pub(crate) mod track;
 
 pub use fit::Unfit;

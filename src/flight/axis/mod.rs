@@ -30,9 +30,8 @@
 
 mod vector;
 
-use crate::geodetic::{Geodetic, to_integer};
+use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
-use crate::sites::Sites;
 use vector::{UNIT, Vector, radius, turned};
 
 #[cfg(not(feature = "internals"))]

@@ -1,9 +1,8 @@
 //! When a relay asks for a new view: at once at first, then less and less often.
 
-use crate::jitter::Jitter;
 use crate::node::timing::PAUSE;
 use crate::settings::Settings;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, Jitter};
 
 /// Whether this relay asks for a new view, and when it asks next.
 #[derive(Clone, Debug)]

@@ -1,7 +1,6 @@
 //! Interference level at an end of the chain, reported by the ground station.
 
-use super::parts::{MessageError, Word, read, write};
-use super::tag;
+use super::parts::{MessageError, Word, read, tag, write};
 use crate::sensing::sums::is_level;
 
 pub(super) fn encode(mission: u16, power_w: f32, buffer: &mut [u8]) -> Option<usize> {
