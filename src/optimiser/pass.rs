@@ -9,7 +9,7 @@
 //! On the way back each relay has a position, and [`stand`](Link::stand) returns the required position of the relay before it on
 //! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
-//! The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A [`Walk`] is a whole chain
+//! The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole chain
 //! for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
 
 use super::PerTarget;

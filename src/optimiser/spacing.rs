@@ -33,7 +33,7 @@
 //! receiver at X - w: to climb before it comes near, or to leave the minimum step. `at_mixed_altitudes` and
 //! `with_a_separation_that_binds` in `host-tests/tests/exact.rs` compare this with a search over all positions.
 //!
-//! For the joint method [`Hop::stretched`] is the reach as a differentiable function.
+//! For the joint method `Hop::stretched` is the reach as a differentiable function.
 //!
 //! With receiver noise the reach has no closed form: `noise` searches for it, starting from this one.
 //!

@@ -1,6 +1,6 @@
 //! Sums that a pass collects along the chain: eighteen numbers that contain all a fit needs of the measurements.
 //!
-//! [`Terms`] are those of which 1 / I is a linear combination; a source has a coefficient for each. A [`Level`] is the interference
+//! `Terms` are those of which 1 / I is a linear combination; a source has a coefficient for each. A [`Level`] is the interference
 //! at an end of the chain, on the ground, within the measurable range of powers.
 
 #![cfg_attr(

@@ -291,7 +291,7 @@ impl Vehicle {
         covered.extend(payload);
         self.number = self.number.wrapping_add(1);
         let known = frame::find_known(0).unwrap();
-        let checksum = uav_relay::flight::mavlink::frame::checksum(&covered, known);
+        let checksum = frame::checksum(&covered, known);
         let mut frame = vec![0xFD];
         frame.extend(covered);
         frame.extend(checksum.to_le_bytes());

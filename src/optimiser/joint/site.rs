@@ -411,9 +411,9 @@ const LITTLE: f32 = 0.999_97;
 const END_HALVINGS: u8 = 24;
 
 /// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice. The optimum is straight away
-/// from the interferer, at t times its distance from Tx. With U and B the squared distances along that line and across it, s = B
-/// + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with
-/// noise there is one optimum, closer to Tx.
+/// from the interferer, at t times its distance from Tx. With U and B the squared distances along that line and across it,
+/// s = B + (1 + t)^2 U + h^2, and the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So
+/// with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
