@@ -90,7 +90,7 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
 /// Interference of v = 1, W: the middle of the measurable range, so that no square of a v leaves an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
-/// Range of v for the measurable range, [`MEASURED_W`](super::sums::MEASURED_W).
+/// Range of v for the measurable range, [`MEASURED_W`].
 const V: (f32, f32) = (1e-18, 1e18);
 
 /// Converts an expected v to f32; `None` outside of the measurable range.

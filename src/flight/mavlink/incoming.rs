@@ -134,7 +134,7 @@ pub enum Incoming {
         /// True while the vehicle is outside of its geofence.
         is_breached: bool,
     },
-    /// RADIO_STATUS of a SiK radio, in the units of [`sik`](super::frame); 255 is unknown.
+    /// RADIO_STATUS of a SiK radio, in the units of [`noise_w`]; 255 is unknown.
     RadioStatus {
         /// Signal strength of the last frame.
         rssi: u8,
