@@ -1,7 +1,7 @@
 //! Events for the firmware. An event is a flag, and for some kinds the node it concerns. A firmware that does not poll loses only
 //! repetitions, and of two nodes at one side the earlier one.
 
-use crate::line::LineError;
+use crate::geodetic::LineError;
 use crate::side::Side;
 
 /// Event that a firmware may react to. The state behind it is read from the relay.

@@ -1,4 +1,7 @@
 //! Geodetic positions as integers, in the units of MAVLink.
+//!
+//! [`Sites`] are those of transmitter and receiver, which define the mission's line on earth; a [`LineError`] is the reason why a
+//! mission does not fit that line.
 
 /// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
@@ -48,6 +51,89 @@ impl Geodetic {
 pub(crate) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
+
+/// Ground positions of both ends of the line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sites {
+    /// Position of the transmitter.
+    pub tx: Geodetic,
+    /// Position of the receiver.
+    pub rx: Geodetic,
+}
+
+/// Length of the encoded sites, bytes.
+pub(crate) const SITES_LENGTH: usize = 24;
+
+impl Sites {
+    /// Encodes latitude, longitude and height of the transmitter, then of the receiver, as four little-endian bytes each.
+    pub(crate) fn to_bytes(self) -> [u8; SITES_LENGTH] {
+        let Self { tx, rx } = self;
+        let numbers = [
+            tx.lat_e7, tx.lon_e7, tx.amsl_mm, rx.lat_e7, rx.lon_e7, rx.amsl_mm,
+        ];
+        let mut bytes = [0; SITES_LENGTH];
+        for (place, number) in bytes.chunks_exact_mut(4).zip(numbers) {
+            place.copy_from_slice(&number.to_le_bytes());
+        }
+        bytes
+    }
+
+    #[cfg(feature = "upload")]
+    pub(crate) fn from_bytes(bytes: [u8; SITES_LENGTH]) -> Self {
+        let mut numbers = [0; SITES_LENGTH / 4];
+        for (number, place) in numbers.iter_mut().zip(bytes.as_chunks().0) {
+            *number = i32::from_le_bytes(*place);
+        }
+        let [tx_lat, tx_lon, tx_amsl, rx_lat, rx_lon, rx_amsl] = numbers;
+        let site = |lat_e7, lon_e7, amsl_mm| Geodetic {
+            lat_e7,
+            lon_e7,
+            amsl_mm,
+        };
+        Self {
+            tx: site(tx_lat, tx_lon, tx_amsl),
+            rx: site(rx_lat, rx_lon, rx_amsl),
+        }
+    }
+
+    #[cfg(feature = "upload")]
+    pub(crate) const fn are_valid(self) -> bool {
+        self.tx.is_valid() && self.rx.is_valid()
+    }
+}
+
+/// Reason why a newer mission does not fit its line on earth or the relay's own geofence.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum LineError {
+    /// The mission's distance differs from that between its sites. Or it has no sites, and its distance differs from the
+    /// configured one at a relay with `Settings::sited`.
+    Distance,
+    /// The mission's sites are less than 10 m or more than 100 km apart.
+    Sites,
+    /// The mission's altitudes exceed the relay's own geofence, [`GuardConfig::fence`](crate::guard::config::GuardConfig).
+    Altitude,
+    /// The mission's lateral band exceeds the geofence.
+    Lateral,
+    /// The mission's distance exceeds the geofence, with or without sites of its own.
+    Length,
+}
+
+impl core::fmt::Display for LineError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Distance => "its distance must be that between its sites; without sites of its own, between those that the relays were loaded with",
+            Self::Sites => "its sites must be on earth, 10 m to 100 km apart",
+            Self::Altitude => "its altitudes must be within the relay's own geofence",
+            Self::Lateral => "its room to the side must be within the relay's own geofence",
+            Self::Length => "its distance must be within the relay's own geofence",
+        })
+    }
+}
+
+impl core::error::Error for LineError {}
 
 #[cfg(test)]
 mod tests {

@@ -20,8 +20,6 @@ mod guard;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod guard;
-mod jitter;
-mod line;
 pub mod mission;
 mod node;
 #[cfg(not(feature = "internals"))]
@@ -52,7 +50,6 @@ mod sir;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod sir;
-mod sites;
 mod stats;
 pub mod time;
 mod view;
@@ -67,12 +64,11 @@ pub use channel::Channel;
 pub use channel_load::{ChannelFull, ChannelLoad};
 pub use event::Event;
 pub use field::{Field, FieldPoint};
-pub use geodetic::Geodetic;
+pub use geodetic::{Geodetic, LineError, Sites};
 #[cfg(feature = "upload")]
 pub use ground::{FlownMission, Ground, Progress};
 pub use guard::HoldReason;
 pub use guard::config::{Geofence, GuardConfig};
-pub use line::LineError;
 pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::round::state::Phase;
 pub use node::sample::Sample;
@@ -83,14 +79,13 @@ pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
 pub use settings::{Adjust, Identity, Listen, Measure, Method, Settings, SetupError, Wiring};
 pub use side::Side;
-pub use sites::Sites;
 pub use stats::Stats;
 pub use time::{Duration, Instant};
 pub use view::{View, ViewId};
+pub use wire::CRC_32C;
 pub use wire::auth::Auth;
 #[cfg(feature = "auth")]
 pub use wire::auth::Key;
-pub use wire::crc::CRC_32C;
 pub use wire::digest::MissionId;
 pub use wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]

@@ -7,7 +7,27 @@
 //! The SIR of a chain is that of its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
 //! `host-tests/tests/placement/main.rs`.
-//! `host-tests/tests/placement/main.rs`.
+//!
+//! # Extrema of SIR_1
+//!
+//! [`first_hop_turn`] returns those along x >= 0 at one altitude: the paper's Lemma 2, for any interferer position and with noise.
+//!
+//! With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of SIR_1 = A s / ((x^2 + h^2)(1 + nu s)) has the sign of
+//!
+//! ```text
+//! X x^2 - q x - X h^2 - nu x s^2
+//! ```
+//!
+//! Without noise this is a quadratic with the roots (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X, one of which is beyond Tx. With noise:
+//!
+//! - X < 0: the expression falls with x from -X h^2 > 0 at Tx, so SIR_1 still has a single maximum, closer to Tx.
+//! - X = 0: the expression is negative.
+//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2, which is concave because s is convex and not negative, and so
+//!   is s^2. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only falls. No root is before the noise-free
+//!   minimum, where the sum of the first three terms is negative.
+//!
+//! For X >= 0 the largest SIR_1 in [0, D] is at x = 0, as without noise: anywhere else s / (x^2 + h^2) is smaller. Where s is
+//! larger, 1 / (1 + nu s) is smaller too; where s is smaller, s / (1 + nu s) is smaller and x^2 + h^2 is larger.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -20,13 +40,10 @@
     )
 )]
 
-mod turn;
-
-pub use turn::{Extremum, first_hop_ceiling, first_hop_turn};
-
-use crate::mission::Mission;
+use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
+use crate::root::sqrt;
 
 /// Returns the inverse interference at `at`, the one term of a hop's SIR that depends on the kind of interference.
 ///
@@ -99,4 +116,196 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
 
 pub(crate) const fn square(x: f32) -> f32 {
     x * x
+}
+
+/// Bisection steps in an interval in which the slope changes its sign.
+const HALVINGS: u8 = 32;
+
+/// Doublings of x at most until a falling function is below 0.
+const DOUBLINGS: u8 = 64;
+
+/// Shape of SIR_1 along x >= 0 at one altitude.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Extremum {
+    /// SIR_1 falls up to this x, m (the paper's Psi^x), and rises beyond: the interferer is ahead of Tx (X > 0).
+    Valley(f32),
+    /// SIR_1 falls up to the first x, m, rises up to the second and falls beyond: X > 0, with noise.
+    ValleyAndHill(f32, f32),
+    /// SIR_1 rises up to this x, m, and falls beyond: the interferer is behind Tx (X < 0).
+    Hill(f32),
+    /// SIR_1 falls with x: X = 0, or X > 0 and the noise exceeds the interference.
+    Falls,
+    /// SIR_1 is constant: the interferer is at Tx (X = Y = 0), and there is no noise.
+    Level,
+}
+
+/// Returns the extrema of SIR_1 along x for a relay at `altitude_m`.
+///
+/// Without noise they are roots of a quadratic, written without cancellation for X < 0; with noise they take at most 190
+/// evaluations of the slope. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
+pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> Extremum {
+    let x = interferer.x_m;
+    let q = square(x) + square(interferer.y_m);
+    let root = sqrt(square(q) + square(2.0 * x * altitude_m));
+    let slope = Slope {
+        x,
+        q,
+        squared: square(altitude_m),
+        aside: square(interferer.y_m) + square(altitude_m),
+        noise: mission.noise_at_a_metre(),
+    };
+    if x > 0.0 {
+        slope.turns((q + root) / (2.0 * x))
+    } else if x < 0.0 {
+        slope.hill(-2.0 * x * square(altitude_m) / (q + root))
+    } else if q > 0.0 || slope.noise > 0.0 {
+        Extremum::Falls
+    } else {
+        Extremum::Level
+    }
+}
+
+/// Sign of the slope of SIR_1 along x.
+struct Slope {
+    x: f32,
+    q: f32,
+    /// h^2, m^2.
+    squared: f32,
+    /// Y^2 + h^2, m^2.
+    aside: f32,
+    /// nu, 1/m^2.
+    noise: f32,
+}
+
+impl Slope {
+    /// Returns true if phi at `at` is above 0.
+    fn sign(&self, at: f32) -> f32 {
+        let s = square(at - self.x) + self.aside;
+        self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s
+    }
+
+    /// Returns half the derivative of phi, for X > 0; it falls beyond X.
+    fn bend(&self, at: f32) -> f32 {
+        let s = square(at - self.x) + self.aside;
+        0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
+    }
+
+    /// Returns the maximum for X < 0; `peak` is the noise-free maximum.
+    fn hill(&self, peak: f32) -> Extremum {
+        if !(self.noise > 0.0) {
+            return Extremum::Hill(peak);
+        }
+        Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
+    }
+
+    /// Returns the extrema for X > 0; `bottom` is the noise-free minimum.
+    fn turns(&self, bottom: f32) -> Extremum {
+        if !(self.noise > 0.0) {
+            return Extremum::Valley(bottom);
+        }
+        let rises = |at: f32| self.bend(at) > 0.0;
+        if !rises(bottom) {
+            return Extremum::Falls;
+        }
+        let top = last(bottom, beyond(bottom, rises), rises);
+        let above = |at: f32| self.sign(at) > 0.0;
+        if !above(top) {
+            return Extremum::Falls;
+        }
+        let valley = last(bottom, top, |at| !above(at));
+        Extremum::ValleyAndHill(valley, last(top, beyond(top, above), above))
+    }
+}
+
+/// Returns the last x in [`low`, `high`] at which `holds` is true; it is true at `low` and changes once.
+fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
+    let (mut low, mut high) = (low, high);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
+    let mut at = 2.0 * from;
+    for _ in 0..DOUBLINGS {
+        if !holds(at) {
+            break;
+        }
+        at *= 2.0;
+    }
+    at
+}
+
+/// Returns the largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
+///
+/// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of [`first_hop_turn`] for X
+/// < 0, with noise as well. In a field it is an upper bound: the largest Upsilon right above the transmitter. It is larger at
+/// lower altitudes.
+pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
+    let Some(interferer) = mission.interferer() else {
+        return mission.tx_gain().value() / square(altitude_m);
+    };
+    let x_m = match first_hop_turn(mission, interferer, altitude_m) {
+        Extremum::Hill(peak) => peak.min(mission.config().distance_m),
+        _ => 0.0,
+    };
+    Sender::transmitter(mission).sir_at(mission, 0.0, Placement::on_line(x_m, altitude_m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Placement, Sender, first_hop_ceiling};
+    use crate::mission::tests::paper;
+    use crate::mission::{Interference, Interferer, Mission, MissionConfig};
+
+    #[test]
+    fn the_ceiling_of_the_first_hop_is_never_below_what_a_scan_finds() {
+        for (x_m, y_m, altitude_m, noise_w) in [
+            (500.0, 400.0, 20.0, 0.0),
+            (-10.0, 0.0, 50.0, 0.0),
+            (-300.0, 200.0, 80.0, 0.0),
+            (-1e5, 3.0, 900.0, 0.0),
+            (500.0, 400.0, 20.0, 1e-8),
+            (0.0, 0.0, 20.0, 1e-5),
+            (-10.0, 0.0, 50.0, 1e-6),
+            (-10.0, 0.0, 50.0, 1e-1),
+            (-300.0, 200.0, 80.0, 1e-7),
+            (-1e5, 3.0, 900.0, 1e-12),
+        ] {
+            let interferer = Interferer {
+                power_w: 80.0,
+                x_m,
+                y_m,
+            };
+            let mission = Mission::try_new(MissionConfig {
+                interference: Interference::Source(interferer),
+                noise_w,
+                ..paper(1)
+            })
+            .unwrap();
+            let tx = Sender::transmitter(&mission);
+            let best = (0..=10_000_u16)
+                .map(|i| {
+                    tx.sir_at(
+                        &mission,
+                        0.0,
+                        Placement::on_line(f32::from(i) * 0.1, altitude_m),
+                    )
+                })
+                .fold(0.0, f32::max);
+            let ceiling = first_hop_ceiling(&mission, altitude_m);
+            assert!(
+                (ceiling / best - 1.0).abs() < 1e-4,
+                "{x_m} {y_m} {altitude_m} {noise_w}: {ceiling} against {best}"
+            );
+            assert!(ceiling >= best * (1.0 - 1e-6));
+        }
+    }
 }

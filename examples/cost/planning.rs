@@ -5,7 +5,7 @@ use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::planning::fleet::Fewest;
-use uav_relay::planning::single::{free, given_altitude, given_x};
+use uav_relay::planning::single::theorems;
 
 use super::counter::instructions;
 use super::missions::{HIGH, MISSION, WIDE};
@@ -14,9 +14,9 @@ use super::missions::{HIGH, MISSION, WIDE};
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
-    let first = instructions(|| given_altitude::best_place(mission, common));
-    let second = instructions(|| given_x::best_place(mission, x_m, common.power_w));
-    let third = instructions(|| free::best_place(mission, common.power_w));
+    let first = instructions(|| theorems::best_at_altitude(mission, common));
+    let second = instructions(|| theorems::best_at_x(mission, x_m, common.power_w));
+    let third = instructions(|| theorems::best_free(mission, common.power_w));
     hprintln!("theorem_1 {}", first);
     hprintln!("theorem_2 {}", second);
     hprintln!("theorem_3 {}", third);

@@ -1,6 +1,6 @@
 //! Answers of the golden image, byte by byte the same on the target and on the host.
 
-use uav_relay::optimiser::verdict::Verdict;
+use uav_relay::optimiser::pass::Verdict;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Answer, Message, MessageError};

@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Mission;
-use uav_relay::planning::single::stochastic::{best_place, stepped};
+use uav_relay::planning::single::without_interferer::{best_in_field, stepped};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_oracle::reference::Station;
@@ -55,7 +55,7 @@ fn the_best_place_is_no_worse_than_a_dense_search() {
     for _ in 0..500 {
         let link = random_link(&mut rng);
         let mission = mission(&link);
-        let found = best_place(&mission, mission.config().common).unwrap();
+        let found = best_in_field(&mission, mission.config().common).unwrap();
         let sir = link.chain_sir(&[f64::from(found.place.x_m)]);
         off = off.max((f64::from(found.sir) / sir - 1.0).abs());
         let (_, best) = link.single_optimum(4_000).unwrap();
@@ -74,7 +74,7 @@ fn the_algorithm_finds_what_the_reference_finds() {
         let link = random_link(&mut rng);
         let mission = mission(&link);
         let common = mission.config().common;
-        let best = best_place(&mission, common).unwrap();
+        let best = best_in_field(&mission, common).unwrap();
         let epsilon = (link.ceiling() / 3000.0) as f32;
         let found = stepped(&mission, common, epsilon, 10_000_000).unwrap();
         assert!(found.sir <= best.sir * (1.0 + 1e-5));
@@ -99,7 +99,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
     let steep = link(100.0, 10.0, 10.0, 1.0, vec![(89.99, 0.1), (90.0, 100.0)]);
     let mission = mission(&steep);
     let common = mission.config().common;
-    let best = best_place(&mission, common).unwrap();
+    let best = best_in_field(&mission, common).unwrap();
     assert!((best.sir / 0.121_95 - 1.0).abs() < 1e-3, "{best:?}");
     let found = stepped(&mission, common, 1e-3, 10_000_000).unwrap();
     assert!((found.sir / 0.121_95 - 1.0).abs() < 0.02, "{found:?}");
@@ -114,7 +114,7 @@ fn a_constant_field_is_as_a_separate_program_has_it() {
     let found = stepped(&mission, common, 1e-4, 10_000_000).unwrap();
     assert!((found.sir - 0.0065).abs() < 1.01e-4, "{found:?}");
     assert!((found.place.x_m - 77.298).abs() < 0.5, "{found:?}");
-    let best = best_place(&mission, common).unwrap();
+    let best = best_in_field(&mission, common).unwrap();
     let (_, exact) = even.single_optimum(100_000).unwrap();
     assert!((f64::from(best.sir) / exact - 1.0).abs() < 1e-5);
     assert!(best.sir >= found.sir);

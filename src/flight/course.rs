@@ -2,8 +2,8 @@
 
 use super::autopilot::carrot::Pace;
 use super::axis::{Axis, AxisError};
+use crate::geodetic::Sites;
 use crate::mission::Mission;
-use crate::sites::Sites;
 
 /// Line and speed that an autopilot uses.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -20,7 +20,7 @@ use levels::Levels;
 
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
-use crate::sensing::level::is_level;
+use crate::sensing::sums::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};

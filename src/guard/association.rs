@@ -8,9 +8,9 @@
 use super::config::GuardConfig;
 use super::fence::{Fence, HoldReason};
 use super::own::Own;
-use crate::jitter::Jitter;
 use crate::place::Placement;
 use crate::side::Side;
+use crate::time::Jitter;
 
 /// Number of messages of another association in a row that show a new one, not late messages of an old one.
 const STRAYS: u8 = 3;

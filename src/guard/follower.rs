@@ -3,8 +3,8 @@
 use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
 use super::own::Own;
-use crate::jitter::Jitter;
 use crate::side::Side;
+use crate::time::Jitter;
 
 /// Maximum forward distance of fence numbers plus one; a fence is newer than another one below it.
 const AHEAD: u16 = 0x8000;

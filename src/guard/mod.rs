@@ -12,8 +12,7 @@
 //! | file | content |
 //! | --- | --- |
 //! | [`config`] | geofence of setpoints, and other settings |
-//! | `own` | the relay's own setpoint and position across the line |
-//! | `reachable` | the interval along x in which the relay may be, by its reports and setpoints |
+//! | `own` | the relay's own setpoint and position across the line, and the interval along x in which it may be |
 //! | `association` | the incarnation of the neighbour that a message belongs to, and requests that relays forward |
 //! | `owner` | the fence downstream, which this relay places |
 //! | `follower` | the fence upstream, which the neighbour places |
@@ -100,24 +99,21 @@ mod fence;
 mod follower;
 mod own;
 mod owner;
-mod reachable;
 #[cfg(test)]
 mod tests;
 
 use crate::place::Placement;
 use crate::side::Side;
 use crate::stats::bump;
-use crate::time::Instant;
+use crate::time::{Instant, Jitter};
 
-use crate::jitter::Jitter;
 use association::Association;
 use config::{Geofence, GuardConfig};
 use fence::is_place;
 pub use fence::{Fence, HoldReason};
 use follower::FenceFollower;
-use own::Own;
+use own::{Own, ReachableInterval};
 use owner::FenceOwner;
-use reachable::ReachableInterval;
 
 /// Guard of one relay: computes safe setpoints on the way to the agreed position.
 ///

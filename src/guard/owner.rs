@@ -3,9 +3,9 @@
 use super::association::{Association, KeepOut};
 use super::fence::{Fence, HoldReason};
 use super::own::Own;
-use crate::jitter::Jitter;
 use crate::place::CrossSection;
 use crate::side::Side;
+use crate::time::Jitter;
 
 /// Owner's state of a fence: the one toward Rx.
 #[derive(Clone, Copy, Debug)]

@@ -28,8 +28,7 @@
 //! Replies are not acknowledged. On a lossy channel a reply is sent again, unasked, as many times as its number of hops has binary digits:
 //! a request for it would cost the previous relay its whole wait.
 
-use crate::jitter::Jitter;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, Jitter};
 
 /// Factor on the wait for a pass on which relays compute: its frames are twice as long, and each relay may take thirty work portions.
 const SLOW: u32 = 4;

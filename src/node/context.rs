@@ -4,15 +4,15 @@ use super::circulation::Path;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
 #[cfg(feature = "upload")]
-use crate::guard::config::Geofence;
+use crate::geodetic::LineError;
+use crate::geodetic::Sites;
 #[cfg(feature = "upload")]
-use crate::line::LineError;
+use crate::guard::config::Geofence;
 #[cfg(feature = "upload")]
 use crate::mission::MissionConfig;
 use crate::mission::{Band, Heading, Interference, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
-use crate::sites::Sites;
 use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, between, digest};

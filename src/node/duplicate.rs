@@ -45,9 +45,8 @@
 //! before it has agreed on its position in the view; and a decision that does not follow the views known to a relay makes it
 //! request a later one.
 
-use crate::jitter::Jitter;
 use crate::settings::{Settings, Wiring};
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 
 /// Sender of a frame that bears this relay's own index.

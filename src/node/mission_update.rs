@@ -31,20 +31,18 @@ use super::context::Member;
 #[cfg(feature = "upload")]
 use super::timing::earliest;
 #[cfg(feature = "upload")]
-use crate::jitter::Jitter;
-#[cfg(feature = "upload")]
-use crate::line::LineError;
+use crate::geodetic::{LineError, Sites};
 use crate::mission::Mission;
 #[cfg(feature = "upload")]
 use crate::settings::Settings;
 #[cfg(feature = "upload")]
 use crate::side::Side;
 use crate::time::Instant;
+#[cfg(feature = "upload")]
+use crate::time::Jitter;
 use crate::wire::digest::MissionId;
 #[cfg(feature = "upload")]
-use crate::wire::upload::{Upload, UploadError};
-#[cfg(feature = "upload")]
-use crate::{line, sites::Sites};
+use crate::wire::upload::{Upload, UploadError, check_line};
 
 /// True with the feature `upload`; without it uploads are not accepted.
 const UPLOAD: bool = cfg!(feature = "upload");
@@ -354,7 +352,7 @@ fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
         .map_err(UploadError::Line)?;
     match upload.sites() {
         // Relays without a line on earth check it too, so that either all relays store the mission or none.
-        Some(sites) => line::check(sites, config.distance_m).map_err(UploadError::Line),
+        Some(sites) => check_line(sites, config.distance_m).map_err(UploadError::Line),
         None if member.settings.sited && is_other => Err(UploadError::Line(LineError::Distance)),
         None => Ok(()),
     }

@@ -3,8 +3,7 @@
 //! | purpose | files |
 //! | --- | --- |
 //! | reach of one hop for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
-//! | pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass), [`verdict`]; [`search`] selects the next targets;
-//! [`plan`] runs all of it for a whole chain without messages |
+//! | pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass); [`search`] selects the next targets; [`plan`] runs all of it for a whole chain without messages |
 //! | joint optimum of x, y and altitude | [`joint`] |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
 //!
@@ -29,8 +28,6 @@ pub mod plan;
 pub mod retreat;
 pub mod search;
 pub mod spacing;
-pub mod verdict;
-pub(crate) mod walk;
 
 /// Numbers for the targets of a ladder: reaches, slacks or the targets themselves.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

@@ -5,9 +5,8 @@
 
 use super::PerTarget;
 use super::ladder::Ladder;
-use super::pass::{self, Behind, Link, origins};
+use super::pass::{self, Behind, Link, Walk, origins};
 use super::search::{Infeasible, Schedule, Search};
-use super::walk::Walk;
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 

@@ -15,7 +15,7 @@
 use core::ops::Range;
 
 use super::ladder::Ladder;
-use super::verdict::{Verdict, met};
+use super::pass::{Verdict, met};
 use crate::mission::{Heading, Mission, MissionConfig, Profile};
 use crate::place::Placement;
 use crate::root::sqrt;

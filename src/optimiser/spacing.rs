@@ -33,12 +33,13 @@
 //! receiver at X - w: to climb before it comes near, or to leave the minimum step. `at_mixed_altitudes` and
 //! `with_a_separation_that_binds` in `host-tests/tests/exact.rs` compare this with a search over all positions.
 //!
+//! For the joint method `Hop::stretched` is the reach as a differentiable function.
+//!
 //! With receiver noise the reach has no closed form: `noise` searches for it, starting from this one.
 //!
 //! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
 
 mod noise;
-mod stretched;
 
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
@@ -281,6 +282,56 @@ impl Hop {
         let [own, sender] = self.gathered_m;
         let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
         gathered.flatten().or_else(|| at(near))
+    }
+
+    /// Returns the reach without a minimum step, as a smooth function of all parameters; `None` if there is none. It is before
+    /// `from_m` if the distance across the line is longer than the hop may be.
+    pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
+        let place = self.stretched_freely(target, from_m)?;
+        if !(self.noise > 0.0) {
+            return Some(place);
+        }
+        let hop = self.noisy(target, from_m);
+        let most = place - from_m;
+        if place >= self.end_m && hop.is_met(most) {
+            return Some(place);
+        }
+        let heard = hop.through_noise()?;
+        // Below A the target may be met on two intervals, the one before the sender being no hop; above A on one.
+        let least = if hop.excess > 0.0 { -heard } else { 0.0 };
+        Some(from_m + hop.last(least, heard.min(most))?)
+    }
+
+    fn stretched_freely(&self, target: f32, from_m: f32) -> Option<f32> {
+        let ratio = self.sender.gain.ratio(target);
+        if !(ratio <= MOST_RATIO) {
+            return None;
+        }
+        let u = self.interferer_x_m - from_m;
+        let e = self.sender.gain.excess(target);
+        let h = self.base - e * self.across_squared;
+        let discriminant = ratio * square(u) + e * h;
+        if !(e > 0.0) {
+            let room = self.end_m - from_m;
+            let all = square(u - room) + self.aside_squared
+                >= ratio * (square(room) + self.across_squared);
+            if all || (discriminant < 0.0 && u >= 0.0) {
+                return Some(self.end_m.max(from_m));
+            }
+            if !(u >= 0.0 && square(u) + h >= 0.0) {
+                return None;
+            }
+        }
+        if discriminant < 0.0 {
+            return None;
+        }
+        let r = sqrt_in_place(discriminant);
+        let d = if u >= 0.0 {
+            (square(u) + h) / (u + r)
+        } else {
+            (r - u) / e
+        };
+        Some((from_m + d).min(self.end_m.max(from_m)))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::facade::Relay;
 use crate::field::estimate::Estimate;
+use crate::geodetic::Sites;
 use crate::guard::HoldReason;
 use crate::mission::{Interference, Mission, Profile};
 use crate::node::round::state::Phase;
@@ -10,7 +11,6 @@ use crate::place::Placement;
 use crate::sensing::belief::Told;
 use crate::sensing::fit::Unfit;
 use crate::side::Side;
-use crate::sites::Sites;
 use crate::stats::Stats;
 use crate::time::Instant;
 use crate::view::ViewId;

@@ -1,7 +1,6 @@
 //! Measurements of one relay: the average at its current position, and faded sums of the earlier positions.
 
-use super::sums::Sums;
-use super::terms::{Terms, terms};
+use super::sums::{Sums, Terms, terms};
 use crate::place::Placement;
 use crate::sir::square;
 use crate::time::{Duration, Instant};

@@ -13,16 +13,11 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `terms` | the four terms of a position, and the coefficients of a source |
-//! | `sums` | the sums that a pass collects along the chain |
+//! | `sums` | the terms of a position; the levels of the transmitter and the receiver; the sums that a pass collects |
 //! | `listener` | the measurements of one relay by position, with fading |
-//! | `level` | the interference levels of the transmitter and the receiver, on the ground |
-//! | `factor` | the solution of a 4 x 4 system |
 //! | `fit` | the source that fits the sums, or the closest one, its uncertainty, and the reasons for no source |
-//! | [`belief`] | the chain's interference estimate, and the rules for its replacement |
-//! | `track` | the velocity of a moving interferer |
-//! | `doubt` | the relay whose measurements do not fit those of the others |
-//! | `ends` | the same for the transmitter and the receiver |
+//! | [`belief`] | the chain's interference estimate, and the rules for its replacement; the velocity of a moving interferer |
+//! | `doubt` | the relay whose measurements do not fit those of the others; the same for the transmitter and the receiver |
 //!
 //! Errors of measured powers are assumed to be *relative*: the mean of K independent samples has an error of 1 / sqrt(K), and
 //! each position has an error of its own (shadowing). So each position counts once, with the weight 1 / v^2, however long a relay
@@ -30,25 +25,16 @@
 
 pub mod belief;
 pub(crate) mod doubt;
-mod ends;
-mod factor;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod fit;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod fit;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod level;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod level;
 pub(crate) mod listener;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod sums;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod sums;
-pub(crate) mod terms;
-pub(crate) mod track;
 
 pub use fit::Unfit;

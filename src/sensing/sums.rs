@@ -1,4 +1,7 @@
 //! Sums that a pass collects along the chain: eighteen numbers that contain all a fit needs of the measurements.
+//!
+//! `Terms` are those of which 1 / I is a linear combination; a source has a coefficient for each. A [`Level`] is the interference
+//! at an end of the chain, on the ground, within the measurable range of powers.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -11,8 +14,124 @@
     )
 )]
 
-use super::terms::Terms;
+use crate::mission::{Interferer, Mission};
+use crate::place::Placement;
 use crate::root::sqrt;
+
+/// Measurable range of interference, W, without the receiver's noise.
+///
+/// The square of a value and of the ratio of any two is finite in the units of [`sensing`](crate::sensing); others are rejected.
+pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
+
+/// Interference level at an end.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Level {
+    /// Mean interference, W; 0 without a measurement.
+    pub power_w: f32,
+    /// Number of measurements, after fading.
+    pub count: f32,
+}
+
+/// Ends whose measurements do not fit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct EndsOff {
+    pub(crate) transmitter: bool,
+    pub(crate) receiver: bool,
+    /// The measurements do not fit, and the faulty one is unknown.
+    pub(crate) unknown: bool,
+}
+
+impl EndsOff {
+    pub(crate) const NONE: Self = Self {
+        transmitter: false,
+        receiver: false,
+        unknown: false,
+    };
+}
+
+/// Levels of both ends, and the ends that did not fit before.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Levels {
+    pub(crate) transmitter: Level,
+    pub(crate) receiver: Level,
+    pub(crate) off: EndsOff,
+}
+
+impl Level {
+    pub(crate) fn is_sound(self) -> bool {
+        is_power(self.power_w) && (0.0..=1e9).contains(&self.count)
+    }
+
+    pub(crate) fn is_heard(self) -> bool {
+        self.power_w > 0.0 && self.count > 0.0
+    }
+}
+
+/// Returns true if `power_w` is a valid level, W; 0 means no measurement.
+pub(crate) fn is_power(power_w: f32) -> bool {
+    power_w.to_bits() == 0 || is_level(power_w)
+}
+
+/// Returns true if `power_w` is in the measurable range, W.
+pub(crate) fn is_level(power_w: f32) -> bool {
+    (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
+}
+
+/// Terms 1, u, u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D and z = 2 h / D.
+pub(crate) type Terms = [f32; 4];
+
+/// Returns the terms at a position, for a line of `distance_m`.
+pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
+    let half = 0.5 * distance_m;
+    let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
+    [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
+}
+
+/// Interference of v = 1, W: the middle of the measurable range, so that no square of a v leaves an f32.
+pub(crate) const UNIT_W: f32 = 1e-12;
+
+/// Range of v for the measurable range, [`MEASURED_W`].
+const V: (f32, f32) = (1e-18, 1e18);
+
+/// Converts an expected v to f32; `None` outside of the measurable range.
+pub(crate) fn expected_v(v: f64) -> Option<f32> {
+    let (least, most) = (f64::from(V.0), f64::from(V.1));
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "within the range of an f32"
+    )]
+    (least..=most).contains(&v).then_some(v as f32)
+}
+
+/// Returns k = eta D^2 [`UNIT_W`] / (4 P) of a source of `power_w`; its own inverse: the power for k.
+pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
+    let config = mission.config();
+    let d = f64::from(config.distance_m);
+    0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
+}
+
+/// Returns the coefficients of `source`: k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
+pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
+    let config = mission.config();
+    let half = 0.5 * f64::from(config.distance_m);
+    let k = strength(mission, f64::from(source.power_w));
+    let (x, y) = (
+        f64::from(source.x_m) / half - 1.0,
+        f64::from(source.y_m) / half,
+    );
+    [
+        k * (x * x + y * y + 1.0 / 3.0),
+        -2.0 * k * x,
+        k,
+        -2.0 * k * y,
+    ]
+}
+
+pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
+    let [a, b, c, d] = coefficients;
+    let [one, u, q, t] = terms.map(f64::from);
+    a * one + b * u + c * q + d * t
+}
 
 /// Length of [`Sums`]: products of the terms, terms times v, v squared, number of positions, of measurements, and their age.
 pub const SUMS: usize = 18;

@@ -1,8 +1,8 @@
 //! Digest and identifier of a mission, by which relays detect different missions.
 
-use super::crc::CRC_32C;
+use super::CRC_32C;
+use crate::geodetic::Sites;
 use crate::mission::{Interference, Mission, MissionConfig};
-use crate::sites::Sites;
 
 /// Returns the low half of a CRC-32C over every parameter of `mission`, in the order of `FORMAT.md`.
 ///

@@ -1,9 +1,9 @@
 //! Frame: header, body, CRC, then COBS and a zero byte as delimiter.
 
+use super::CRC_32C;
+pub use super::MAX_NODE;
 use super::auth::{Signer, TAG};
-use super::crc::CRC_32C;
 use super::message::{MAX_BODY, Message, MessageError};
-pub use super::node_number::MAX_NODE;
 
 /// Version of the format, in the top four bits of the first word.
 pub const VERSION: u8 = 1;

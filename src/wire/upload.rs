@@ -6,9 +6,8 @@
 
 use super::digest::{MissionId, between, digest, of};
 use super::message::UPLOAD;
-use crate::line::{self, LineError};
+use crate::geodetic::{LineError, Sites};
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
-use crate::sites::Sites;
 
 /// Mission with a version.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -98,7 +97,7 @@ impl Upload {
     pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
         let valid = sites.are_valid().then_some(sites);
         let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;
-        line::check(sites, self.config.distance_m).map_err(UploadError::Line)?;
+        check_line(sites, self.config.distance_m).map_err(UploadError::Line)?;
         Ok(Self {
             sites: Some(sites),
             ..self
@@ -152,5 +151,23 @@ impl Upload {
             version: self.version,
             digest: between(of(&self.config), self.sites),
         }
+    }
+}
+
+/// Accepts every mission, since a relay without the feature `flight` has no line on earth.
+#[cfg(not(feature = "flight"))]
+#[expect(clippy::unnecessary_wraps, reason = "as with a line")]
+pub(crate) const fn check_line(_: Sites, _: f32) -> Result<(), LineError> {
+    Ok(())
+}
+
+/// Checks that a mission over `distance_m` metres fits the distance between `sites`.
+#[cfg(feature = "flight")]
+pub(crate) fn check_line(sites: Sites, distance_m: f32) -> Result<(), LineError> {
+    let axis = crate::flight::axis::Axis::between(sites).map_err(|_| LineError::Sites)?;
+    if axis.is_of(distance_m) {
+        Ok(())
+    } else {
+        Err(LineError::Distance)
     }
 }

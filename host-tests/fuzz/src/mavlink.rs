@@ -6,7 +6,7 @@ mod peer;
 mod reference;
 mod wire;
 
-use uav_relay::flight::mavlink::parser::{Counters, Parser, Received};
+use uav_relay::flight::mavlink::incoming::{Counters, Parser, Received};
 
 use super::heap::without;
 use super::input::Input;

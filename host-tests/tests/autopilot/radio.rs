@@ -3,7 +3,7 @@
 use mavlink::dialects::common::{MavLandedState, MavMessage, RADIO_STATUS_DATA};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use uav_relay::Sample;
-use uav_relay::flight::mavlink::sik::noise_w;
+use uav_relay::flight::mavlink::incoming::noise_w;
 
 use super::*;
 

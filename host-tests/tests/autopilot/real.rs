@@ -7,8 +7,7 @@
 
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::mavlink::frame::checksum;
-use uav_relay::flight::mavlink::table;
+use uav_relay::flight::mavlink::frame::{checksum, find_known};
 use uav_relay::{Duration, Geodetic, Instant, Placement};
 
 pub(crate) type Point = [f64; 3];
@@ -442,7 +441,7 @@ impl Real {
         let mut frame = vec![0xFD, length, 0, 0, self.sequence, 1, 1, a, b, c];
         self.sequence = self.sequence.wrapping_add(1);
         frame.extend(payload);
-        let known = table::find(id).unwrap();
+        let known = find_known(id).unwrap();
         let sum = checksum(&frame[1..], known);
         frame.extend(sum.to_le_bytes());
         frame

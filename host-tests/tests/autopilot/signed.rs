@@ -3,8 +3,7 @@
 use sha2::{Digest as _, Sha256};
 use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::flight::autopilot::{Signing, Stamp};
-use uav_relay::flight::mavlink::frame::checksum;
-use uav_relay::flight::mavlink::table;
+use uav_relay::flight::mavlink::frame::{checksum, find_known};
 
 use super::*;
 
@@ -40,7 +39,7 @@ impl Key {
         frame[2] = 1;
         let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
         // The link ignores unknown messages.
-        let sum = table::find(id).map_or(0, |known| checksum(&frame[1..], known));
+        let sum = find_known(id).map_or(0, |known| checksum(&frame[1..], known));
         frame.extend(sum.to_le_bytes());
         frame.push(0);
         frame.extend(&self.last.to_le_bytes()[..6]);
@@ -202,7 +201,7 @@ fn what_a_radio_says_needs_no_signature() {
     vehicle.run(2_000);
     let mut frame = vec![0xFD, 9, 0, 0, 0, b'3', b'D', 109, 0, 0];
     frame.extend([1; 9]);
-    let sum = checksum(&frame[1..], table::find(109).unwrap());
+    let sum = checksum(&frame[1..], find_known(109).unwrap());
     frame.extend(sum.to_le_bytes());
     let before = vehicle.link.counters().frames;
     vehicle.link.handle_bytes(vehicle.now, &frame);

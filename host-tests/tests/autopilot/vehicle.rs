@@ -6,12 +6,11 @@ use mavlink::dialects::common::{
     TIMESYNC_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
-use uav_relay::Geodetic;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, AutopilotEvent, Kind, Position};
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::mavlink::table;
-use uav_relay::{Instant, Placement, Sites};
+use uav_relay::flight::mavlink::frame;
+use uav_relay::{Geodetic, Instant, Placement, Sites};
 
 use crate::signed::Key;
 
@@ -301,8 +300,8 @@ impl Vehicle {
         ];
         covered.extend(payload);
         self.number = self.number.wrapping_add(1);
-        let known = table::find(0).unwrap();
-        let checksum = uav_relay::flight::mavlink::frame::checksum(&covered, known);
+        let known = frame::find_known(0).unwrap();
+        let checksum = frame::checksum(&covered, known);
         let mut frame = vec![0xFD];
         frame.extend(covered);
         frame.extend(checksum.to_le_bytes());

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::planning::fleet::{Fewest, ranges};
+use uav_relay::planning::fleet::{self, Fewest};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
@@ -170,7 +170,7 @@ fn the_best_of_equals_in_a_field() {
         let n = rng.random_range(1..=40);
         link.relays = vec![link.relays[0]; n];
         let mission = of_stochastic_link(&link, 0.0).unwrap();
-        let best = f64::from(ranges::best(&mission, mission.config().common).unwrap());
+        let best = f64::from(fleet::best_of_equals(&mission, mission.config().common).unwrap());
         if let Some(optimum) = link.iid_optimum() {
             assert!(
                 (best / optimum - 1.0).abs() < 5e-6,

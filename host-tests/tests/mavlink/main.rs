@@ -13,7 +13,7 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::flight::mavlink::frame::Address;
-use uav_relay::flight::mavlink::parser::{Parser, Received};
+use uav_relay::flight::mavlink::incoming::{Parser, Received};
 
 const COMPANION: Address = Address {
     system: 7,

@@ -4,9 +4,8 @@ use host_tests::python;
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;
 use uav_relay::flight::autopilot::{Flaw, Signing, Stamp};
-use uav_relay::flight::mavlink::frame::checksum;
+use uav_relay::flight::mavlink::frame::{checksum, find_known};
 use uav_relay::flight::mavlink::outgoing::Outgoing;
-use uav_relay::flight::mavlink::table;
 
 use super::ours::framed;
 use super::theirs::written;
@@ -42,7 +41,7 @@ fn signed(key: [u8; 32], from: Address, link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = Outgoing::Heartbeat.encode(from, from, 0).to_vec();
     frame.truncate(frame.len() - 2);
     frame[2] = 1;
-    let sum = checksum(&frame[1..], table::find(0).unwrap());
+    let sum = checksum(&frame[1..], find_known(0).unwrap());
     frame.extend(sum.to_le_bytes());
     frame.push(link);
     frame.extend(&stamp.to_le_bytes()[..6]);
@@ -133,7 +132,7 @@ fn what_pymavlink_signs_is_taken_once_and_with_its_own_key_alone() {
         let mut frame = last.to_vec();
         frame[changed] ^= 1;
         let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
-        let sum = checksum(&frame[1..length - 15], table::find(id).unwrap());
+        let sum = checksum(&frame[1..length - 15], find_known(id).unwrap());
         frame[length - 15..length - 13].copy_from_slice(&sum.to_le_bytes());
         assert_eq!(
             checked(&mut signing(KEY), at(0), &frame),

@@ -3,7 +3,7 @@
 use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::MavLandedState;
 use uav_relay::flight::autopilot::Kind;
-use uav_relay::flight::mavlink::sik::noise_w;
+use uav_relay::flight::mavlink::incoming::noise_w;
 use uav_relay::sensing::belief::Belief;
 use uav_relay::{Interference, Placement, Sample};
 use uav_relay_scenario::Scenario;

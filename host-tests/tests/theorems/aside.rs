@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use uav_relay::planning::single::aside::{self, AsideCase};
-use uav_relay::planning::single::{Found, free, given_altitude};
+use uav_relay::planning::single::{Found, theorems};
 use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
 
@@ -205,7 +205,7 @@ fn without_room_it_is_theorems_1_and_3() {
         let pairs = [
             (
                 aside::best_at(&none.scene.mission, profile).unwrap().0,
-                given_altitude::best_place(&none.scene.mission, profile)
+                theorems::best_at_altitude(&none.scene.mission, profile)
                     .unwrap()
                     .0,
             ),
@@ -213,7 +213,7 @@ fn without_room_it_is_theorems_1_and_3() {
                 aside::best_place(&none.scene.mission, none.power_w())
                     .unwrap()
                     .0,
-                free::best_place(&none.scene.mission, none.power_w())
+                theorems::best_free(&none.scene.mission, none.power_w())
                     .unwrap()
                     .0,
             ),

@@ -1,6 +1,6 @@
 //! Values of an independent program, counterexamples to the printed theorems, and degenerate interferers.
 
-use uav_relay::planning::single::{free, given_altitude, given_x, guide, locus};
+use uav_relay::planning::single::theorems;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::Link;
 
@@ -12,7 +12,7 @@ fn the_reference_cases_hold() {
         let mut scene = Scene::of(&case);
         let altitude = case.arg("h").unwrap();
         let profile = scene.profile(altitude);
-        let (found, which) = given_altitude::best_place(&scene.mission, profile).unwrap();
+        let (found, which) = theorems::best_at_altitude(&scene.mission, profile).unwrap();
         let expected = case.part("sir").unwrap();
         assert!(
             (scene.sir_of(&found) / expected - 1.0).abs() < 1e-6,
@@ -26,7 +26,7 @@ fn the_reference_cases_hold() {
             "{}",
             case.id
         );
-        let guide = guide::ratios(&scene.mission, profile.altitude_m).unwrap();
+        let guide = theorems::power_ratios(&scene.mission, profile.altitude_m).unwrap();
         let told = [guide.c1, guide.c2, guide.c3.unwrap_or(f32::NAN)];
         for (told, name) in told.into_iter().zip(["C1", "C2", "C3"]) {
             let expected = case.part(name).unwrap();
@@ -38,7 +38,7 @@ fn the_reference_cases_hold() {
     for case in cases::of("theorem2").unwrap() {
         let mut scene = Scene::of(&case);
         let (x_m, power_w) = (case.arg("x").unwrap() as f32, case.params.p_u as f32);
-        let (found, _) = given_x::best_place(&scene.mission, x_m, power_w).unwrap();
+        let (found, _) = theorems::best_at_x(&scene.mission, x_m, power_w).unwrap();
         let expected = (case.part("h").unwrap(), case.part("sir").unwrap());
         assert!(
             (scene.sir_of(&found) / expected.1 - 1.0).abs() < 1e-6,
@@ -53,7 +53,7 @@ fn the_reference_cases_hold() {
     }
     for case in cases::of("theorem3").unwrap() {
         let mut scene = Scene::of(&case);
-        let (found, _) = free::best_place(&scene.mission, case.params.p_u as f32).unwrap();
+        let (found, _) = theorems::best_free(&scene.mission, case.params.p_u as f32).unwrap();
         let expected = case.part("sir").unwrap();
         assert!(
             (scene.sir_of(&found) / expected - 1.0).abs() < 1e-6,
@@ -64,7 +64,7 @@ fn the_reference_cases_hold() {
     for case in cases::of("locus").unwrap() {
         let scene = Scene::of(&case);
         let (x_m, power_w) = (case.arg("x").unwrap() as f32, case.params.p_u as f32);
-        let [low, high] = locus::altitudes(&scene.mission, x_m, power_w);
+        let [low, high] = theorems::equal_altitudes(&scene.mission, x_m, power_w);
         let expected = case.part_list("h_minus_plus").unwrap();
         for (told, expected) in [low, high].into_iter().zip(expected) {
             match told {
@@ -86,7 +86,7 @@ fn the_reference_cases_hold() {
         let scene = Scene::of(&case);
         let altitude = case.arg("h").unwrap();
         let (found, _) =
-            given_altitude::best_place(&scene.mission, scene.profile(altitude)).unwrap();
+            theorems::best_at_altitude(&scene.mission, scene.profile(altitude)).unwrap();
         let (x, root) = (f64::from(found.place.x_m), case.values().unwrap()[0]);
         assert!((x - root).abs() < 1e-5 * root, "{x} {root}");
         let value = |x: f64| {
@@ -121,7 +121,7 @@ fn counterexamples_and_degenerate_places() {
     let best = |link: &Link, band| {
         let mut scene = Scene::new(link, band);
         let (found, case) =
-            free::best_place(&scene.mission, link.relays[0].power_w as f32).unwrap();
+            theorems::best_free(&scene.mission, link.relays[0].power_w as f32).unwrap();
         let sir = scene.sir_of(&found);
         (found.place, sir, case)
     };
@@ -138,24 +138,24 @@ fn counterexamples_and_degenerate_places() {
     // Interferer on Tx: SIR_1 is constant, so SIR_2 decides.
     let (place, sir, case) = best(&link(100.0, 0.0, 0.0, 1.0, 2.0, 2.0), (5.0, 200.0));
     assert!(
-        case == free::FreeCase::Lowest(given_altitude::PlaceCase::Level),
+        case == theorems::FreeCase::Lowest(theorems::PlaceCase::Level),
         "{case:?}"
     );
     assert!((sir - 1.0).abs() < 1e-12 && place.x_m > 99.9 && place.altitude_m < 5.1);
     // Interferer on Rx: no position helps.
     let (_, sir, case) = best(&link(100.0, 100.0, 0.0, 1.0, 2.0, 2.0), (5.0, 200.0));
     assert!(
-        case == free::FreeCase::Lowest(given_altitude::PlaceCase::Drowned) && sir <= 0.0,
+        case == theorems::FreeCase::Lowest(theorems::PlaceCase::Drowned) && sir <= 0.0,
         "{case:?}"
     );
     // Interferer right beside Tx: SIR_1 only falls.
     let mut scene = Scene::new(&link(100.0, 0.0, 30.0, 1.0, 2.0, 2.0), (5.0, 5.0));
-    let (found, case) = given_altitude::best_place(&scene.mission, scene.profile(5.0)).unwrap();
-    assert!(case == given_altitude::PlaceCase::Crossing, "{case:?}");
+    let (found, case) = theorems::best_at_altitude(&scene.mission, scene.profile(5.0)).unwrap();
+    assert!(case == theorems::PlaceCase::Crossing, "{case:?}");
     let most = scene.brute((0.0, 100.0), (5.0, 5.0));
     assert!(scene.sir_of(&found) >= most * (1.0 - 1e-6));
     // Outside [0, D] there is no position.
     for x_m in [-1.0, 100.1, f32::NAN] {
-        assert!(given_x::best_place(&scene.mission, x_m, 1.0).is_none());
+        assert!(theorems::best_at_x(&scene.mission, x_m, 1.0).is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::planning::single::{given_altitude, guide, locus};
+use uav_relay::planning::single::theorems;
 use uav_relay::sir::{Extremum, first_hop_turn};
 use uav_relay_oracle::random;
 
@@ -20,7 +20,7 @@ fn the_locus_is_where_the_hops_are_equal() {
         };
         let x = f64::from(rng.random_range(0.0..=scene.link.distance_m) as f32);
         let power_w = scene.mission.config().common.power_w;
-        let found = locus::altitudes(&scene.mission, x as f32, power_w);
+        let found = theorems::equal_altitudes(&scene.mission, x as f32, power_w);
         let difference = |scene: &mut Scene, h: f64| {
             scene.link.relays[0].altitude_m = h;
             let first = scene.link.sir_relay(1, 0.0, x).unwrap();
@@ -151,7 +151,7 @@ fn the_guide_agrees_with_the_cases() {
             continue;
         }
         let (low, d) = (scene.band.0, link.distance_m);
-        let guide = guide::ratios(&scene.mission, low as f32).unwrap();
+        let guide = theorems::power_ratios(&scene.mission, low as f32).unwrap();
         let (x, y2, h2) = (link.x_i, link.y_i * link.y_i, low * low);
         // Formulas as printed in the paper.
         let kappa = link.mu_nlos / link.eta;
@@ -183,7 +183,7 @@ fn the_guide_agrees_with_the_cases() {
             (false, ratio) if ratio <= c3 => 4,
             (false, _) => 5,
         };
-        let (_, found) = given_altitude::best_place(&scene.mission, scene.profile(low)).unwrap();
+        let (_, found) = theorems::best_at_altitude(&scene.mission, scene.profile(low)).unwrap();
         assert_eq!(found.printed(), case, "{link:?}");
         seen[usize::from(case)] += 1;
     }

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::planning::single::{Found, free, given_altitude, given_x, noise};
+use uav_relay::planning::single::{Found, theorems, without_interferer};
 use uav_relay_oracle::random::{self, log_uniform};
 
 use super::scene::Scene;
@@ -64,7 +64,7 @@ fn theorem_1_is_no_worse_than_brute_force() {
         |_, scene| ((0.0, scene.link.distance_m), (scene.band.0, scene.band.0)),
         |scene, _, h| {
             let (found, case) =
-                given_altitude::best_place(&scene.mission, scene.profile(h.0)).unwrap();
+                theorems::best_at_altitude(&scene.mission, scene.profile(h.0)).unwrap();
             (found, format!("{case:?}"))
         },
     );
@@ -87,7 +87,7 @@ fn theorem_2_is_no_worse_than_brute_force() {
         },
         |scene, x, _| {
             let power_w = scene.mission.config().common.power_w;
-            let (found, case) = given_x::best_place(&scene.mission, x.0 as f32, power_w).unwrap();
+            let (found, case) = theorems::best_at_x(&scene.mission, x.0 as f32, power_w).unwrap();
             (found, format!("{case:?}"))
         },
     );
@@ -102,7 +102,7 @@ fn theorem_3_is_no_worse_than_brute_force() {
         |_, scene| ((0.0, scene.link.distance_m), scene.band),
         |scene, _, _| {
             let power_w = scene.mission.config().common.power_w;
-            let (found, case) = free::best_place(&scene.mission, power_w).unwrap();
+            let (found, case) = theorems::best_free(&scene.mission, power_w).unwrap();
             (found, format!("{case:?}"))
         },
     );
@@ -122,7 +122,7 @@ fn theorem_1_in_noise_is_no_worse_than_brute_force() {
         |_, scene| ((0.0, scene.link.distance_m), (scene.band.0, scene.band.0)),
         |scene, _, h| {
             let (found, case) =
-                given_altitude::best_place(&scene.mission, scene.profile(h.0)).unwrap();
+                theorems::best_at_altitude(&scene.mission, scene.profile(h.0)).unwrap();
             (found, format!("{case:?}"))
         },
     );
@@ -147,7 +147,7 @@ fn theorem_2_in_noise_is_no_worse_than_brute_force() {
         },
         |scene, x, _| {
             let power_w = scene.mission.config().common.power_w;
-            let (found, case) = given_x::best_place(&scene.mission, x.0 as f32, power_w).unwrap();
+            let (found, case) = theorems::best_at_x(&scene.mission, x.0 as f32, power_w).unwrap();
             (found, format!("{case:?}"))
         },
     );
@@ -162,7 +162,7 @@ fn theorem_3_in_noise_is_no_worse_than_brute_force() {
         |_, scene| ((0.0, scene.link.distance_m), scene.band),
         |scene, _, _| {
             let power_w = scene.mission.config().common.power_w;
-            let (found, case) = free::best_place(&scene.mission, power_w).unwrap();
+            let (found, case) = theorems::best_free(&scene.mission, power_w).unwrap();
             (found, format!("{case:?}"))
         },
     );
@@ -180,11 +180,12 @@ fn noise_is_no_worse_than_brute_force() {
     let (mut worst, mut middle) = (0.0_f64, 0);
     for _ in 0..20_000 {
         let scene = Scene::random(&mut rng);
-        let noise = noise::Noise {
+        let noise = without_interferer::Noise {
             relay_w: log_uniform(&mut rng, 1e-16, 1e-10) as f32,
             receiver_w: log_uniform(&mut rng, 1e-16, 1e-10) as f32,
         };
-        let found = noise::best_place(&scene.mission, scene.profile(scene.band.0), noise);
+        let found =
+            without_interferer::best_in_noise(&scene.mission, scene.profile(scene.band.0), noise);
         let link = &scene.link;
         let snr = |x: f64| {
             let h2 = scene.band.0 * scene.band.0;

@@ -1,7 +1,7 @@
 //! Valid values of turns, views and lease renewals, and node numbers that fit.
 
 use uav_relay::optimiser::ladder::Ladder;
-use uav_relay::optimiser::{PerTarget, verdict::Verdict};
+use uav_relay::optimiser::{PerTarget, pass::Verdict};
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{Answer, Message, MessageError};
 

@@ -12,24 +12,22 @@ use super::state::{Observed, State};
 use super::streams::Streams;
 use super::target::Target;
 use super::trust::Trust;
-use super::vehicle::RadioNoise;
-use super::vehicle::{Position, Vehicle, VehicleUpdate};
+use super::vehicle::{Position, RadioNoise, Vehicle, VehicleUpdate};
 use crate::event::Event;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
-use crate::flight::mavlink::incoming::Incoming;
+use crate::flight::mavlink::incoming::{Counters, Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing};
-use crate::flight::mavlink::parser::{Counters, Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 use crate::geodetic::Geodetic;
+#[cfg(feature = "upload")]
+use crate::geodetic::Sites;
 use crate::guard::HoldReason;
 use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::side::Side;
-#[cfg(feature = "upload")]
-use crate::sites::Sites;
 use crate::time::{Duration, Instant, MonotonicClock};
 
 /// An onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.

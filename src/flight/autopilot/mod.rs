@@ -46,7 +46,7 @@ pub use mode::{FlightMode, Release, ReleaseCause, WaitReason};
 pub use vehicle::Position;
 
 pub use super::mavlink::frame::Address;
+pub use super::mavlink::incoming::Counters;
 pub use super::mavlink::outgoing::FrameBytes;
-pub use super::mavlink::parser::Counters;
 #[cfg(feature = "mavlink-signing")]
 pub use super::mavlink::signing::{Flaw, Signing, Stamp};

@@ -4,7 +4,7 @@
 //! One request is under way at a time, so that an answer (COMMAND_ACK), which does not say for which message it is, belongs to that request.
 
 use super::kind::Kind;
-use crate::flight::mavlink::table::id;
+use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
 /// Messages are counted for so long before the autopilot is asked again.

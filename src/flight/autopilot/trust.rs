@@ -6,9 +6,8 @@
 
 use super::kind::Kind;
 use super::vehicle::AUTOPILOT;
-use crate::flight::mavlink::incoming::Incoming;
+use crate::flight::mavlink::incoming::{Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::FrameBytes;
-use crate::flight::mavlink::parser::{Parser, Received};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::{Flaw, Signing};
 use crate::time::Instant;

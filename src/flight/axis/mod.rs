@@ -28,26 +28,66 @@
 //! (`places_agree_with_geodesics` in `host-tests/tests/axis`); round trip within one unit of [`Geodetic`]. The distance of a far
 //! point: within 0.2 % anywhere on earth, and 0.002 % up to 1000 km (`distances_agree_with_geodesics`, in the same folder).
 
-mod error;
-#[cfg(test)]
-mod tests;
 mod vector;
 
-use crate::geodetic::{Geodetic, to_integer};
+use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
-use crate::sites::Sites;
-use vector::{UNIT, turned};
-use vector::{Vector, radius};
+use vector::{UNIT, Vector, radius, turned};
 
-pub use error::AxisError;
 #[cfg(not(feature = "internals"))]
-use error::{LONGEST_M, SHORTEST_M};
+use vector::{LONGEST_M, SHORTEST_M};
 #[cfg(feature = "internals")]
 #[doc(hidden)]
-pub use error::{LONGEST_M, SHORTEST_M};
+pub use vector::{LONGEST_M, SHORTEST_M};
 
 /// Allowed difference between the mission's distance and that of the sites, m, for the rounding of the sites and of f32.
 const TOLERANCE_M: f64 = 0.05;
+
+/// Reason why a pair of sites is rejected.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AxisError {
+    /// The latitude or longitude of the transmitter is not on earth.
+    Tx(Geodetic),
+    /// The latitude or longitude of the receiver is not on earth.
+    Rx(Geodetic),
+    /// The sites are less than 10 m apart.
+    TooShort {
+        /// The distance, m.
+        distance_m: f64,
+    },
+    /// The sites are more than 100 km apart.
+    TooLong {
+        /// Length of the chord, m.
+        distance_m: f64,
+    },
+}
+
+impl core::fmt::Display for AxisError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let site = |f: &mut core::fmt::Formatter<'_>, name, site: &Geodetic| {
+            let Geodetic { lat_e7, lon_e7, .. } = site;
+            write!(
+                f,
+                "site {name}: latitude {lat_e7} and longitude {lon_e7} in 1e-7 degrees: allowed are ±900000000 and ±1800000000"
+            )
+        };
+        match self {
+            Self::Tx(at) => site(f, "tx", at),
+            Self::Rx(at) => site(f, "rx", at),
+            Self::TooShort { distance_m } => write!(
+                f,
+                "the sites are {distance_m:.2} m apart: allowed are {SHORTEST_M} to {LONGEST_M} m"
+            ),
+            Self::TooLong { distance_m } => write!(
+                f,
+                "the sites are {distance_m:.0} m apart: allowed are {SHORTEST_M} to {LONGEST_M} m"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for AxisError {}
 
 /// The line from the transmitter's site to the receiver's.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -323,4 +363,156 @@ fn arc(chord: f64, radius: f64) -> f64 {
 fn chord(arc: f64, radius: f64) -> f64 {
     let q = arc / radius;
     arc * (1.0 - q * q / 6.0)
+}
+
+/// Special cases of the line: its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
+#[cfg(test)]
+mod tests {
+    use super::{Axis, AxisError, LONGEST_M};
+    use crate::geodetic::Geodetic;
+    use crate::place::Placement;
+
+    fn site(lat_deg: f64, lon_deg: f64, amsl_m: f64) -> Geodetic {
+        Geodetic::from_degrees(lat_deg, lon_deg, amsl_m).expect("on earth")
+    }
+
+    fn near(a: f32, b: f64, within: f64) {
+        assert!((f64::from(a) - b).abs() <= within, "{a} is not {b}");
+    }
+
+    #[test]
+    fn the_sites_are_the_ends_of_the_line() {
+        let (tx, rx) = (site(47.40, 8.54, 420.0), site(47.41, 8.55, 431.0));
+        let axis = Axis::try_new(tx, rx).expect("a line");
+        let d = axis.distance_m();
+        for (site, x) in [(tx, 0.0), (rx, d)] {
+            let place = axis.place(site).expect("near");
+            near(place.x_m, x, 1e-4);
+            near(place.y_m, 0.0, 1e-4);
+            near(place.altitude_m, 0.0, 1e-3);
+        }
+    }
+
+    #[test]
+    fn y_is_to_the_right() {
+        // Eastward line: the right side is south.
+        let axis = Axis::try_new(site(47.4, 8.54, 0.0), site(47.4, 8.55, 0.0)).expect("a line");
+        let south = axis.place(site(47.399, 8.545, 0.0)).expect("near");
+        near(south.y_m, 111.2, 0.1);
+        let point = axis.point(Placement {
+            y_m: 100.0,
+            ..Placement::on_line(300.0, 20.0)
+        });
+        assert!(point.expect("near").lat_e7 < 474_000_000);
+    }
+
+    #[test]
+    fn height_is_above_the_line_from_ground_to_ground() {
+        let axis =
+            Axis::try_new(site(0.0, 179.99, 100.0), site(0.0, -179.99, 300.0)).expect("a line");
+        let middle = Placement::on_line(1_113.195, 20.0);
+        let point = axis.point(middle).expect("near");
+        assert_eq!(point.lat_e7, 0);
+        assert_eq!(
+            point.lon_e7.unsigned_abs(),
+            1_800_000_000,
+            "the antimeridian"
+        );
+        assert_eq!(point.amsl_mm, 220_000);
+    }
+
+    #[test]
+    fn a_line_over_the_pole_is_a_line() {
+        let (tx, rx) = (site(89.99, 0.0, 0.0), site(89.99, 180.0, 0.0));
+        let axis = Axis::try_new(tx, rx).expect("a line");
+        let pole = axis.place(site(90.0, 12.0, 5.0)).expect("near");
+        near(pole.x_m, axis.distance_m() / 2.0, 1e-3);
+        near(pole.y_m, 0.0, 1e-3);
+        let back = axis.point(pole).expect("near");
+        assert!(back.lat_e7 >= 899_999_999, "{back:?}");
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_pair_of_sites_is_said() {
+        let here = site(47.4, 8.54, 0.0);
+        let off = Geodetic {
+            lat_e7: 900_000_001,
+            ..here
+        };
+        assert_eq!(Axis::try_new(off, here), Err(AxisError::Tx(off)));
+        assert_eq!(Axis::try_new(here, off), Err(AxisError::Rx(off)));
+        assert_eq!(
+            Axis::try_new(here, here),
+            Err(AxisError::TooShort { distance_m: 0.0 })
+        );
+        let far = Axis::try_new(here, site(47.4, 9.9, 0.0));
+        assert!(
+            matches!(far, Err(AxisError::TooLong { distance_m }) if distance_m > LONGEST_M),
+            "{far:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_far_from_the_line_or_not_finite_has_a_point() {
+        let axis = Axis::try_new(site(47.4, 8.54, 0.0), site(47.41, 8.55, 0.0)).expect("a line");
+        for (x_m, y_m, altitude_m) in [
+            (f32::NAN, 0.0, 20.0),
+            (0.0, f32::NAN, 20.0),
+            (0.0, 0.0, f32::INFINITY),
+            (-5_001.0, 0.0, 20.0),
+            (0.0, 5_001.0, 20.0),
+        ] {
+            let place = Placement {
+                x_m,
+                y_m,
+                altitude_m,
+            };
+            assert_eq!(axis.point(place), None, "{place:?}");
+        }
+        assert_eq!(
+            axis.place(site(0.0, 0.0, 0.0)),
+            None,
+            "what has no fix says 0, 0"
+        );
+        assert_eq!(
+            axis.place(site(-47.405, -171.455, 0.0)),
+            None,
+            "behind the earth"
+        );
+    }
+
+    #[test]
+    fn the_azimuth_turns_along_the_line() {
+        let axis = Axis::try_new(site(60.0, 10.0, 0.0), site(60.0, 11.0, 0.0)).expect("a line");
+        #[expect(clippy::cast_possible_truncation, reason = "missions are f32")]
+        let d = axis.distance_m() as f32;
+        // Eastward in the middle; the meridians converge by 0.866 degrees from one end to the other.
+        for (x, degrees) in [(0.0, 89.567), (d / 2.0, 90.0), (d, 90.433)] {
+            let azimuth = axis.azimuth_rad(x).to_degrees();
+            near(azimuth, degrees, 2e-3);
+        }
+    }
+
+    #[test]
+    fn velocities_turn_with_the_line() {
+        // Line toward the south-east that climbs 100 m.
+        let axis = Axis::try_new(site(0.01, 10.0, 0.0), site(0.0, 10.01, 100.0)).expect("a line");
+        let [north, east, down] = axis.to_ned(800.0, [10.0, 0.0, 1.0]);
+        near(north, -7.05, 0.05);
+        near(east, 7.09, 0.05);
+        near(down, -1.0 - 10.0 * 100.0 / axis.distance_m(), 1e-3);
+        let [north, east, down] = axis.to_ned(800.0, [0.0, 10.0, 0.0]);
+        near(north, -7.09, 0.05);
+        near(east, -7.05, 0.05);
+        near(down, 0.0, 1e-6);
+    }
+
+    #[test]
+    fn a_mission_over_another_distance_is_another() {
+        let axis = Axis::try_new(site(47.4, 8.54, 0.0), site(47.41, 8.55, 0.0)).expect("a line");
+        #[expect(clippy::cast_possible_truncation, reason = "missions are f32")]
+        let d = axis.distance_m() as f32;
+        assert!(axis.is_of(d) && axis.is_of(d + 0.04));
+        assert!(!axis.is_of(d + 0.1) && !axis.is_of(f32::NAN));
+    }
 }

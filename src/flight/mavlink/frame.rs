@@ -1,4 +1,4 @@
-//! Layout of a MAVLink 2 frame.
+//! Layout of a MAVLink 2 frame, and the known messages of the `common` dialect.
 //!
 //! | byte | content |
 //! | --- | --- |
@@ -13,8 +13,6 @@
 //! The checksum is CRC-16/MCRF4XX over all bytes but the first, and over the message's CRC seed, which is not sent.
 
 use crc::{CRC_16_MCRF4XX, Crc, NoTable};
-
-use super::table::Known;
 
 /// First byte of a frame.
 pub const MAGIC: u8 = 0xFD;
@@ -55,4 +53,102 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
     digest.update(covered);
     digest.update(&[known.crc_extra]);
     digest.finalize()
+}
+
+/// Properties of a message for the checksum and the parser.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Known {
+    /// Message id, 24 bits.
+    pub id: u32,
+    /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
+    pub crc_extra: u8,
+    /// Length of its fields, without extensions of later dialects, bytes.
+    pub length: u8,
+}
+
+/// Message ids.
+pub mod id {
+    /// Type, mode and state of a system.
+    pub const HEARTBEAT: u32 = 0;
+    /// Position of the vehicle.
+    pub const GLOBAL_POSITION_INT: u32 = 33;
+    /// Command with seven parameters.
+    pub const COMMAND_LONG: u32 = 76;
+    /// Reply to a command.
+    pub const COMMAND_ACK: u32 = 77;
+    /// Current target of an ArduPilot or PX4, in its local frame.
+    pub const POSITION_TARGET_LOCAL_NED: u32 = 85;
+    /// Target position to fly to.
+    pub const SET_POSITION_TARGET_GLOBAL_INT: u32 = 86;
+    /// Current target of the vehicle.
+    pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
+    /// Signal and noise level of a radio.
+    pub const RADIO_STATUS: u32 = 109;
+    /// Clock value that is sent back.
+    pub const TIMESYNC: u32 = 111;
+    /// State of the vehicle's geofence.
+    pub const FENCE_STATUS: u32 = 162;
+    /// Landed state of the vehicle.
+    pub const EXTENDED_SYS_STATE: u32 = 245;
+    /// Named value, for an operator to plot.
+    pub const NAMED_VALUE_FLOAT: u32 = 251;
+    /// Text for an operator.
+    pub const STATUSTEXT: u32 = 253;
+}
+
+/// Maximum length of a later dialect's extensions, bytes; a longer message is treated as noise.
+const ADDED: u8 = 24;
+
+impl Known {
+    /// Maximum payload length of this message.
+    pub const fn longest(self) -> u8 {
+        self.length.saturating_add(ADDED)
+    }
+}
+
+const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
+    Known {
+        id,
+        crc_extra,
+        length,
+    }
+}
+
+/// Messages that are read or written, and then messages whose payload may contain frames, which are skipped as a whole.
+const TABLE: [Known; 26] = [
+    known(id::HEARTBEAT, 50, 9),
+    known(id::GLOBAL_POSITION_INT, 104, 28),
+    known(id::COMMAND_LONG, 152, 33),
+    known(id::COMMAND_ACK, 143, 10),
+    known(id::POSITION_TARGET_LOCAL_NED, 140, 51),
+    known(id::SET_POSITION_TARGET_GLOBAL_INT, 5, 53),
+    known(id::POSITION_TARGET_GLOBAL_INT, 150, 51),
+    known(id::RADIO_STATUS, 185, 9),
+    known(id::TIMESYNC, 34, 16),
+    known(id::FENCE_STATUS, 189, 8),
+    known(id::EXTENDED_SYS_STATE, 130, 2),
+    known(id::NAMED_VALUE_FLOAT, 170, 18),
+    known(id::STATUSTEXT, 83, 54),
+    // FILE_TRANSFER_PROTOCOL, LOG_DATA, GPS_INJECT_DATA, SERIAL_CONTROL, ENCAPSULATED_DATA.
+    known(110, 84, 254),
+    known(120, 134, 97),
+    known(123, 250, 113),
+    known(126, 220, 81),
+    known(131, 223, 255),
+    // DATA64, DATA96, REMOTE_LOG_DATA_BLOCK, GPS_RTCM_DATA, V2_EXTENSION.
+    known(171, 181, 66),
+    known(172, 22, 98),
+    known(184, 159, 206),
+    known(233, 35, 182),
+    known(248, 8, 254),
+    // LOGGING_DATA, LOGGING_DATA_ACKED, TUNNEL.
+    known(266, 193, 255),
+    known(267, 35, 255),
+    known(385, 147, 133),
+];
+
+/// Returns the properties of a message.
+pub fn find_known(id: u32) -> Option<Known> {
+    TABLE.into_iter().find(|known| known.id == id)
 }

@@ -2,12 +2,9 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`table`] | known messages: id, CRC seed, length |
-//! | [`frame`] | frame layout, and the checksum |
-//! | [`parser`] | frames from a byte stream |
-//! | [`incoming`] | messages from an autopilot |
+//! | [`frame`] | known messages: id, CRC seed, length; frame layout, and the checksum |
+//! | [`incoming`] | messages from an autopilot; frames from a byte stream; units of a SiK radio |
 //! | [`outgoing`] | messages of a companion |
-//! | [`sik`] | units of a SiK radio |
 //! | `signing` | signatures, with the feature `mavlink-signing` |
 //!
 //! Unknown enum values and unknown messages cost only their bytes. MAVLink 1 is not supported; an autopilot that starts with it
@@ -27,8 +24,5 @@
 pub mod frame;
 pub mod incoming;
 pub mod outgoing;
-pub mod parser;
 #[cfg(feature = "mavlink-signing")]
 pub mod signing;
-pub mod sik;
-pub mod table;

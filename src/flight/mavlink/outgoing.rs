@@ -2,8 +2,7 @@
 
 use heapless::Vec;
 
-use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum};
-use super::table::{self, id};
+use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum, find_known, id};
 use crate::geodetic::Geodetic;
 
 /// Maximum payload length of these messages, bytes.
@@ -123,7 +122,7 @@ impl Outgoing<'_> {
         if let (Some(byte), Ok(length)) = (frame.get_mut(1), u8::try_from(length)) {
             *byte = length;
         }
-        if let (Some(known), Some(covered)) = (table::find(self.id()), frame.get(1..)) {
+        if let (Some(known), Some(covered)) = (find_known(self.id()), frame.get(1..)) {
             let checksum = checksum(covered, known);
             let mut writer = Writer(frame);
             writer.bytes(&checksum.to_le_bytes());

@@ -16,10 +16,9 @@
 
 use sha2::{Digest as _, Sha256};
 
-use super::frame::{Address, CHECKSUM, HEADER, SIGNATURE, SIGNED, checksum};
+use super::frame::{Address, CHECKSUM, HEADER, SIGNATURE, SIGNED, checksum, find_known};
+use super::incoming::Received;
 use super::outgoing::FrameBytes;
-use super::parser::Received;
-use super::table;
 use crate::time::{Duration, Instant};
 
 /// Length of the truncated hash, bytes.
@@ -142,7 +141,7 @@ impl Signing {
         });
         let covered = frame.get(1..).unwrap_or_default();
         let sum = id
-            .and_then(table::find)
+            .and_then(find_known)
             .map_or(0, |known| checksum(covered, known));
         // `FrameBytes` has room for the signature.
         let _ = frame.extend_from_slice(&sum.to_le_bytes());

@@ -5,7 +5,7 @@ mod pairs;
 mod released;
 
 use super::config::{Geofence, GuardConfig};
-use super::reachable::ReachableInterval;
+use super::own::ReachableInterval;
 use super::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;

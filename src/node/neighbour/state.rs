@@ -27,11 +27,10 @@ use super::damping::Damping;
 use super::hearing::Hellos;
 use super::hearing::{CANDIDATES, Hearing, InRow, ToldOf, mask};
 use super::liveness::{Liveness, patience, tick};
-use crate::jitter::Jitter;
 use crate::node::context::Proposer;
 use crate::node::timing::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, Jitter};
 use crate::wire::digest::MissionId;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,15 +1,13 @@
 //! Relay's part in a sweep of targets (Algorithms 1 and 4) and in its verdict.
 
-use super::computation::LeaderTask;
-use super::computation::{ADJUST, ALTITUDE, Computation, PassKind};
+use super::computation::{ADJUST, ALTITUDE, Computation, LeaderTask, PassKind};
 use super::state::Action;
 use crate::mission::Heading;
 use crate::node::context::Context;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::pass::{Behind, Link, close};
+use crate::optimiser::pass::{Behind, Link, Verdict, close};
 use crate::optimiser::spacing::Stand;
-use crate::optimiser::verdict::Verdict;
 use crate::place::Station;
 use crate::settings::Method;
 use crate::wire::message::{Answer, Sweep};

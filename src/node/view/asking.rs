@@ -1,9 +1,8 @@
 //! Timing of view requests: at once at first, then less and less often.
 
-use crate::jitter::Jitter;
 use crate::node::timing::PAUSE;
 use crate::settings::Settings;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, Jitter};
 
 /// State of this relay's view request, and the time of the next one.
 #[derive(Clone, Debug)]

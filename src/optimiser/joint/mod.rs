@@ -7,10 +7,8 @@
 //! | file | content |
 //! | --- | --- |
 //! | `hop` | the reach of a hop with its derivatives, with and without noise, and the choice of the dependent coordinate |
-//! | `outlook` | the value function: the slack as a quadratic in a relay's position |
-//! | `policy` | a relay's step, and its feedback on changes of the relay before it |
-//! | `site`, `weigh` | one relay and the hop to it: its part of the forward pass and of the backward pass; its room across the
-//! line |
+//! | `outlook` | the value function: the slack as a quadratic in a relay's position; a relay's step, and its feedback |
+//! | `site` | one relay and the hop to it: its part of the forward pass and of the backward pass; its room across the line |
 //! | `ascent` | step control: the increase of the target, and the accepted fraction of the step |
 //! | `starts` | initial chains and initial targets of the ascents |
 //! | [`solver`] | the solution of a whole chain without messages |
@@ -18,11 +16,9 @@
 mod ascent;
 mod hop;
 mod outlook;
-mod policy;
 mod site;
 pub mod solver;
 mod starts;
-mod weigh;
 
 pub use site::Room;
 pub use solver::{Seat, Solver};

@@ -1,24 +1,31 @@
 //! Number of relays for a target SIR, and their positions: the paper's eq. (Opt), and Problem 1 in a field.
 //!
-//! | interference | profiles | file | accuracy |
+//! | interference | profiles | method | accuracy |
 //! | --- | --- | --- | --- |
-//! | one interferer | any | [`farthest`] | exact if `proven`: no chain with one relay fewer meets the target |
-//! | a field | equal | `ranges` | exact, also in an uneven field, which the paper leaves to an exhaustive search |
-//! | a field | different | [`farthest`] | result of Algorithm 4; not proven |
+//! | one interferer | any | reaches of a pass | exact if `proven`: no chain with one relay fewer meets the target |
+//! | a field | equal | ranges of equal relays | exact, also in an uneven field, which the paper leaves to an exhaustive search |
+//! | a field | different | reaches of a pass | result of Algorithm 4; not proven |
 //!
 //! A minimum separation can only raise the number. A number that is the same without it is proven, any other is not. These
 //! functions do not allocate, but are not intended for a relay's main loop.
+//!
+//! **Reaches of a pass:** the paper's eq. (Opt) and Problem 1. No chain gets farther than its reaches (see `optimiser::pass`), so n
+//! relays whose reaches do not end within the last hop cannot meet the target. The printed search starts with two relays; one may
+//! be enough.
+//!
+//! **Ranges of equal relays** in a field: the exact solution of the paper's Problem 1. Without a minimum separation, more equal
+//! relays never have a lower SIR. N of them meet a target if and only if the ranges of `optimiser::retreat` end at a position
+//! within the reach of the first hop.
 
-pub mod farthest;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod ranges;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod ranges;
-
-use crate::mission::{MAX_RELAYS, Mission, Profile};
+use crate::mission::{Heading, MAX_RELAYS, Mission, Profile};
+use crate::optimiser::pass::{Walk, before};
+use crate::optimiser::spacing::Stand;
 use crate::place::Placement;
+#[cfg(feature = "internals")]
+use crate::root::sqrt;
 use crate::sir;
+#[cfg(feature = "internals")]
+use crate::sir::square;
 
 /// Minimum number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -51,7 +58,7 @@ impl Fewest {
     ///
     /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive count if
     /// `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay,
-    /// and all of them again with a minimum separation; in a field at most 32 chains of `ranges`.
+    /// and all of them again with a minimum separation; in a field at most 32 chains of equal relays.
     ///
     /// `None` if no number of relays meets it; [`Most::of`] returns the best that they can meet.
     pub fn of(mission: &Mission, target: f32, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
@@ -116,16 +123,16 @@ impl Mission {
         let Some(places) = places.get_mut(..usize::from(self.relays())) else {
             return false;
         };
-        farthest::places(self, target, &profile_of, places)
+        required_places(self, target, &profile_of, places)
     }
 }
 
 /// Returns the minimum number of relays; `proven` ignores the separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
-        ranges::fewest(mission, target, profile_of(1))
+        fewest_of_equals(mission, target, profile_of(1))
     } else {
-        farthest::fewest(mission, target, profile_of)
+        fewest_by_reaches(mission, target, profile_of)
     }
 }
 
@@ -133,4 +140,195 @@ fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile)
 fn alike(last: u16, profile_of: &impl Fn(u16) -> Profile) -> bool {
     let first = profile_of(1);
     (2..=last).all(|index| profile_of(index) == first)
+}
+
+fn fewest_by_reaches(
+    mission: &Mission,
+    target: f32,
+    profile_of: &impl Fn(u16) -> Profile,
+) -> Option<Fewest> {
+    match mission.heading() {
+        Heading::TowardRx => toward_rx(mission, target, profile_of),
+        // Profiles are indexed from Tx, so every number of relays is another chain.
+        Heading::TowardTx => (1..=MAX_RELAYS)
+            .map_while(|relays| mission.with_relays(relays).ok())
+            .find(|mission| chain(mission, target, profile_of).is_met())
+            .map(|mission| Fewest {
+                relays: mission.relays(),
+                proven: false,
+            }),
+    }
+}
+
+fn toward_rx(
+    mission: &Mission,
+    target: f32,
+    profile_of: &impl Fn(u16) -> Profile,
+) -> Option<Fewest> {
+    let mut from_m = 0.0;
+    let mut proven = true;
+    for index in 1..=MAX_RELAYS {
+        let mission = mission.with_relays(index).ok()?;
+        // The last relay of its chain may go to the very end.
+        let last = chain(&mission, target, profile_of);
+        let link = last.link(index);
+        from_m = link.reach(target, from_m)?;
+        if !link
+            .ending(target, from_m)
+            .is_some_and(|(slack, _)| slack >= 0.0)
+        {
+            continue;
+        }
+        // If it leaves room for the relays behind it, a chain of known length may end earlier than one that grows.
+        if last.is_met() {
+            return Some(Fewest {
+                relays: index,
+                proven,
+            });
+        }
+        proven = false;
+    }
+    None
+}
+
+fn chain<'a, F: Fn(u16) -> Profile>(
+    mission: &'a Mission,
+    target: f32,
+    profile_of: &'a F,
+) -> Walk<'a, F> {
+    Walk {
+        mission,
+        target,
+        plain: false,
+        profile_of,
+    }
+}
+
+fn required_places(
+    mission: &Mission,
+    target: f32,
+    profile_of: &impl Fn(u16) -> Profile,
+    places: &mut [Placement],
+) -> bool {
+    let chain = chain(mission, target, profile_of);
+    let plain = Walk {
+        plain: true,
+        ..chain
+    };
+    settled(&chain, places).is_some() || settled(&plain, places).is_some()
+}
+
+/// Computes the reaches, and then the required positions from the last relay back.
+fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
+    let slot = |index: u16| usize::from(index).wrapping_sub(1);
+    let (slack, mut place) = chain.ends(|index, reach| {
+        if let Some(own) = places.get_mut(slot(index)) {
+            *own = chain.link(index).own.at.at(reach);
+        }
+    })?;
+    if !(slack >= 0.0) {
+        return None;
+    }
+    let mut at = match chain.mission.heading() {
+        Heading::TowardRx => chain.mission.relays(),
+        Heading::TowardTx => 1,
+    };
+    loop {
+        places.get_mut(slot(at))?.x_m = place;
+        let before = before(chain.mission, at);
+        let from_m = match before {
+            Some(index) => places.get(slot(index))?.x_m,
+            None => crate::optimiser::pass::origin(chain.mission),
+        };
+        place = match chain.link(at).stand(chain.target, from_m, place)? {
+            Stand::AtReach => from_m,
+            Stand::At(x_m) => x_m,
+        };
+        let Some(index) = before else { return Some(()) };
+        at = index;
+    }
+}
+
+/// Number of additional relays that are tried with a minimum separation.
+const MORE: u16 = 32;
+
+#[cfg(feature = "internals")]
+const TARGETS: u8 = 48;
+
+fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
+    let chain = Walk {
+        mission,
+        target,
+        plain: false,
+        profile_of: &|_| profile,
+    };
+    chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
+}
+
+/// Returns the minimum number of equal relays for `target` in a field; see [`fewest`]. Without a separation it is found by
+/// bisection.
+fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
+    let met_by = |mission: &Mission, relays: u16| {
+        mission
+            .with_relays(relays)
+            .is_ok_and(|mission| is_met(&mission, target, profile))
+    };
+    let freely = mission.unseparated();
+    let (mut too_few, mut enough) = (0, 1);
+    while !met_by(&freely, enough) {
+        if enough >= MAX_RELAYS {
+            return None;
+        }
+        too_few = enough;
+        enough = (enough * 2).min(MAX_RELAYS);
+    }
+    while enough - too_few > 1 {
+        let middle = too_few + (enough - too_few) / 2;
+        if met_by(&freely, middle) {
+            enough = middle;
+        } else {
+            too_few = middle;
+        }
+    }
+    (enough..=enough.saturating_add(MORE))
+        .find(|&relays| met_by(mission, relays))
+        .map(|relays| Fewest {
+            relays,
+            proven: true,
+        })
+}
+
+/// Returns the highest target (linear, to an f32's step) of the mission's N equal relays in its field.
+///
+/// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
+/// `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
+/// each three square roots for every point of the field and relay.
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
+    mission.field()?;
+    let met = |target: f32| is_met(mission, target, profile);
+    // SIR of the last hop from right above Rx.
+    let mut high = mission.receiver_gain(profile.power_w) / square(profile.altitude_m);
+    if met(high) {
+        return Some(high);
+    }
+    let mut low = 0.0;
+    for _ in 0..TARGETS {
+        // Geometric bisection first, since the targets span many decades.
+        let middle = if high > 4.0 * low {
+            sqrt(high * low.max(high * 1e-6))
+        } else {
+            0.5 * (low + high)
+        };
+        if !(middle > low && middle < high) {
+            break;
+        }
+        if met(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low > 0.0).then_some(low)
 }

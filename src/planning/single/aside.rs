@@ -40,7 +40,7 @@
 //!
 //! **Limits.** If the touching position is in [0, D] x [left, right], it is the optimum. Otherwise the optimum is on an edge of
 //! that rectangle, because an inner position that cannot be improved is one of the three. An edge is a one-dimensional problem:
-//! `edge`.
+//! see `edge`.
 //!
 //! **With the altitude free** the lowest altitude is optimal if there is lateral room. Turn a position about the line on the
 //! ground through the centres of its two spheres: neither SIR changes, and the relay descends to one side or the other. So no
@@ -63,15 +63,15 @@
 //! - On a sphere about Rx l is linear in x, and s in x and y. For Y = 0 SIR_1 is symmetric in y; for any other Y it rises toward
 //!   the side away from the interferer. On that side the relay descends as it moves there, so the lowest altitude is optimal if
 //!   there is room. On the interferer's side it climbs, so the highest may be optimal. In a vertical face along the line the
-//!   level lines may touch in between: `touching`. In the two faces across the line l is constant along such a circle, so they do
+//!   level lines may touch in between: see `edge`. In the two faces across the line l is constant along such a circle, so they do
 //!   not touch.
 //! - If the touching position is outside of the corridor, another one may be inside, in the lowest plane or the highest: see
-//!   `corridor`.
+//!   `edge`.
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use super::edge::{Edge, TwoHops, narrow};
-use super::{Found, corridor, touching};
+use super::Found;
+use super::edge::{Edge, TwoHops, best_in_corridor, narrow, touching_inside};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::place::Placement;
 
@@ -159,14 +159,14 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     };
     if mission.noise_at_a_metre() > 0.0 && !across.is_single() {
         for altitude_m in both_ends(band) {
-            let found = corridor::best(&hops, interferer, along, across, altitude_m);
+            let found = best_in_corridor(&hops, interferer, along, across, altitude_m);
             if found.sir > best.0.sir {
                 best = (found, AsideCase::Inside);
             }
         }
     }
     for y in both_ends(across) {
-        if let Some(found) = touching::inside(&hops, interferer, y, band)
+        if let Some(found) = touching_inside(&hops, interferer, y, band)
             && found.sir > best.0.sir
         {
             best = (found, AsideCase::Wall);

@@ -1,17 +1,71 @@
-//! One edge of the box of a single relay: one of x, y and altitude is free, the other two are fixed.
+//! Edges and faces of the box of a single relay: best position on an edge, and with noise inside a face.
+//!
+//! # Edge
+//!
+//! One of x, y and altitude is free, the other two are fixed.
 //!
 //! With t the free coordinate, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 has one extremum, at
 //! E. SIR_1 has extrema where P t^2 - (P^2 + a - b) t - P b = 0, at two points whose product is -b. Between these three points
 //! both are monotone, so the worse one is maximal at an end of such an interval, or where they cross, which is at one point. With
-//! noise SIR_1 may have three extrema: [`edge_noise`].
+//! noise SIR_1 may have three extrema.
 //!
 //! | free | P | a | b | E |
 //! | --- | --- | --- | --- | --- |
 //! | x | X | (Y - y)^2 + h^2 | y^2 + h^2 | D |
 //! | y | Y | (X - x)^2 + h^2 | x^2 + h^2 | 0 |
 //! | h | 0 | (X - x)^2 + (Y - y)^2 | x^2 + y^2 | 0 |
+//!
+//! # Extrema of SIR_1 on an edge with noise
+//!
+//! In the same notation, with s = (t - P)^2 + a, the slope of SIR_1 has the sign of
+//!
+//! ```text
+//! P t^2 - (P^2 + a - b) t - P b - nu t s^2
+//! ```
+//!
+//! For P > 0 (otherwise everything is mirrored) this over t, phi, is concave for t > 0, since s is convex and not negative, and
+//! so is s^2. So there are at most two extrema, a minimum and a maximum, none before the noise-free minimum. For t < 0 phi falls
+//! with |t| from a positive value: one extremum, closer than the noise-free one. For P = 0 the sign is that of -t (a - b + nu
+//! (t^2 + a)^2).
+//!
+//! # Corridor at one altitude
+//!
+//! With lateral freedom and noise the corridor is searched at one altitude, if the touching position is outside.
+//!
+//! Without noise no position inside the rectangle can then be optimal. With noise there may be a second position at which two
+//! level lines touch from within, on the other side of the interferer's line; near Y = 0 it is almost the mirror image of the
+//! first. There is no proof of their number, so the plane is searched. Each line along x is solved exactly, as an edge. The best
+//! line is searched on lines that are closer near y = 0, and by golden section about the three best.
+//!
+//! # Touching position in a vertical plane
+//!
+//! With noise there may be a position inside the box at which the level lines of both SIRs touch.
+//!
+//! In the plane y = y0, SIR_2 is constant on the circle of radius r about (D, y0), and with z = x - D both squared distances are
+//! linear in z:
+//!
+//! ```text
+//! l = r^2 + y0^2 + D^2 + 2 D z               from Tx
+//! s = r^2 + (D - X)^2 + (y0 - Y)^2 + 2 (D - X) z    from the interferer
+//! ```
+//!
+//! The slope of SIR_1 = A s / (l (1 + nu s)) by z has the sign of (D - X) l - D s - D nu s^2. The sum of the first two terms does
+//! not depend on z:
+//!
+//! ```text
+//! T = (D - X) y0^2 - X r^2 + D ((D - X) X - (y0 - Y)^2)
+//! ```
+//!
+//! So without noise SIR_1 is monotone along the circle, and no position inside the box is optimal: Theorem 3 as corrected. With
+//! noise and X < D it rises up to s = sqrt(T / (D nu)) and falls beyond; this maximum is above the ground if |z| < r. For X >= D
+//! the sign is negative.
+//!
+//! SIR_1 has no maximum off the ground: its slope by h is 0 only where l = s (1 + nu s), and then that by x only for X = 0, where
+//! it is the sum of two terms that are not. So the maximum on a circle is that of its inside, and does not fall with r, while
+//! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
+//! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
-use super::{Found, HALVINGS, edge_noise};
+use super::{Found, HALVINGS};
 use crate::mission::{Band, Interferer, Mission};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
@@ -99,7 +153,7 @@ impl Edge {
         };
         let noise = wide(mission.noise_at_a_metre());
         if noise > 0.0 {
-            let [behind, valley, hill] = edge_noise::turns(p, a, b, noise).map(narrow);
+            let [behind, valley, hill] = noisy_turns(p, a, b, noise).map(narrow);
             return [behind, valley, hill, end];
         }
         let half = 0.5 * (squared(p) + a - b);
@@ -171,4 +225,257 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
 )]
 pub(super) fn narrow(value: f64) -> f32 {
     value as f32
+}
+
+const NOISY_HALVINGS: u8 = 60;
+
+/// Doublings of t at most until a falling function is below 0.
+const DOUBLINGS: u8 = 100;
+
+/// Returns the extrema, m; missing ones are NaN.
+fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
+    if !(libm::fabs(p) > 0.0) {
+        let squared = libm::sqrt((b - a) / noise) - a;
+        let t = if squared > 0.0 {
+            libm::sqrt(squared)
+        } else {
+            f64::NAN
+        };
+        return [-t, 0.0, t];
+    }
+    let slope = Slope {
+        p: libm::fabs(p),
+        a,
+        b,
+        noise,
+    };
+    slope.turns().map(|t| libm::copysign(1.0, p) * t)
+}
+
+/// phi for P > 0.
+struct Slope {
+    p: f64,
+    a: f64,
+    b: f64,
+    noise: f64,
+}
+
+impl Slope {
+    fn phi(&self, t: f64) -> f64 {
+        let Self { p, a, b, noise } = *self;
+        let s = (t - p) * (t - p) + a;
+        p * t - (p * p + a - b) - p * b / t - noise * s * s
+    }
+
+    fn bend(&self, t: f64) -> f64 {
+        let Self { p, a, b, noise } = *self;
+        let s = (t - p) * (t - p) + a;
+        p + p * b / (t * t) - 4.0 * noise * s * (t - p)
+    }
+
+    fn turns(&self) -> [f64; 3] {
+        let Self { p, a, b, .. } = *self;
+        let half = 0.5 * (p * p + a - b);
+        let root = libm::sqrt(half * half + p * p * b);
+        // Extrema without noise; neither cancels.
+        let (valley, before) = if half > 0.0 {
+            ((half + root) / p, p * b / (half + root))
+        } else {
+            (p * b / (root - half), (root - half) / p)
+        };
+        let behind = -last(0.0, before, |t| self.phi(-t) > 0.0);
+        let rises = |t: f64| self.bend(t) > 0.0;
+        let none = [behind, f64::NAN, f64::NAN];
+        if !rises(valley) {
+            return none;
+        }
+        let top = last(valley, beyond(valley, rises), rises);
+        let above = |t: f64| self.phi(t) > 0.0;
+        if !above(top) {
+            return none;
+        }
+        let low = last(valley, top, |t| !above(t));
+        [behind, low, last(top, beyond(top, above), above)]
+    }
+}
+
+/// Returns the last t in [`low`, `high`] at which `holds` is true; it is true at `low` and changes once.
+fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (low, high);
+    for _ in 0..NOISY_HALVINGS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let mut at = 2.0 * from;
+    for _ in 0..DOUBLINGS {
+        if !holds(at) {
+            break;
+        }
+        at *= 2.0;
+    }
+    at
+}
+
+/// Number of lines on either side of y = 0.
+const LINES: u8 = 24;
+
+/// Number of the best lines that are refined.
+const FOLLOWED: usize = 3;
+
+/// Golden-section steps about each.
+const STEPS: u8 = 32;
+
+const GOLDEN: f32 = 0.618_034;
+
+/// Returns the best position at `altitude_m` in `along` by `across`. Work: at most 145 lines of some 90 evaluations.
+pub(super) fn best_in_corridor(
+    hops: &TwoHops<'_>,
+    interferer: &Interferer,
+    along: Band,
+    across: Band,
+    altitude_m: f32,
+) -> Found {
+    let line = |y_m: f32| {
+        let through = Placement {
+            x_m: 0.0,
+            y_m,
+            altitude_m,
+        };
+        let free = EdgeCoordinate::Along;
+        let room = along;
+        Edge {
+            free,
+            through,
+            room,
+        }
+        .best(hops, interferer)
+    };
+    let mut best = line(0.0);
+    // The best three, and the lines beside each.
+    let mut followed = [(0.0_f32, 0.0_f32, 0.0_f32); FOLLOWED];
+    for end in [across.least_m, across.most_m] {
+        let at = |step: u8| {
+            let part = f32::from(step) / f32::from(LINES);
+            end * (part * part * part)
+        };
+        let (mut before, mut here) = (0.0, best.sir.max(line(0.0).sir));
+        for step in 1..=LINES {
+            let found = line(at(step));
+            let after = found.sir;
+            best = best.or(found);
+            if here >= before && here >= after {
+                keep(&mut followed, (here, at(step.saturating_sub(2)), at(step)));
+            }
+            (before, here) = (here, after);
+        }
+        keep(&mut followed, (here, at(LINES - 1), end));
+    }
+    for (sir, low, high) in followed {
+        if !(sir > 0.0) {
+            continue;
+        }
+        let (mut low, mut high) = (low, high);
+        for _ in 0..STEPS {
+            let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+            let (one, other) = (line(a), line(b));
+            best = best.or(one).or(other);
+            if one.sir > other.sir {
+                high = b;
+            } else {
+                low = a;
+            }
+        }
+    }
+    best
+}
+
+/// Inserts `new` into the best lines, best first.
+fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
+    let mut new = new;
+    for slot in followed {
+        if new.0 > slot.0 {
+            core::mem::swap(slot, &mut new);
+        }
+    }
+}
+
+/// Returns the touching position at `y_m`; `None` outside of [0, D] and `band`, and without noise. 40 bisection steps.
+pub(super) fn touching_inside(
+    hops: &TwoHops<'_>,
+    interferer: &Interferer,
+    y_m: f32,
+    band: Band,
+) -> Option<Found> {
+    let mission = hops.mission;
+    let face = Face {
+        d: f64::from(mission.config().distance_m),
+        x: f64::from(interferer.x_m),
+        aside: squared(f64::from(y_m) - f64::from(interferer.y_m)),
+        y: squared(f64::from(y_m)),
+        noise: f64::from(mission.noise_at_a_metre()),
+        g: mission.last_to_first(hops.power_w),
+    };
+    if !(face.noise > 0.0 && face.x < face.d) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, libm::hypot(face.d, f64::from(band.most_m)));
+    for _ in 0..HALVINGS {
+        let r = 0.5 * (low + high);
+        if face.first(r) < face.g / (squared(r) + face.y) {
+            low = r;
+        } else {
+            high = r;
+        }
+    }
+    let z = face.best(high);
+    let across = squared(high) - squared(z);
+    let place = Placement {
+        x_m: narrow(face.d + z),
+        y_m,
+        altitude_m: narrow(libm::sqrt(across.max(0.0))),
+    };
+    let within = (0.0..=mission.config().distance_m).contains(&place.x_m)
+        && (band.least_m..=band.most_m).contains(&place.altitude_m);
+    within.then(|| hops.found(place))
+}
+
+/// Vertical plane along the line, in m and m^2: D, X, (y0 - Y)^2, y0^2, nu, and G = K / A.
+struct Face {
+    d: f64,
+    x: f64,
+    aside: f64,
+    y: f64,
+    noise: f64,
+    g: f64,
+}
+
+impl Face {
+    /// Returns x - D of the maximum of SIR_1 on the circle of radius `r`.
+    fn best(&self, r: f64) -> f64 {
+        let (d, gap) = (self.d, self.d - self.x);
+        let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
+        let s = libm::sqrt((t / (d * self.noise)).max(0.0));
+        let z = (s - squared(r) - squared(gap) - self.aside) / (2.0 * gap);
+        z.max(-r).min(r)
+    }
+
+    /// Returns the maximum of SIR_1 / A on the circle of radius `r`.
+    fn first(&self, r: f64) -> f64 {
+        let (z, gap) = (self.best(r), self.d - self.x);
+        let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;
+        let l = squared(r) + self.y + squared(self.d) + 2.0 * self.d * z;
+        s / (l * (1.0 + self.noise * s))
+    }
+}
+
+fn squared(x: f64) -> f64 {
+    x * x
 }

@@ -2,17 +2,18 @@
 //!
 //! | fixed | file | source |
 //! | --- | --- | --- |
-//! | altitude, one interferer | [`given_altitude`] | Corollary 1, Theorem 1 |
-//! | x, one interferer | [`given_x`] | Theorem 2 |
-//! | nothing, one interferer | [`free`] | Theorem 3, as corrected |
+//! | altitude, one interferer | [`theorems`] | Corollary 1, Theorem 1 |
+//! | x, one interferer | [`theorems`] | Theorem 2 |
+//! | nothing, one interferer | [`theorems`] | Theorem 3, as corrected |
 //! | nothing, with lateral room, one interferer | [`aside`] | not in the paper |
-//! | altitude, a field of interference | [`stochastic`] | Algorithm 3, as corrected |
-//! | altitude, noise only | [`noise`] | the paper's special case without interference |
+//! | altitude, a field of interference | [`without_interferer`] | Algorithm 3, as corrected |
+//! | altitude, noise only | [`without_interferer`] | the paper's special case without interference |
 //!
-//! They use the locus of equal SIRs ([`locus`], Lemma 1) and the extrema of the first hop's SIR ([`crate::sir::first_hop_turn`],
-//! Lemma 2). [`guide`] has C_1, C_2 and C_3, the power ratios at which the cases change. SIR_2 always rises with x and falls with
-//! the altitude. With receiver noise SIR_1 may have one more extremum, and the optimum of Theorem 3 may be inside the box
-//! (`touching`). All modules use the mission's noise but [`noise`], which has its own.
+//! They use the locus of equal SIRs ([`theorems::equal_altitudes`], Lemma 1) and the extrema of the first hop's SIR
+//! ([`crate::sir::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
+//! change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more extremum, and the
+//! optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise but
+//! [`without_interferer::best_in_noise`], which has its own.
 
 #![cfg_attr(
     not(feature = "internals"),
@@ -26,25 +27,9 @@
 )]
 
 pub mod aside;
-mod corridor;
 mod edge;
-mod edge_noise;
-pub mod free;
-pub mod given_altitude;
-pub mod given_x;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod guide;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod guide;
-#[cfg(not(feature = "internals"))]
-pub(crate) mod locus;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod locus;
-pub mod noise;
-pub mod stochastic;
-mod touching;
+pub mod theorems;
+pub mod without_interferer;
 
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;

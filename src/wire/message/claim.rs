@@ -1,7 +1,6 @@
 //! Claim to a node number, by which two nodes with the same number detect each other.
 
-use super::parts::{MessageError, read, write};
-use super::tag;
+use super::parts::{MessageError, read, tag, write};
 
 /// Claim of the sender to its node number since its start, or the repetition of such a claim; sent in both directions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,7 +1,6 @@
 //! Encoding of a [`Fence`] between two neighbours.
 
-use super::parts::{MessageError, PassId, Word, read, write};
-use super::tag;
+use super::parts::{MessageError, PassId, Word, read, tag, write};
 use crate::guard::Fence;
 use crate::place::CrossSection;
 

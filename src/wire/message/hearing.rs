@@ -5,9 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::parts::{MessageError, PassId, Word, read, write};
 use crate::mission::Interferer;
 use crate::sensing::belief::{Belief, Spread, Told};
-use crate::sensing::level::{Level, is_power};
-use crate::sensing::sums::{SUMS, Sums};
-use crate::wire::node_number::MAX_NODE;
+use crate::sensing::sums::{Level, SUMS, Sums, is_power};
+use crate::wire::MAX_NODE;
 
 /// Length of the body: tag, pass id, estimate, sums, receiver's level and the excluded node.
 pub(super) const LENGTH: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;

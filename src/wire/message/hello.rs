@@ -1,7 +1,6 @@
 //! Hello: a node's state of the chain.
 
-use super::parts::{MessageError, Word, read, write};
-use super::tag;
+use super::parts::{MessageError, Word, read, tag, write};
 use crate::mission::MAX_RELAYS;
 use crate::view::ViewId;
 use crate::wire::digest::MissionId;

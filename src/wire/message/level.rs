@@ -1,8 +1,7 @@
 //! Interference level at an end of the chain, reported by the ground station.
 
-use super::parts::{MessageError, Word, read, write};
-use super::tag;
-use crate::sensing::level::is_level;
+use super::parts::{MessageError, Word, read, tag, write};
+use crate::sensing::sums::is_level;
 
 pub(super) fn encode(mission: u16, power_w: f32, buffer: &mut [u8]) -> Option<usize> {
     write(&(tag::LEVEL, Word::new(mission), power_w), buffer)

@@ -1,7 +1,8 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
 //! Each kind of message has one file with its type, its encoder and its decoder, which checks all ranges: a decoded message has
-//! no invalid number. A body is a byte, the `tag`, and postcard of a tuple, whose order is the format. `parts` has shared parts.
+//! no invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
+//! shared parts.
 
 mod claim;
 mod fence;
@@ -15,7 +16,6 @@ mod parts;
 mod pulse;
 mod roster;
 mod sweep;
-mod tag;
 mod turn;
 mod view;
 
@@ -29,7 +29,7 @@ pub use self::sweep::{Answer, Sweep};
 pub use self::turn::{AdjustStep, Moved, Token};
 pub use self::view::{Decision, Poll, Proposal, Successor};
 
-use self::parts::{Word, read, write};
+use self::parts::{Word, read, tag, write};
 #[cfg(feature = "upload")]
 use super::upload::Upload;
 use crate::guard::Fence;

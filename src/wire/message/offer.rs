@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{MessageError, PassId, Word, read, write};
-use super::tag;
+use super::parts::{MessageError, PassId, Word, read, tag, write};
 use crate::channel::Channel;
+use crate::geodetic::{SITES_LENGTH, Sites};
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
-use crate::sites::{self, Sites};
 use crate::wire::upload::Upload;
 
 /// Length of an encoded upload, bytes: its tag and the fixed-size fields of its wire form.
@@ -59,9 +58,9 @@ struct OfferBody {
     sites: SitesBody,
 }
 
-type SitesBody = [u8; sites::LENGTH];
+type SitesBody = [u8; SITES_LENGTH];
 
-const NO_SITES: SitesBody = [0; sites::LENGTH];
+const NO_SITES: SitesBody = [0; SITES_LENGTH];
 
 impl OfferBody {
     fn of(upload: &Upload) -> Self {

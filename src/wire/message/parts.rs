@@ -1,4 +1,4 @@
-//! Parts of several bodies, and the ranges of their numbers.
+//! Parts of several bodies, the ranges of their numbers, and the tags of the messages.
 //!
 //! A type of its own costs no bytes on the wire, and saves the code to read it again.
 
@@ -7,6 +7,33 @@ use serde::{Deserialize, Serialize, Serializer};
 use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
+
+/// Tags: the first byte of a body, which is the kind of message; sweeps have three kinds.
+pub(super) mod tag {
+    pub(crate) const SWEEP: u8 = 0;
+    pub(crate) const VERDICT: u8 = 1;
+    pub(crate) const BUSY: u8 = 2;
+    pub(crate) const HEARTBEAT: u8 = 3;
+    pub(crate) const MEASURED: u8 = 4;
+    pub(crate) const ASIDE: u8 = 5;
+    pub(crate) const GATHER: u8 = 6;
+    pub(crate) const GATHERED: u8 = 7;
+    pub(crate) const TOKEN: u8 = 8;
+    pub(crate) const MOVED: u8 = 9;
+    pub(crate) const HELLO: u8 = 10;
+    pub(crate) const PROPOSAL: u8 = 11;
+    pub(crate) const DECISION: u8 = 12;
+    pub(crate) const FENCE: u8 = 13;
+    #[cfg(feature = "upload")]
+    pub(crate) const OFFER: u8 = 14;
+    pub(crate) const PULSE: u8 = 15;
+    pub(crate) const PULSED: u8 = 16;
+    pub(crate) const SENSE: u8 = 17;
+    pub(crate) const SENSED: u8 = 18;
+    #[cfg(feature = "upload")]
+    pub(crate) const LEVEL: u8 = 19;
+    pub(crate) const CLAIM: u8 = 20;
+}
 
 /// 16-bit number in two bytes; postcard would encode a `u16` as a varint.
 #[derive(Clone, Copy, Deserialize)]

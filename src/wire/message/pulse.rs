@@ -1,7 +1,6 @@
 //! Lease renewal, and its acknowledgement.
 
-use super::parts::{MessageError, PassId, Word, read, write};
-use super::tag;
+use super::parts::{MessageError, PassId, Word, read, tag, write};
 
 /// Lease renewal by the view's leader; sent onward.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

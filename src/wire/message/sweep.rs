@@ -3,13 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::parts::{
-    FARTHEST_M, MessageError, PassId, in_range, is_beside, profile, read, take, take_targets, write,
+    FARTHEST_M, MessageError, PassId, in_range, is_beside, profile, read, tag, take, take_targets,
+    write,
 };
-use super::tag;
 use crate::field::is_upsilon;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::{Ladder, TARGETS};
-use crate::optimiser::verdict::Verdict;
+use crate::optimiser::pass::Verdict;
 use crate::place::{CrossSection, Station};
 
 /// Sweep of targets along the chain, from one relay to the next.

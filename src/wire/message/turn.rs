@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{MessageError, PassId, PlaceBody, profile, read, write};
-use super::tag;
+use super::parts::{MessageError, PassId, PlaceBody, profile, read, tag, write};
 use crate::optimiser::local::Local;
 use crate::place::Placement;
 

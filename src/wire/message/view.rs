@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{MessageError, Word, read, write};
-use super::tag;
+use super::parts::{MessageError, Word, read, tag, write};
 use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;

@@ -4,8 +4,7 @@
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;
 use uav_relay::flight::autopilot::{Signing, Stamp};
-use uav_relay::flight::mavlink::incoming::Incoming;
-use uav_relay::flight::mavlink::parser::{Parser, Received};
+use uav_relay::flight::mavlink::incoming::{Incoming, Parser, Received};
 
 use crate::input::Input;
 

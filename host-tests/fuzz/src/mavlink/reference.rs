@@ -1,6 +1,6 @@
 //! Reference parser by the definition of frames: the earliest valid frame, then the search continues behind it.
 
-use uav_relay::flight::mavlink::table;
+use uav_relay::flight::mavlink::frame;
 
 use super::wire::checksum;
 
@@ -29,7 +29,7 @@ impl Reference {
             bytes.get(at..).and_then(<[u8]>::first_chunk)
         {
             let id = u32::from_le_bytes([a, b, c, 0]);
-            let known = table::find(id)
+            let known = frame::find_known(id)
                 .filter(|known| magic == 0xFD && u16::from(length) <= u16::from(known.length) + 24);
             let Some(known) = known else {
                 at += 1;

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::Ladder;
-use uav_relay::optimiser::verdict::Verdict;
+use uav_relay::optimiser::pass::Verdict;
 use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::message::{Answer, Message, Sweep};
 

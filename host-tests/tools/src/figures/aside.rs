@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::Mission;
-use uav_relay::planning::single::{Found, aside, free, given_altitude};
+use uav_relay::planning::single::{Found, aside, theorems};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::paper;
@@ -121,8 +121,8 @@ fn gain(offset: u16) -> Result<PowerRatio, Trouble> {
     let both = some(aside::best_place(&mission, common.power_w))?;
     Ok(PowerRatio {
         interferer_y_m: offset_m,
-        line_sir_linear: some(given_altitude::best_place(&mission, common))?.sir,
-        altitude_sir_linear: some(free::best_place(&mission, common.power_w))?.sir,
+        line_sir_linear: some(theorems::best_at_altitude(&mission, common))?.sir,
+        altitude_sir_linear: some(theorems::best_free(&mission, common.power_w))?.sir,
         side_sir_linear: some(aside::best_at(&mission, common))?.sir,
         both_sir_linear: both.sir,
         both_altitude_m: both.place.altitude_m,

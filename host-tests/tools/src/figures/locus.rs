@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use uav_relay::Mission;
-use uav_relay::planning::single::locus::altitudes;
+use uav_relay::planning::single::theorems::equal_altitudes;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::paper;
@@ -67,7 +67,7 @@ pub fn data(per_m: u8) -> Result<Vec<Row>, Trouble> {
             if x_m > config.distance_m {
                 break;
             }
-            let [lower, upper] = altitudes(&mission, x_m, config.common.power_w);
+            let [lower, upper] = equal_altitudes(&mission, x_m, config.common.power_w);
             rows.push(Row {
                 tx_w: choice.0,
                 interferer_x_m: choice.1.0,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::planning::single::given_altitude;
+use uav_relay::planning::single::theorems;
 
 use super::trouble::Trouble;
 use crate::baseline::random::mean;
@@ -88,7 +88,7 @@ fn row(tx_w: f64, relay_w: f64, altitude_m: u32, draws: u32) -> Option<Row> {
     let scenario = scenario(tx_w, relay_w, altitude_m);
     let (mission, _) = mission::mission(&scenario, 1, 1e-4).ok()?;
     let scene = Scene::new(&scenario, 1)?;
-    let (best, _) = given_altitude::best_place(&mission, mission.config().common)?;
+    let (best, _) = theorems::best_at_altitude(&mission, mission.config().common)?;
     let random = mean(&scene, draws, SEED + u64::from(altitude_m));
     Some(Row {
         tx_w,

@@ -1,6 +1,6 @@
 //! Explanations of the theorems' cases for the user.
 
-use uav_relay::planning::single::{aside, free, given_altitude, given_x};
+use uav_relay::planning::single::{aside, theorems};
 
 /// Explanation for an interferer at Rx.
 const DROWNED: &str = "the interferer stands at Rx, where nothing is heard wherever the drone is";
@@ -10,8 +10,8 @@ const LEVEL: &str = "the drone goes right above Rx: the interferer stands at Tx,
                      second is best there";
 
 /// Explains a case of Theorem 1.
-pub(super) fn along_x(case: given_altitude::PlaceCase) -> &'static str {
-    use given_altitude::PlaceCase;
+pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
+    use theorems::PlaceCase;
     match case {
         PlaceCase::AboveTx => {
             "the drone stays right above Tx: its first hop is the weaker one even there, and weaker anywhere else"
@@ -47,8 +47,8 @@ pub(super) fn along_x(case: given_altitude::PlaceCase) -> &'static str {
 }
 
 /// Explains a case of Theorem 2.
-pub(super) fn upward(case: given_x::AltitudeCase) -> &'static str {
-    use given_x::AltitudeCase;
+pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
+    use theorems::AltitudeCase;
     match case {
         AltitudeCase::BothFall => {
             "the drone flies as low as it may: both hops get worse with the altitude"
@@ -64,12 +64,12 @@ pub(super) fn upward(case: given_x::AltitudeCase) -> &'static str {
 }
 
 /// Returns the number and explanation of a case of Theorem 3.
-pub(super) fn anywhere_above(case: free::FreeCase) -> (u8, String) {
+pub(super) fn anywhere_above(case: theorems::FreeCase) -> (u8, String) {
     match case {
-        free::FreeCase::Lowest(case) => (1, format!("as low as may be, {}", along_x(case))),
-        free::FreeCase::Highest(case) => (2, format!("as high as may be, {}", along_x(case))),
-        free::FreeCase::AboveRx(case) => (3, format!("right above Rx, {}", upward(case))),
-        free::FreeCase::Touching => (
+        theorems::FreeCase::Lowest(case) => (1, format!("as low as may be, {}", along_x(case))),
+        theorems::FreeCase::Highest(case) => (2, format!("as high as may be, {}", along_x(case))),
+        theorems::FreeCase::AboveRx(case) => (3, format!("right above Rx, {}", upward(case))),
+        theorems::FreeCase::Touching => (
             4,
             "the drone goes between the lowest and the highest altitude, to where any step that helps one hop harms the other"
                 .to_owned(),

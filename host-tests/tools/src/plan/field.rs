@@ -2,8 +2,8 @@
 //!
 //! The field does not depend on the altitude, and the outer hops are best at the lowest one, so free altitudes reduce to that.
 
-use uav_relay::planning::fleet::ranges;
-use uav_relay::planning::single::stochastic;
+use uav_relay::planning::fleet;
+use uav_relay::planning::single::without_interferer;
 
 use super::ask::{Ask, Number};
 use super::briefed::{Briefed, is_free};
@@ -38,7 +38,8 @@ fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan
     let briefed = Briefed::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);
     if relays == 1 {
-        let found = stochastic::best_place(&briefed.mission, profile).ok_or_else(nothing)?;
+        let found =
+            without_interferer::best_in_field(&briefed.mission, profile).ok_or_else(nothing)?;
         return Ok(briefed.plan(&[found.place], "Algorithm 3", true));
     }
     if !briefed.own.is_empty() {
@@ -47,11 +48,11 @@ fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan
         let places = placed(&briefed, target).ok_or_else(nothing)?;
         return Ok(briefed.plan(&places, "Algorithm 4", false));
     }
-    let target = ranges::best(&briefed.mission, profile).ok_or_else(nothing)?;
+    let target = fleet::best_of_equals(&briefed.mission, profile).ok_or_else(nothing)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
     let proven = is_free(scenario, |free| {
         let free = Briefed::new(free, relays, tolerance).ok()?;
-        let most = ranges::best(&free.mission, profile)?;
+        let most = fleet::best_of_equals(&free.mission, profile)?;
         Some(f64::from(most) <= f64::from(target) * (1.0 + tolerance))
     });
     Ok(briefed.plan(&places, "ranges that can be continued to Rx", proven))

@@ -2,7 +2,7 @@
 
 use uav_relay::optimiser::plan as silent;
 use uav_relay::planning::fleet::{Fewest, Most};
-use uav_relay::planning::single::{Found, aside, free, given_altitude, given_x};
+use uav_relay::planning::single::{Found, aside, theorems};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
 use super::ask::Ask;
@@ -72,7 +72,7 @@ pub(super) fn nothing() -> NoPlan {
 }
 
 fn first(mission: &Mission, profile: Profile) -> Option<(Found, Theorem)> {
-    let (found, case) = given_altitude::best_place(mission, profile)?;
+    let (found, case) = theorems::best_at_altitude(mission, profile)?;
     Some((
         found,
         Theorem {
@@ -84,7 +84,7 @@ fn first(mission: &Mission, profile: Profile) -> Option<(Found, Theorem)> {
 }
 
 fn second(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Theorem)> {
-    let (found, case) = given_x::best_place(mission, x_m, power_w)?;
+    let (found, case) = theorems::best_at_x(mission, x_m, power_w)?;
     Some((
         found,
         Theorem {
@@ -96,7 +96,7 @@ fn second(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Theorem)>
 }
 
 fn third(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
-    let (found, case) = free::best_place(mission, power_w)?;
+    let (found, case) = theorems::best_free(mission, power_w)?;
     let (number, words) = anywhere_above(case);
     Some((
         found,

@@ -5,8 +5,7 @@
 
 use crate::mission::{Interferer, Mission, Profile};
 use crate::optimiser::joint::hop::Triple;
-use crate::optimiser::joint::outlook::Outlook;
-use crate::optimiser::joint::policy::Brief;
+use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};

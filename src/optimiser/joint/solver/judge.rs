@@ -4,8 +4,7 @@
 //! tries another position, where the derivatives show no gain.
 
 use super::chain::{Seat, SolverContext, far_off, last_of};
-use super::state::Solver;
-use super::work::{Purpose, Work};
+use super::{Purpose, Solver, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};

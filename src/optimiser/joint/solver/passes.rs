@@ -4,13 +4,11 @@
 //! and whether they have to hold back.
 
 use super::chain::{SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of};
-use super::state::Solver;
-use super::work::{ForwardPass, Purpose, Work};
+use super::{ForwardPass, Purpose, Solver, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::AscentStep;
 use crate::optimiser::joint::hop::{Triple, minus, triple};
-use crate::optimiser::joint::outlook::Outlook;
-use crate::optimiser::joint::policy::Brief;
+use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site::{Cell, Room, Site};
 use crate::optimiser::joint::starts::Start;
 use crate::optimiser::spacing::{Hop, Stand};

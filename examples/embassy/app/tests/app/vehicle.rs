@@ -2,8 +2,7 @@
 
 use embedded_io_async::Write as _;
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum};
-use uav_relay::flight::mavlink::table::{self, id};
+use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum, find_known, id};
 use uav_relay::{Geodetic, Placement};
 
 use crate::bench::{Pipe, SITES};
@@ -89,7 +88,7 @@ impl Vehicle {
         let mut frame = vec![MAGIC, length, 0, 0, self.sequence, 1, 1, a, b, c];
         self.sequence = self.sequence.wrapping_add(1);
         frame.extend(payload);
-        let sum = checksum(&frame[1..], table::find(id).unwrap());
+        let sum = checksum(&frame[1..], find_known(id).unwrap());
         frame.extend(sum.to_le_bytes());
         embassy_futures::block_on(self.uart[0].write(&frame)).unwrap();
     }

@@ -1,8 +1,7 @@
 //! MAVLink frames of a simulated autopilot: encoding and decoding.
 
 use uav_relay::Geodetic;
-use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum};
-use uav_relay::flight::mavlink::table::{self, id};
+use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum, find_known, id};
 
 /// MAVLink system ID.
 const SYSTEM: u8 = 1;
@@ -86,7 +85,7 @@ fn framed(id: u32, payload: &[u8], sequence: u8) -> Vec<u8> {
     let length = u8::try_from(payload.len()).unwrap_or(u8::MAX);
     let mut frame = vec![MAGIC, length, 0, 0, sequence, SYSTEM, 1, a, b, c];
     frame.extend(payload);
-    if let (Some(known), Some(covered)) = (table::find(id), frame.get(1..)) {
+    if let (Some(known), Some(covered)) = (find_known(id), frame.get(1..)) {
         frame.extend(checksum(covered, known).to_le_bytes());
     }
     frame

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, Kind};
 use uav_relay::flight::axis::Axis;
-use uav_relay::flight::mavlink::table::id;
+use uav_relay::flight::mavlink::frame::id;
 use uav_relay::{Duration, Instant, Placement, Sites};
 
 use super::frames::{Heard, Says, heard};

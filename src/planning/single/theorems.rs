@@ -1,0 +1,388 @@
+//! One relay above the line from Tx to Rx and one interferer anywhere: Lemma 1, Corollary 1, and Theorems 1 to 3.
+//!
+//! # Given altitude: Corollary 1 and Theorem 1
+//!
+//! [`best_at_altitude`] has the optimum.
+//!
+//! SIR_2 rises with x. For X > 0 SIR_1 falls to a minimum and rises beyond, so the worse one is maximal where they cross before
+//! the minimum, or above Rx. With the interferer behind Tx (X < 0), which the paper omits, SIR_1 rises to a maximum and falls
+//! beyond. Up to the maximum both rise, so the optimum is the maximum, the crossing beyond it, or above Rx.
+//!
+//! With noise SIR_1 finally falls: beyond its minimum it has a maximum, or it has neither. Up to the maximum both rise; beyond,
+//! the optimum is the maximum, the crossing, or above Rx.
+//!
+//! The crossing is a root of the paper's quartic. Its coefficients cancel in f32, but the SIRs themselves do not, so the root is
+//! found by bisection of an interval on which their difference changes its sign once.
+//!
+//! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
+//!
+//! # Given x: Theorem 2
+//!
+//! [`best_at_x`] has the optimum.
+//!
+//! SIR_2 falls with the altitude. SIR_1 = A (a + h^2) / (b + h^2) with a = (x - X)^2 + Y^2 and b = x^2 falls too, unless X > 0
+//! and x is beyond the paper's Psi^h = (X^2 + Y^2) / 2X. There it rises, and the worse one is maximal where they are equal (Lemma
+//! 1), or at an end of the band.
+//!
+//! With noise SIR_1 = A (a + h^2) / ((b + h^2)(1 + nu (a + h^2))) rises only while nu (a + h^2)^2 < b - a, and falls above that,
+//! as SIR_2 does. So no higher altitude is better, and below it everything is as without noise.
+//!
+//! Accuracy: `theorem_2_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
+//!
+//! # Free x and altitude: Theorem 3, corrected
+//!
+//! [`best_free`] has the optimum.
+//!
+//! The optimum is on the edge of the box [0, D] x band. Inside, SIR_1 and SIR_2 would have to be equal with opposite slopes,
+//! since neither has a stationary point there: their level lines would touch. But those of SIR_1 are circles about ground points,
+//! and those of SIR_2 circles about Rx, and such circles touch on the ground only. Two of the printed cases miss this, and are
+//! wrong (by a factor of 17 in the first counterexample of the tests).
+//!
+//! On the edges Theorems 1 and 2 are exact, and the best of the edges is the optimum. Right above Tx both SIRs fall with the
+//! altitude, so only the lowest position of that edge counts, which is on the lowest edge too: three edges are left.
+//!
+//! With noise the level lines of SIR_1 are no circles, and there is one position inside at which they may touch: see `edge`.
+//!
+//! Accuracy: `theorem_3_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
+//!
+//! # Guide for the powers of Tx and relay
+//!
+//! [`power_ratios`] are the ratios p_t / p_u at which the cases of Corollary 1 change.
+//!
+//! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at one position: above Tx (C_1),
+//! above Rx (C_2), and at the minimum of SIR_1 (C_3). The paper prints them as formulas; here they are computed from the SIRs.
+//!
+//! # Locus of equal SIR of both hops: Lemma 1
+//!
+//! [`equal_altitudes`] has the altitudes for an x.
+//!
+//! With u = h^2, a = (x - X)^2 + Y^2, b = x^2, c = (D - x)^2 and G = (p_u / p_t)(mu_nlos / eta)((X - D)^2 + Y^2), SIR_1 = SIR_2
+//! is (a + u)(c + u) = G (b + u), or
+//!
+//! ```text
+//! u^2 + (a + c - G) u + a c - G b = 0,
+//! ```
+//!
+//! which is the paper's A u^2 + B u + C = 0 divided by A = p_t. With noise the denominator of SIR_1 has a factor 1 + nu (a + u),
+//! K includes the noise at Rx, and
+//!
+//! ```text
+//! (1 - G nu) u^2 + (a + c - G - G nu (a + b)) u + a c - G b - G nu a b = 0.
+//! ```
+//!
+//! Computed in f64, and so exact to the last place of the f32 result. Accuracy: `the_locus_is_where_the_hops_are_equal` in
+//! `host-tests/tests/theorems/`.
+
+use super::edge::{TwoHops, touching_inside};
+use super::{Found, Two};
+use crate::mission::{Band, Interferer, Mission, Profile};
+use crate::root::sqrt;
+use crate::sir::{Extremum, first_hop_turn, square};
+
+/// Case of the optimum; the first five are Corollary 1's, for X >= 0.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum PlaceCase {
+    /// x = 0: the first hop is the worse one even right above Tx, p_t / p_u < C_1.
+    AboveTx = 1,
+    /// x of the only crossing: SIR_1 falls over the relevant range and crosses SIR_2 once.
+    Crossing = 2,
+    /// x = D: the first hop is the better one wherever SIR_1 does not rise.
+    AboveRx = 3,
+    /// x of the crossing before the minimum of SIR_1, or D if SIR_1 has recovered by then.
+    BeforeValley = 4,
+    /// x = D: the first hop is the better one even at the minimum of SIR_1.
+    OverValley = 5,
+    /// x of the maximum of SIR_1, for X < 0: the first hop is the worse one even there.
+    Hilltop = 6,
+    /// x of the crossing beyond the maximum of SIR_1, for X < 0.
+    BeyondHill = 7,
+    /// x = D, for X < 0: the first hop is the better one even above Rx, or SIR_1 rises over the whole range.
+    HillAboveRx = 8,
+    /// x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
+    Level = 9,
+    /// x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    Drowned = 10,
+    /// Maximum that follows the minimum of SIR_1, or the crossing beyond it; with noise.
+    SecondHill = 11,
+}
+
+impl PlaceCase {
+    /// Number of the case in Corollary 1, 1 to 5; 0 for cases that it omits.
+    pub const fn printed(self) -> u8 {
+        let number = self as u8;
+        if number <= Self::OverValley as u8 {
+            number
+        } else {
+            0
+        }
+    }
+}
+
+/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case; `None` in a field.
+///
+/// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
+pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
+    let interferer = mission.interferer()?;
+    let two = Two { mission, profile };
+    let end_m = mission.config().distance_m;
+    let above_rx = two.found(end_m);
+    if !(two.second(end_m) > 0.0) {
+        return Some((above_rx, PlaceCase::Drowned));
+    }
+    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
+    // End of the falling part of SIR_1, and true if it rises again before Rx.
+    let turn = first_hop_turn(mission, interferer, profile.altitude_m);
+    let (to, valley) = match turn {
+        Extremum::Level => return Some((above_rx, PlaceCase::Level)),
+        Extremum::Hill(peak) => {
+            return Some(if peak >= end_m || !worse_first(end_m) {
+                (above_rx, PlaceCase::HillAboveRx)
+            } else if worse_first(peak) {
+                (two.found(peak), PlaceCase::Hilltop)
+            } else {
+                (two.crossing(peak, end_m), PlaceCase::BeyondHill)
+            });
+        }
+        Extremum::Valley(bottom) | Extremum::ValleyAndHill(bottom, _) if bottom < end_m => {
+            (bottom, true)
+        }
+        _ => (end_m, false),
+    };
+    if two.first(0.0) < two.second(0.0) {
+        return Some((two.found(0.0), PlaceCase::AboveTx));
+    }
+    let second = second_hill(two, turn, end_m);
+    let first = match (worse_first(to), valley) {
+        (true, false) => (two.crossing(0.0, to), PlaceCase::Crossing),
+        (true, true) => (two.crossing(0.0, to).or(above_rx), PlaceCase::BeforeValley),
+        (false, false) => (above_rx, PlaceCase::AboveRx),
+        (false, true) => (above_rx, PlaceCase::OverValley),
+    };
+    Some(match second {
+        Some(second) if second.sir > first.0.sir => (second, PlaceCase::SecondHill),
+        _ => first,
+    })
+}
+
+/// Returns the best position at or beyond the maximum that follows the minimum of SIR_1, if that is before `end_m`.
+fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
+    let Extremum::ValleyAndHill(_, hill) = turn else {
+        return None;
+    };
+    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
+    if !(hill < end_m) {
+        return None;
+    }
+    Some(if worse_first(hill) {
+        two.found(hill)
+    } else if worse_first(end_m) {
+        two.crossing(hill, end_m)
+    } else {
+        two.found(end_m)
+    })
+}
+
+/// Case of the optimum; the first three are Theorem 2's.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum AltitudeCase {
+    /// Lowest altitude: both SIRs fall with the altitude (x <= Psi^h, or X <= 0).
+    BothFall = 1,
+    /// Altitude within the band at which SIR_1, which rises with the altitude, equals SIR_2.
+    Crossing = 2,
+    /// End of the band: SIR_1 rises with the altitude, but equals SIR_2 nowhere in the band.
+    End = 3,
+    /// Lowest altitude: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    Drowned = 4,
+}
+
+impl AltitudeCase {
+    /// Number of the case in Theorem 2, 1 to 3; 0 for the case that it omits.
+    pub const fn printed(self) -> u8 {
+        match self {
+            Self::Drowned => 0,
+            other => other as u8,
+        }
+    }
+}
+
+/// Returns the optimal altitude in the mission's band for a relay of `power_w` watts at `x_m`, m in [0, D], and its case.
+///
+/// `None` in a field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one of Lemma 1.
+pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, AltitudeCase)> {
+    let interferer = mission.interferer()?;
+    if !(0.0..=mission.config().distance_m).contains(&x_m) {
+        return None;
+    }
+    let band = mission.config().band;
+    let at = |altitude_m: f32| Two {
+        mission,
+        profile: Profile {
+            altitude_m,
+            power_w,
+        },
+    };
+    let (rises, top_m) = rising(mission, interferer, x_m, band);
+    let (lowest, highest) = (at(band.least_m), at(top_m));
+    let low = lowest.found(x_m);
+    if !(lowest.second(x_m) > 0.0) {
+        return Some((low, AltitudeCase::Drowned));
+    }
+    if !rises {
+        return Some((low, AltitudeCase::BothFall));
+    }
+    if lowest.first(x_m) > lowest.second(x_m) || highest.first(x_m) < highest.second(x_m) {
+        return Some((low.or(highest.found(x_m)), AltitudeCase::End));
+    }
+    // SIR_1 is smaller below the crossing, SIR_2 above: it is the larger root, unless that is where SIR_1 falls.
+    let [lower, upper] = equal_altitudes(mission, x_m, power_w);
+    let crossing = upper
+        .filter(|upper| !(*upper > top_m && mission.noise_at_a_metre() > 0.0))
+        .or(lower);
+    let altitude_m = crossing
+        .unwrap_or(band.least_m)
+        .max(band.least_m)
+        .min(top_m);
+    Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
+}
+
+/// Returns true if SIR_1 rises with the altitude from the bottom of `band`, and the altitude up to which it rises.
+fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
+    let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
+    let noise = mission.noise_at_a_metre();
+    if !(noise > 0.0 && ahead > 0.0) {
+        let rises = 2.0 * interferer.x_m * x_m > square(interferer.x_m) + square(interferer.y_m);
+        return (rises, band.most_m);
+    }
+    let a = square(x_m - interferer.x_m) + square(interferer.y_m);
+    let top_m = sqrt(sqrt(ahead / noise) - a).min(band.most_m);
+    (top_m > band.least_m, top_m.max(band.least_m))
+}
+
+/// Edge of the optimum with its case there, or the inside; on a corner the first edge.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum FreeCase {
+    /// Lowest altitude, by Theorem 1.
+    Lowest(PlaceCase),
+    /// Highest altitude, by Theorem 1.
+    Highest(PlaceCase),
+    /// Above Rx, by Theorem 2.
+    AboveRx(AltitudeCase),
+    /// Touching position of the level lines of both SIRs inside the box, with noise.
+    Touching,
+}
+
+/// Returns the optimal position of a relay of `power_w` watts in [0, D] and the mission's band, and its case; `None` in a field.
+///
+/// Work: at most 190 evaluations of both hops and one of Lemma 1.
+pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
+    let config = mission.config();
+    let level = |altitude_m: f32| {
+        let profile = Profile {
+            altitude_m,
+            power_w,
+        };
+        best_at_altitude(mission, profile)
+    };
+    let (found, case) = level(config.band.least_m)?;
+    let mut best = (found, FreeCase::Lowest(case));
+    let mut weigh = |found: Found, case: FreeCase| {
+        if found.sir > best.0.sir {
+            best = (found, case);
+        }
+    };
+    let (found, case) = level(config.band.most_m)?;
+    weigh(found, FreeCase::Highest(case));
+    let (found, case) = best_at_x(mission, config.distance_m, power_w)?;
+    weigh(found, FreeCase::AboveRx(case));
+    let hops = TwoHops { mission, power_w };
+    if let Some(found) = touching_inside(&hops, mission.interferer()?, 0.0, config.band) {
+        weigh(found, FreeCase::Touching);
+    }
+    Some(best)
+}
+
+/// Ratios p_t / p_u, linear.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Guide {
+    /// C_1: below it the first hop is the worse one even right above Tx; 0 with the interferer at Rx.
+    pub c1: f32,
+    /// C_2: above it the first hop is the better one even right above Rx.
+    pub c2: f32,
+    /// C_3: above it the first hop is the better one even at the minimum of SIR_1, between Tx and Rx or beyond. `None` for X <=
+    /// 0; with noise, the minimum before the maximum.
+    pub c3: Option<f32>,
+}
+
+/// Returns the ratios for a relay at `altitude_m`, m, above 0; `None` in a field.
+///
+/// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
+pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
+    let interferer = mission.interferer()?;
+    let config = mission.config();
+    let profile = Profile {
+        altitude_m,
+        power_w: config.common.power_w,
+    };
+    let two = Two { mission, profile };
+    let present = config.tx_power_w / profile.power_w;
+    let equal_at = |x_m: f32| present * (two.second(x_m) / two.first(x_m));
+    Some(Guide {
+        c1: equal_at(0.0),
+        c2: equal_at(config.distance_m),
+        c3: match first_hop_turn(mission, interferer, altitude_m) {
+            Extremum::Valley(bottom) | Extremum::ValleyAndHill(bottom, _) if bottom < 1e18 => {
+                Some(equal_at(bottom))
+            }
+            _ => None,
+        },
+    })
+}
+
+/// Returns the altitudes, m, lower first, at which a relay of `power_w` watts at `x_m` has SIR_1 = SIR_2: the paper's h^- and
+/// h^+.
+///
+/// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's band. `None` for each that does not
+/// exist, and for both in a field. Constant work.
+pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
+    let Some(interferer) = mission.interferer() else {
+        return [None; 2];
+    };
+    let wide = |x: f32| f64::from(x);
+    let squared = |x: f64| x * x;
+    let x = wide(x_m);
+    let a = squared(x - wide(interferer.x_m)) + squared(wide(interferer.y_m));
+    let b = squared(x);
+    let c = squared(wide(mission.config().distance_m) - x);
+    let g = mission.last_to_first(power_w);
+    let lost = g * wide(mission.noise_at_a_metre());
+    let half = 0.5 * (a + c - g - lost * (a + b));
+    let (square, product) = (1.0 - lost, a * c - g * b - lost * a * b);
+    let discriminant = half * half - square * product;
+    if discriminant < 0.0 {
+        return [None; 2];
+    }
+    // The larger root first, the other one from their product: neither cancels.
+    let far = -(half + libm::copysign(libm::sqrt(discriminant), half));
+    let near = if libm::fabs(far) > 0.0 {
+        product / far
+    } else {
+        0.0
+    };
+    let far = far / square;
+    [near.min(far), near.max(far)]
+        .map(|u| (u > 0.0 && u.is_finite()).then(|| narrow(libm::sqrt(u))))
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "an altitude is given as an f32"
+)]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
