@@ -509,7 +509,7 @@ fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let mut fences = [0.0_f32; 2];
     for second in 1..20 {
         let now = Instant::from_millis(1_000 * second);
-        let first = if second < 10 { 1 } else { 0 };
+        let first = usize::from(second < 10);
         if second == 10 {
             guards[0].link(Side::Downstream, Some(2));
             guards[1].link(Side::Upstream, Some(1));
