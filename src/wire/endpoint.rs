@@ -90,6 +90,10 @@ impl Endpoint {
     }
 
     /// Returns true once no more frames can be sent: a signed counter is used once, and after four billion frames a new epoch is due.
+    #[cfg_attr(
+        not(feature = "auth"),
+        expect(clippy::unused_self, reason = "only signed counters end")
+    )]
     pub(crate) const fn is_exhausted(&self) -> bool {
         #[cfg(feature = "auth")]
         return self.counter == u32::MAX && self.session.is_some();
@@ -99,6 +103,10 @@ impl Endpoint {
 
     /// Writes `message` to node `to`. If that node could not check its tag yet, writes a handshake in its place: the message is due again
     /// later.
+    #[cfg_attr(
+        not(feature = "auth"),
+        expect(clippy::unnecessary_wraps, reason = "as with signatures")
+    )]
     pub(crate) fn transmit(
         &mut self,
         to: u16,
