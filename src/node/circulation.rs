@@ -9,11 +9,11 @@
 //! | --- | --- | --- | --- |
 //! | any | message received or created ([`start`](Circulation::start)) | forward it | `Outstanding` |
 //! | any | result known ([`complete`](Circulation::complete)) | send the reply, unless this relay is the initiator | `Completed` |
-//! | any | message given up ([`withdraw`](Circulation::withdraw)) | - | `Idle` |
+//! | any | message given up ([`withdraw`](Circulation::withdraw), [`cancel`](Circulation::cancel)) | - | `Idle`, `Cancelled` |
 //! | `Idle`, `Outstanding` | duplicate received | reply that it is in progress; retransmit soon | unchanged |
 //! | `Outstanding` | "in progress" received | wait for the whole round trip | unchanged |
 //! | `Outstanding` | timer expired | forward it again | unchanged |
-//! | `Completed` | duplicate received | send the reply again | unchanged |
+//! | `Completed`, `Cancelled` | duplicate received | send the reply again | unchanged |
 //! | `Completed` | timer expired | send the reply again, unasked | unchanged |
 //!
 //! # Timing
@@ -51,6 +51,8 @@ pub(crate) enum Stage {
     Outstanding,
     /// The result is known.
     Completed,
+    /// Given up after it was sent, so its times are no signs of life. Otherwise as `Completed`.
+    Cancelled,
 }
 
 /// A reply to the previous relay.
@@ -77,8 +79,8 @@ pub(crate) struct Path {
 #[derive(Clone, Debug)]
 pub(crate) struct Circulation {
     stage: Stage,
-    started_at: Option<Instant>,
-    completed_at: Option<Instant>,
+    started_at: Instant,
+    completed_at: Instant,
     is_forward_due: bool,
     reply_due: Option<Reply>,
     /// Retransmissions since a neighbour replied last.
@@ -100,8 +102,8 @@ impl Circulation {
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             stage: Stage::Idle,
-            started_at: None,
-            completed_at: None,
+            started_at: Instant::ZERO,
+            completed_at: Instant::ZERO,
             is_forward_due: false,
             reply_due: None,
             retries: 0,
@@ -135,19 +137,24 @@ impl Circulation {
 
     /// Returns the time at which this relay had the message to forward.
     pub(crate) const fn started_at(&self) -> Option<Instant> {
-        self.started_at
+        match self.stage {
+            Stage::Outstanding | Stage::Completed => Some(self.started_at),
+            Stage::Idle | Stage::Cancelled => None,
+        }
     }
 
     /// Returns the time at which this relay knew the result; `None` before.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
-        self.completed_at
+        match self.stage {
+            Stage::Completed => Some(self.completed_at),
+            Stage::Idle | Stage::Outstanding | Stage::Cancelled => None,
+        }
     }
 
     /// Forwards a new message.
     pub(crate) const fn start(&mut self, now: Instant) {
         self.stop(Stage::Outstanding);
-        self.started_at = Some(now);
-        self.completed_at = None;
+        self.started_at = now;
         self.is_forward_due = true;
         self.retries = 0;
         self.is_received = false;
@@ -159,7 +166,7 @@ impl Circulation {
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
-        self.completed_at = Some(now);
+        self.completed_at = now;
         self.reply_due = (path.hops > 0).then_some(Reply::Result);
         self.repeat_reply(now, path);
     }
@@ -176,9 +183,7 @@ impl Circulation {
 
     /// Completes the message without a result, and forgets its times: no later message is a sign of life by them.
     pub(crate) const fn cancel(&mut self) {
-        self.close();
-        self.started_at = None;
-        self.completed_at = None;
+        self.stop(Stage::Cancelled);
     }
 
     const fn stop(&mut self, stage: Stage) {
@@ -192,7 +197,7 @@ impl Circulation {
     /// Handles the same message once more: the previous relay has retransmitted it, `path` hops from the initiator.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
-        if self.stage == Stage::Completed {
+        if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
             self.reply_due = Some(Reply::Result);
             self.repeat_reply(now, path);
             return;

@@ -65,7 +65,6 @@ use crate::wire::upload::{Upload, UploadError};
 pub struct Relay {
     pub(super) node: Node,
     pub(super) endpoint: Endpoint,
-    wiring: Wiring,
     /// Deframers of the upstream or shared port, and of the downstream port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
@@ -122,10 +121,13 @@ impl Relay {
         Self {
             node: Node::new(mission, identity, settings, seed, now),
             endpoint: Endpoint::new(identity.network, identity.index),
-            wiring: settings.wiring,
             deframers: [Deframer::new(), Deframer::new()],
             clock: MonotonicClock::new(now),
         }
+    }
+
+    const fn wiring(&self) -> Wiring {
+        self.node.member().settings.wiring
     }
 
     #[inline(never)] // a session is built on the stack
@@ -159,7 +161,7 @@ impl Relay {
     /// assert_eq!(relay.stats().truncated, 1);
     /// ```
     pub fn handle_bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
-        let shared = self.wiring == Wiring::Shared;
+        let shared = self.wiring() == Wiring::Shared;
         if shared != (port == Port::Shared) {
             return;
         }
@@ -239,7 +241,7 @@ impl Relay {
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut [u8; MAX_FRAME]) -> Option<Transmit> {
         let now = self.clock.advance(now);
         let sent = frames::poll_transmit(&mut self.node, &mut self.endpoint, now, frame)?;
-        let port = match self.wiring {
+        let port = match self.wiring() {
             Wiring::Shared => Port::Shared,
             Wiring::Pair if sent.to < self.node.member().node => Port::Upstream,
             Wiring::Pair => Port::Downstream,

@@ -114,39 +114,33 @@ impl Endpoint {
         frame: &mut FrameBuf,
         stats: &mut Stats,
     ) -> Option<Sent> {
+        let header = self.header(to);
         #[cfg(feature = "auth")]
-        if let Some(session) = &mut self.session {
-            if !session.knows(to) {
+        let len = match &mut self.session {
+            Some(session) if !session.knows(to) => {
                 session.greet(to);
                 return self.transmit_handshake(frame, stats);
             }
-            let header = Header {
-                network: self.network,
-                sender: self.node,
-                destination: to,
-                counter: self.counter,
-            };
-            let len = frame::encode_signed(header, message, session.signer(to), frame);
-            return Some(self.sent(to, len, stats));
-        }
-        let len = frame::encode(self.header(to), message, frame);
+            Some(session) => frame::encode_signed(header, message, session.signer(to), frame),
+            None => frame::encode(header, message, frame),
+        };
+        #[cfg(not(feature = "auth"))]
+        let len = frame::encode(header, message, frame);
         Some(self.sent(to, len, stats))
     }
 
     /// Writes the next pending handshake.
     #[cfg(feature = "auth")]
+    #[inline(never)] // called from two places
     pub(crate) fn transmit_handshake(
         &mut self,
         frame: &mut FrameBuf,
         stats: &mut Stats,
     ) -> Option<Sent> {
-        let header = self.header(0);
+        let mut header = self.header(0);
         let session = self.session.as_mut()?;
         let to = session.take_handshake()?;
-        let header = Header {
-            destination: to,
-            ..header
-        };
+        header.destination = to;
         let body = session.handshake(to);
         let len = frame::encode_handshake(header, &body, session.signer(to), frame);
         Some(self.sent(to, len, stats))

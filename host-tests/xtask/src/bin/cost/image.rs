@@ -37,7 +37,8 @@ pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
 /// Description, features, and budgets of an image: flash, static RAM, stack.
 type Image = (&'static str, &'static [&'static str], [u64; 3]);
 
-/// Images from the smallest to the largest.
+/// Images from the smallest to the largest. The endpoint that relay and ground station share costs an image with `auth` 0.4 KB of
+/// flash, and saves it 0.8 KB of stack.
 const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
@@ -52,17 +53,17 @@ const IMAGES: &[Image] = &[
     (
         "flash of that with `auth`",
         &["--no-default-features", "--features", "auth"],
-        [75 * 1024, 6_400, 4_480],
+        [75 * 1024 + 512, 6_400, 3_712],
     ),
     (
         "flash of that with `guard` and `upload`",
         &["--no-default-features", "--features", "guard,upload"],
-        [96 * 1024, 6_912, 5_760],
+        [96 * 1024, 6_912, 5_120],
     ),
     (
         "flash of that with `guard` and `flight`",
         &["--no-default-features", "--features", "guard,flight"],
-        [118 * 1024, 9_216, 4_608],
+        [118 * 1024 + 256, 9_216, 4_608],
     ),
     (
         "flash of that with `mavlink-signing`",
@@ -89,7 +90,7 @@ const IMAGES: &[Image] = &[
         //   up to 900
         //   bytes stack of each image with a guard; the operator's command to clear a lost relay: 1 KiB of those with an
         //   autopilot
-        [201 * 1024, 13_504, 7_232],
+        [201 * 1024, 13_504, 6_528],
     ),
 ];
 
