@@ -482,7 +482,7 @@ mod tests {
             );
         }
         let sweep = if cfg!(feature = "auth") { 108 } else { 100 };
-        let slow = Duration::from_micros(sweep * 1_000_000 / 960 + 10_000);
+        let slow = Duration::from_micros((sweep * 1_000_000_u64).div_ceil(960) + 10_000);
         assert_eq!(Settings::wires(9_600).hop_time, slow);
     }
 }

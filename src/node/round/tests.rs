@@ -3,6 +3,7 @@
 extern crate std;
 
 use super::Round;
+#[cfg(feature = "adjust")]
 use super::computation::PassKind;
 use super::state::Phase;
 use crate::mission::Mission;
