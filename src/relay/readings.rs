@@ -248,7 +248,7 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// As [`handle_control`](Self::handle_control). Returns true if the relay has a guard that did not know this control state.
+    /// Handles the control state, as [`handle_control`](Self::handle_control). Returns true if the relay has a guard that did not know this control state.
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         self.node.handle_control(self.clock.advance(now), flown)
     }

@@ -34,7 +34,7 @@ fn processor() -> Option<String> {
 
 /// Clock for the processor time of this thread, which excludes other programs.
 ///
-/// As accounted by Linux, to some milliseconds; wall-clock time elsewhere.
+/// CPU time as Linux accounts it, to some milliseconds; wall-clock time elsewhere.
 pub(crate) struct Clock {
     started: Instant,
     on_cpu_s: Option<f64>,

@@ -1,6 +1,6 @@
 //! Network of emulated drones: a thread for each receiving serial port, and one that carries bytes through the medium.
 //!
-//! As at a serial port, bytes not read in time are lost: a drone that falls behind receives less, instead of later and later.
+//! Bytes not read in time are lost: a drone that falls behind receives less, instead of later and later.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;

@@ -172,7 +172,7 @@ impl Axis {
     /// Creates the line between both `sites`, see [`try_new`](Self::try_new).
     ///
     /// # Errors
-    /// As for [`try_new`](Self::try_new).
+    /// Same as for [`try_new`](Self::try_new).
     #[inline] // a line is returned through the stack
     pub fn between(sites: Sites) -> Result<Self, AxisError> {
         Self::try_new(sites.tx, sites.rx)

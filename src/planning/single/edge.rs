@@ -56,7 +56,7 @@
 //! T = (D - X) y0^2 - X r^2 + D ((D - X) X - (y0 - Y)^2)
 //! ```
 //!
-//! So without noise SIR_1 is monotone along the circle, and no position inside the box is optimal: Theorem 3 as corrected. With
+//! Without noise SIR_1 is monotone along the circle, and no position inside the box is optimal: Theorem 3 as corrected. With
 //! noise and X < D it rises up to s = sqrt(T / (D nu)) and falls beyond; this maximum is above the ground if |z| < r. For X >= D
 //! the sign is negative.
 //!

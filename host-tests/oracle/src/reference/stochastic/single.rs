@@ -23,7 +23,7 @@ impl StochasticLink {
 
     /// Runs the corrected Algorithm 3: continues while a lower target could still be better than the best seen.
     ///
-    /// Of the two steps around the optimum this prefers the one where the first hop is weaker, so for a constant Upsilon its
+    /// Prefers, of the two steps around the optimum, the one where the first hop is weaker, so for a constant Upsilon its
     /// position may be one step off the printed one's, with an SIR at least as high.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
