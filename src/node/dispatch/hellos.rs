@@ -59,12 +59,7 @@ impl Node {
             form: self.layers.view.asking.asks() && side == self.back(),
             fresh: self.layers.round.is_fresh(),
             ready: false,
-            // A relay that has just started belongs to no part of the chain.
-            behind: if self.layers.round.is_fresh() {
-                1
-            } else {
-                self.beyond(side.other()).saturating_add(1)
-            },
+            behind: self.behind(side.other()),
             hears: self
                 .layers
                 .neighbours
@@ -123,6 +118,17 @@ impl Node {
         // If two links cross, the one whose end is nearer to Rx is replaced.
         let crosses = side == Side::Downstream && far.goes_past(distance);
         there && (far.is_two_way(distance, now, settings) || far.comes_along(distance) || crosses)
+    }
+
+    /// Returns the number of relays that a neighbour reaches through this one if `far` is this relay's other side.
+    fn behind(&self, far: Side) -> u16 {
+        // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
+        // the old view, although no neighbour selects it.
+        if self.layers.round.is_fresh() || !self.layers.neighbours.at(far).is_mutual() {
+            1
+        } else {
+            self.beyond(far).saturating_add(1)
+        }
     }
 
     /// Returns the number of relays at `side` in this part of the chain, as of the last count.
