@@ -138,16 +138,16 @@ pub(crate) fn runners() {
     let mut polls = 0;
     let mut polled = 0;
     while down.gone.get() == 0 && polls < 9 {
-        polled += instructions(|| ports.poll(now, &mut middle));
+        polled += instructions(|| ports.poll(now, &mut middle, |_| true));
         polls += 1;
     }
     hprintln!("polled_sweep {}", polled);
     hprintln!("polled_polls {}", polls);
     hprintln!("polled_gone {}", down.gone.get());
-    ports.poll(now, &mut middle);
+    ports.poll(now, &mut middle, |_| true);
     hprintln!(
         "polled_idle {}",
-        instructions(|| ports.poll(now, &mut middle))
+        instructions(|| ports.poll(now, &mut middle, |_| true))
     );
     let polled_size = size_of_val(&ports);
     hprintln!("polled_size {}", polled_size);
@@ -168,7 +168,7 @@ fn awaited() {
         AsyncLink::new(End(&up), End(&up), BAUD),
         AsyncLink::new(End(&down), End(&down), BAUD),
     );
-    let run = ports.run(&relay, &time);
+    let run = ports.run(&relay, &time, |_| true);
     hprintln!("async_size {}", size_of_val(&run));
     let mut run = pin!(run);
     let mut cx = Context::from_waker(Waker::noop());

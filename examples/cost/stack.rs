@@ -36,6 +36,7 @@ pub(crate) fn stack() {
 
 pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant) {
     let mut frame = [0; MAX_FRAME];
+    from.persist(|_| true);
     while let Some(transmit) = from.poll_transmit(now, &mut frame) {
         to.handle_bytes(now, at, frame.get(..transmit.len).unwrap_or_default());
     }

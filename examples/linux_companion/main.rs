@@ -43,7 +43,6 @@
 //! | `waits.rs` | log lines for the reasons of a hold |
 //! | `lost.rs` | lost relays, and the operator's command to clear them |
 //! | `kept.rs` | file written in flight by a separate thread |
-//! | `gate.rs` | send gate, closed while such a file is written |
 //!
 //! It shares a library with the ground station, `examples/linux`. It runs on other kinds of Unix, too; on a Mac the ttys are
 //! called `/dev/cu.*`.
@@ -58,7 +57,6 @@ mod autopilot;
 #[cfg(unix)]
 mod datagrams;
 #[cfg(unix)]
-mod gate;
 #[cfg(unix)]
 mod kept;
 #[cfg(unix)]

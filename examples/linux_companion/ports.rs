@@ -8,17 +8,16 @@ use rustix::event::PollFlags;
 use rustix::io::Errno;
 use serde_json::{Value, json};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared};
-use uav_relay::{Instant, Relay};
+use uav_relay::{Instant, Relay, ViewRecord};
 
-use crate::gate::Gate;
 use crate::options::Ttys;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::{sleep, tap};
 
-/// Tty, or `None` at an end of the chain, behind the send gate.
+/// Tty, or `None` at an end of the chain.
 #[derive(Debug)]
-pub(crate) struct End(Option<Replug>, Gate);
+pub(crate) struct End(Option<Replug>);
 
 impl SerialPort for End {
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
@@ -26,10 +25,6 @@ impl SerialPort for End {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
-        if !self.1.is_open() {
-            // Keeps the frame waiting, as a full port does.
-            return Ok(0);
-        }
         let all = Ok(bytes.len());
         self.0.as_mut().map_or(all, |tty| tty.write(bytes))
     }
@@ -46,13 +41,13 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens the ttys. Nothing is sent while `gate` is closed.
-    pub(crate) fn open(ttys: &Ttys, baud: u32, gate: &Gate) -> Result<Self, String> {
+    /// Opens the ttys.
+    pub(crate) fn open(ttys: &Ttys, baud: u32) -> Result<Self, String> {
         let link = |option, path: Option<&_>| {
             let tty = path
                 .map(|path| Replug::open(option, path, baud))
                 .transpose()?;
-            Ok::<_, String>(SerialLink::new(End(tty, gate.clone()), baud))
+            Ok::<_, String>(SerialLink::new(End(tty), baud))
         };
         Ok(match ttys {
             Ttys::Pair {
@@ -79,16 +74,16 @@ impl Ports {
         Ok(file)
     }
 
-    /// Exchanges bytes with the relay, and calls `keep` before each send. Returns the time of the next call.
+    /// Exchanges bytes with the relay, and passes a changed record to `store` before it sends. Returns the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
         relay: &mut Relay,
-        keep: &mut dyn FnMut(&Relay),
+        store: &mut dyn FnMut(&ViewRecord) -> bool,
     ) -> Option<Instant> {
         match self {
-            Self::Pair(pair) => pair.poll_keeping(now, relay, keep),
-            Self::Shared(shared) => shared.poll_keeping(now, relay, keep),
+            Self::Pair(pair) => pair.poll(now, relay, store),
+            Self::Shared(shared) => shared.poll(now, relay, store),
         }
     }
 

@@ -5,10 +5,9 @@ use std::os::fd::BorrowedFd;
 
 use rustix::event::PollFlags;
 use serde_json::json;
-use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload};
+use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload, ViewRecord};
 
 use crate::autopilot::Companion;
-use crate::gate::Gate;
 use crate::kept::Kept;
 use crate::lost::Lost;
 use crate::options::Plan;
@@ -74,8 +73,7 @@ impl Flight {
         };
         let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
         let log = service.log.clone();
-        let gate = Gate::new();
-        let mut ports = Ports::open(&plan.ttys, plan.baud, &gate)?;
+        let mut ports = Ports::open(&plan.ttys, plan.baud)?;
         let listens = plan.settings.listen.is_some();
         let positions = plan
             .positions
@@ -92,7 +90,7 @@ impl Flight {
             auth,
             ..plan.settings
         };
-        let views = Views::load(plan.view_file.as_deref(), gate)?;
+        let views = Views::load(plan.view_file.as_deref())?;
         let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), service.now())
             .map_err(|error| error.to_string())?;
         let resumed = resume(plan, &mut relay, &log);
@@ -163,8 +161,9 @@ impl Flight {
         }
         let reopen = self.ports.tend(time, log);
         let views = &mut self.views;
-        let mut keep = |relay: &Relay| views.keep(time, log, relay);
-        let wake = self.ports.poll(time, relay, &mut keep);
+        views.tend(time, log);
+        let mut store = |record: &ViewRecord| views.store(record);
+        let wake = self.ports.poll(time, relay, &mut store);
         while let Some(event) = relay.poll_event() {
             if let (Event::Uploaded, Some(uploads), Some(upload)) =
                 (event, &mut self.uploads, relay.upload())

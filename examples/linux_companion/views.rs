@@ -7,9 +7,8 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use uav_relay::CRC_32C;
-use uav_relay::{Instant, RecordError, Relay, ViewRecord};
+use uav_relay::{Instant, RecordError, ViewRecord};
 
-use crate::gate::Gate;
 use crate::kept::Kept;
 use crate::relay::Refusal;
 use uav_relay_linux::log::Log;
@@ -22,8 +21,6 @@ pub(crate) struct Views {
     writing: Option<ViewRecord>,
     /// Record of the last write, successful or not.
     tried: Option<ViewRecord>,
-    /// Closed while the current record has not been written or tried.
-    gate: Gate,
 }
 
 impl Views {
@@ -32,7 +29,7 @@ impl Views {
     /// # Errors
     /// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
     /// flight.
-    pub(crate) fn load(file: Option<&Path>, gate: Gate) -> Result<Self, Refusal> {
+    pub(crate) fn load(file: Option<&Path>) -> Result<Self, Refusal> {
         let stored = match file {
             None => None,
             Some(file) => match std::fs::read(file) {
@@ -52,7 +49,6 @@ impl Views {
             stored,
             writing: None,
             tried: None,
-            gate,
         })
     }
 
@@ -61,10 +57,8 @@ impl Views {
         self.stored.as_ref()
     }
 
-    /// Writes the record of `relay` if it has changed, and closes the gate meanwhile.
-    ///
-    /// A failed write is retried, but the gate opens: a drone in the air must not fall silent for a full disk.
-    pub(crate) fn keep(&mut self, now: Instant, log: &Log, relay: &Relay) {
+    /// Finishes a write, and retries a failed one when it is due. Call it in each turn of the main loop.
+    pub(crate) fn tend(&mut self, now: Instant, log: &Log) {
         let Some(kept) = &mut self.kept else { return };
         if let Some(is_kept) = kept.tend(now, log) {
             self.tried = self.writing.take();
@@ -72,14 +66,35 @@ impl Views {
                 self.stored = self.tried;
             }
         }
-        let record = relay.view_record();
-        let (is_stored, is_tried) = (self.stored == Some(record), self.tried == Some(record));
-        if !is_stored && !kept.is_writing() && (!is_tried || kept.is_due(now)) {
+        if self.tried != self.stored && kept.is_due(now) {
+            self.writing = self.tried;
+            self.write();
+        }
+    }
+
+    /// Begins to write `record`. Returns true once it is written, or once the write has failed: a drone in the air must not fall
+    /// silent for a full disk.
+    pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
+        let Some(kept) = &self.kept else { return true };
+        let record = Some(*record);
+        if self.stored == record || self.tried == record {
+            return true;
+        }
+        if !kept.is_writing() {
+            self.writing = record;
+            self.write();
+        }
+        false
+    }
+
+    /// Hands the record `writing` to the thread that writes.
+    fn write(&mut self) {
+        if let (Some(kept), Some(record)) = (&mut self.kept, self.writing)
+            && !kept.is_writing()
+        {
             let body = record.to_bytes();
             kept.put([&body[..], &sum(&body)].concat());
-            self.writing = Some(record);
         }
-        self.gate.set(is_stored || is_tried);
     }
 
     pub(crate) const fn kept(&self) -> Option<&Kept> {

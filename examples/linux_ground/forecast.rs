@@ -82,6 +82,7 @@ impl Chain {
         let mut frame = [0; MAX_FRAME];
         for (number, (relay, agreed)) in (1..).zip(self.relays.iter_mut().zip(&mut self.agreed)) {
             relay.handle_timeout(now);
+            relay.persist(|_| true);
             while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
                 let (to, port) = match transmit.port {
                     Port::Upstream => (number - 1, Port::Downstream),

@@ -1,6 +1,6 @@
 //! Persistent state: the relay's votes on views and, with the feature `upload`, the uploaded mission.
 
-use uav_relay::{Instant, Relay};
+use uav_relay::{Instant, Relay, ViewRecord};
 #[cfg(feature = "upload")]
 use uav_relay_kept::journal::{Journal, WhenFull};
 use uav_relay_kept::views;
@@ -48,12 +48,12 @@ impl Views {
         Self(views::Views::resume(relay, now, log, log::stands_by))
     }
 
-    /// Stores the votes of `relay` if they have changed. Call it before each send.
-    pub(crate) fn keep(&mut self, relay: &Relay) {
-        let log = || views::log(flash::VIEWS, block());
-        if let Some(kept) = self.0.keep(relay, log) {
+    /// Stores a changed `record` of the relay. Returns true even if the write fails, so that the relay flies on.
+    pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
+        if let Some(kept) = self.0.store(record, views::log(flash::VIEWS, block())) {
             log::votes(kept);
         }
+        true
     }
 }
 

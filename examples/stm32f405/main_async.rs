@@ -86,8 +86,8 @@ fn fly(
         AsyncLink::new(rx, tx, port::BAUD)
     };
     let mut ports = AsyncPair::new(link(&upstream), link(&downstream));
-    let mut keep = |relay: &uav_relay::Relay| views.keep(relay);
-    let runs = ports.run_keeping(&relay, &time, &mut keep);
+    let store = |record: &uav_relay::ViewRecord| views.store(record);
+    let runs = ports.run(&relay, &time, store);
     executor::run(pin!(select(runs, tell(&relay))), &time, || {
         let now = uav_relay::asynch::Clock::now(&time);
         relay.look(|relay| chip::end_turn(relay, now));

@@ -24,7 +24,7 @@ pub(crate) trait Links {
 impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
         let Drone { relay, views, .. } = drone;
-        self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
+        Self::poll(self, now, relay, |record| views.store(record))
     }
 
     fn log_counters(&self) {
@@ -36,7 +36,7 @@ impl<U: SerialPort, D: SerialPort> Links for Pair<U, D> {
 impl<P: SerialPort, Pin: OutputPin> Links for Shared<P, Pin> {
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant> {
         let Drone { relay, views, .. } = drone;
-        self.poll_keeping(now, relay, &mut |relay| views.keep(relay))
+        Self::poll(self, now, relay, |record| views.store(record))
     }
 
     fn log_counters(&self) {

@@ -98,7 +98,7 @@
 //!     while relay.next_event().await != Event::SetpointChanged {}
 //!     relay.look(|relay| relay.setpoint()).flatten()
 //! };
-//! let Either::Second(place) = embassy_futures::block_on(select(ports.run(&relay, &Time), firmware)) else {
+//! let Either::Second(place) = embassy_futures::block_on(select(ports.run(&relay, &Time, |_| true), firmware)) else {
 //!     unreachable!("`run` never completes")
 //! };
 //! assert!((place.expect("agreed on").x_m - 349.8).abs() < 0.1);
@@ -126,6 +126,7 @@ pub use clock::Clock;
 pub use link::AsyncLink;
 pub use relay::AsyncRelay;
 
+use crate::node::view::record::ViewRecord;
 use crate::relay::{Port, Relay, Transmit};
 use crate::serial::NoPin;
 use crate::stats::bump;
@@ -163,22 +164,20 @@ where
 
     /// Moves bytes between the relay and its ports and handles its timers, forever. The documentation of [`asynch`](self)
     /// describes the work per poll and the effect of dropping the future.
-    pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
-        self.run_keeping(relay, clock, &mut |_| {}).await
-    }
-
-    /// Runs like [`run`](Self::run), and calls `keep` between receiving and sending. Use `keep` to persist what must be stored
-    /// before it is sent: see [`Relay::view_record`].
-    pub async fn run_keeping(
+    ///
+    /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true if it is stored;
+    /// until then the relay sends nothing. Without such memory pass `|_| true`, and leave the relay off after a reboot in
+    /// flight.
+    pub async fn run(
         &mut self,
         relay: &AsyncRelay<'_>,
         clock: &impl Clock,
-        keep: &mut dyn FnMut(&Relay),
+        mut store: impl FnMut(&ViewRecord) -> bool,
     ) -> Infallible {
         let (hears_up, says_up, up) = self.upstream.ends(Port::Upstream, relay, clock);
         let (hears_down, says_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
         let queues = [(Port::Upstream, up), (Port::Downstream, down)];
-        let drives = drive(relay, &queues, clock, keep);
+        let drives = drive(relay, &queues, clock, &mut store);
         // The order matters: bytes read go into this turn of the relay, and its frames are written at once.
         match select5(hears_up, hears_down, drives, says_up, says_down).await {
             Either5::First(never)
@@ -209,20 +208,15 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
     }
 
     /// Runs like [`AsyncPair::run`].
-    pub async fn run(&mut self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
-        self.run_keeping(relay, clock, &mut |_| {}).await
-    }
-
-    /// Runs like [`AsyncPair::run_keeping`].
-    pub async fn run_keeping(
+    pub async fn run(
         &mut self,
         relay: &AsyncRelay<'_>,
         clock: &impl Clock,
-        keep: &mut dyn FnMut(&Relay),
+        mut store: impl FnMut(&ViewRecord) -> bool,
     ) -> Infallible {
         let (hears, says, waiting) = self.channel.ends(Port::Shared, relay, clock);
         let queues = [(Port::Shared, waiting)];
-        let drives = drive(relay, &queues, clock, keep);
+        let drives = drive(relay, &queues, clock, &mut store);
         match select3(hears, drives, says).await {
             Either3::First(never) | Either3::Second(never) | Either3::Third(never) => never,
         }
@@ -239,12 +233,12 @@ async fn drive(
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
     clock: &impl Clock,
-    keep: &mut dyn FnMut(&Relay),
+    store: &mut dyn FnMut(&ViewRecord) -> bool,
 ) -> Infallible {
     loop {
         relay.settle();
         let now = clock.now();
-        let wake = relay.lend(|of| turn(of, now, relay, queues, keep));
+        let wake = relay.lend(|of| turn(of, now, relay, queues, store));
         relay.tell();
         let waited = match wake.flatten() {
             Some(wake) => {
@@ -266,12 +260,12 @@ fn turn(
     now: Instant,
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
-    keep: &mut dyn FnMut(&Relay),
+    store: &mut dyn FnMut(&ViewRecord) -> bool,
 ) -> Option<Instant> {
     if of.poll_timeout().is_some_and(|at| at <= now) {
         of.handle_timeout(now);
     }
-    keep(of);
+    of.persist(store);
     let mut frame = [0; MAX_FRAME];
     let has_room = |(_, queue): &(Port, &RefCell<Frames>)| {
         queue.try_borrow().is_ok_and(|queue| queue.has_room())

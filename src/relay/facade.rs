@@ -24,8 +24,8 @@ use crate::wire::upload::{Upload, UploadError};
 ///   the chain is out of reach ends the wait for that part's leases early: two chains may then fly until these have expired.
 /// - *Getters* take constant time and return values of the last agreement. Positions are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
-/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, call
-///   [`poll_transmit`](Self::poll_transmit) until it returns `None`, then [`poll_event`](Self::poll_event) until `None`,
+/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store
+///   what [`unpersisted`](Self::unpersisted) returns, call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then [`poll_event`](Self::poll_event) until `None`,
 ///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
 /// - After that, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
 /// - *Setpoints* are finite, within [0, D] along the line, at the relay's altitude or one of the mission's band, and at least
@@ -222,6 +222,8 @@ impl Relay {
 
     /// Writes the next frame to send into `frame`, if there is one. Call it until it returns `None`.
     ///
+    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted); the pending frames follow once it is.
+    ///
     /// The work is linear in the frame's length, plus a tag if frames are signed.
     ///
     /// ```
@@ -240,6 +242,9 @@ impl Relay {
     #[inline(never)] // its buffers would stay in the frame of a caller's main loop
     pub fn poll_transmit(&mut self, now: Instant, frame: &mut [u8; MAX_FRAME]) -> Option<Transmit> {
         let now = self.clock.advance(now);
+        if self.node.unpersisted().is_some() {
+            return None;
+        }
         let sent = frames::poll_transmit(&mut self.node, &mut self.endpoint, now, frame)?;
         let port = match self.wiring() {
             Wiring::Shared => Port::Shared,
@@ -293,14 +298,45 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the acceptor state, to be persisted after every change and *before* [`poll_transmit`](Self::poll_transmit).
+    /// Returns the acceptor state if it has changed since the last [`persisted`](Self::persisted), to be stored now.
     ///
-    /// Without it a restarted relay breaks its promises, and the chain can split. Takes constant time.
-    pub const fn view_record(&self) -> ViewRecord {
-        self.node.view_record()
+    /// [`poll_transmit`](Self::poll_transmit) returns no frame until the state is confirmed: a restarted relay that has forgotten
+    /// what it sent could vote twice, and the chain could split. Takes constant time.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// # use uav_relay::{Settings, ViewRecord};
+    /// # let mut relay = relay(Settings::default());
+    /// # let mut flash = [0; ViewRecord::LENGTH];
+    /// if let Some(record) = relay.unpersisted() {
+    ///     flash = record.to_bytes();
+    ///     relay.persisted(&record);
+    /// }
+    /// assert_eq!(relay.unpersisted(), None);
+    /// ```
+    pub fn unpersisted(&self) -> Option<ViewRecord> {
+        self.node.unpersisted()
     }
 
-    /// Restores the [`view_record`](Self::view_record) stored before the relay was switched off in flight.
+    /// Confirms that `record`, returned by [`unpersisted`](Self::unpersisted), is stored. Takes constant time.
+    ///
+    /// A firmware without storage confirms each record at once; its relay must then stay off for the rest of the flight after a
+    /// reboot. A record that the relay has replaced meanwhile may be confirmed, too; `unpersisted` then returns the current one.
+    pub const fn persisted(&mut self, record: &ViewRecord) {
+        self.node.persisted(record);
+    }
+
+    /// Passes an [unconfirmed](Self::unpersisted) record to `store`, and confirms it if that returns true.
+    pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
+        if let Some(record) = self.unpersisted()
+            && store(&record)
+        {
+            self.persisted(&record);
+        }
+    }
+
+    /// Restores the record that was [`persisted`](Self::persisted) before the relay was switched off in flight.
     ///
     /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
     ///

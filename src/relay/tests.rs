@@ -34,6 +34,7 @@ fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
         for seconds in 0..100 {
             let now = Instant::from_millis(1_000 * seconds);
             relay.handle_timeout(now);
+            relay.persist(|_| true);
             while relay.poll_transmit(now, &mut frame).is_some() {
                 counters += 1;
             }

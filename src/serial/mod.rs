@@ -79,7 +79,7 @@
 //! let mut ports = Pair::new(link(), link());
 //!
 //! while now < Instant::from_millis(100) {
-//!     let wake = ports.poll(now, &mut relay);
+//!     let wake = ports.poll(now, &mut relay, |_| true);
 //!     while let Some(event) = relay.poll_event() {
 //!         if event == Event::SetpointChanged {
 //!             // hand relay.setpoint() to the autopilot
@@ -113,6 +113,7 @@ pub(crate) use read_limit::READ_LIMIT;
 #[doc(hidden)]
 pub use read_limit::READ_LIMIT;
 
+use crate::node::view::record::ViewRecord;
 use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
@@ -172,20 +173,17 @@ macro_rules! polled {
             ///
             /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and
             /// the relay's pending frames; for a shared port, as many as fit.
-            pub fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-                self.poll_keeping(now, relay, &mut |_| {})
-            }
-
-            /// Does the same, with a call of `keep` between reception and transmission, to store state before it is sent.
             ///
-            /// See [`Relay::view_record`].
-            pub fn poll_keeping(
+            /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true if it is
+            /// stored; until then the relay sends nothing. Without such memory pass `|_| true`, and leave the relay off
+            /// after a reboot in flight.
+            pub fn poll(
                 &mut self,
                 now: Instant,
                 relay: &mut Relay,
-                keep: &mut dyn FnMut(&Relay),
+                mut store: impl FnMut(&ViewRecord) -> bool,
             ) -> Option<Instant> {
-                poll(now, relay, &mut self.links(), keep)
+                poll(now, relay, &mut self.links(), &mut store)
             }
         }
     };
@@ -198,7 +196,7 @@ fn poll(
     now: Instant,
     relay: &mut Relay,
     links: &mut [(Port, &mut dyn FrameLink)],
-    keep: &mut dyn FnMut(&Relay),
+    store: &mut dyn FnMut(&ViewRecord) -> bool,
 ) -> Option<Instant> {
     for (port, link) in &mut *links {
         link.receive(now, *port, relay);
@@ -206,7 +204,7 @@ fn poll(
     if relay.poll_timeout().is_some_and(|at| at <= now) {
         relay.handle_timeout(now);
     }
-    keep(relay);
+    relay.persist(store);
     let mut frame = [0; MAX_FRAME];
     // A link without room must not block the other one, so its frames are counted and dropped.
     while links.iter().any(|(_, link)| link.has_room())

@@ -34,11 +34,10 @@ pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
     Journal::new(flash, WORDS, block)
 }
 
-/// Last known view record of the relay.
+/// Storage state of the relay's view records.
 #[derive(Debug)]
 pub struct Views {
-    said: ViewRecord,
-    /// True if the record is in the flash.
+    /// True if the last record is in the flash.
     kept: bool,
 }
 
@@ -59,32 +58,16 @@ impl Views {
             kept = record.is_some_and(|record| relay.resume_view(now, &record).is_ok());
             stands_by(kept);
         }
-        Self {
-            said: relay.view_record(),
-            kept,
-        }
+        Self { kept }
     }
 
-    /// Stores the record of `relay` if it has changed; call it before each send. Returns the storage state if that has changed.
+    /// Stores a changed `record` of the relay. Returns the storage state if that has changed.
     ///
     /// If the write fails the relay flies on, because a drone in the air must not be stopped for it.
-    pub fn keep<F: Flash>(
-        &mut self,
-        relay: &Relay,
-        log: impl FnOnce() -> Journal<F>,
-    ) -> Option<bool> {
-        let said = relay.view_record();
-        if said == self.said {
-            return None;
-        }
-        self.said = said;
-        self.write(log)
-    }
-
     #[inline(never)] // rarely called
-    fn write<F: Flash>(&mut self, log: impl FnOnce() -> Journal<F>) -> Option<bool> {
+    pub fn store<F: Flash>(&mut self, record: &ViewRecord, mut log: Journal<F>) -> Option<bool> {
         let before = self.kept;
-        self.kept = log().keep(&kept(&self.said), WhenFull::Erase);
+        self.kept = log.keep(&kept(record), WhenFull::Erase);
         (self.kept != before).then_some(self.kept)
     }
 }

@@ -193,6 +193,7 @@ impl Watched {
         heap::without(|| self.relay.handle_timeout(now));
         let mut sent = Vec::with_capacity(MOST_FRAMES);
         let mut buffer = [0; MAX_FRAME];
+        self.relay.persist(|_| true);
         while let Some(transmit) = heap::without(|| self.relay.poll_transmit(now, &mut buffer)) {
             let bytes = buffer.get(..transmit.len).unwrap_or_default().to_vec();
             let port = transmit.port;

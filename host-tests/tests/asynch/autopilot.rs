@@ -281,7 +281,7 @@ impl Scene {
                 };
                 let flies = fly(&vehicle, &time, to, from);
                 let runs = autopilot.run(&relay, &time, &mut rx, &mut tx);
-                let both = embassy_futures::join::join(ports.run(&relay, &time), runs);
+                let both = embassy_futures::join::join(ports.run(&relay, &time, |_| true), runs);
                 join4::<_, _, _, _>(both, relays, autopilots, flies).await
             }
         };

@@ -94,7 +94,7 @@ pub(crate) fn fly(
                     let mut relay = relay(relays, index, wiring);
                     let relay = AsyncRelay::new(&mut relay);
                     embassy_futures::join::join(
-                        ports.run(&relay, &time),
+                        ports.run(&relay, &time, |_| true),
                         firmware(&relay, &time, &drone),
                     )
                     .await;
@@ -122,7 +122,7 @@ pub(crate) fn fly(
                     let mut relay = relay(relays, index, wiring);
                     let relay = AsyncRelay::new(&mut relay);
                     embassy_futures::join::join(
-                        ports.run(&relay, &time),
+                        ports.run(&relay, &time, |_| true),
                         firmware(&relay, &time, &drone),
                     )
                     .await;

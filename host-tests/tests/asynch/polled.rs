@@ -64,12 +64,12 @@ pub(crate) fn places(wiring: Wiring, relays: u16) -> Vec<Option<Placement>> {
                 let up = link(&queues[one - 1], vec![at(count + one)]);
                 let down = link(&queues[count + 1 + one], vec![at(one)]);
                 let mut ports = Pair::new(up, down);
-                Box::new(move |now, relay| ports.poll(now, relay))
+                Box::new(move |now, relay| ports.poll(now, relay, |_| true))
             }
             Wiring::Shared => {
                 let others = (1..=count).filter(|other| *other != one).map(at);
                 let mut ports = Shared::new(link(&queues[one], others.collect()));
-                Box::new(move |now, relay| ports.poll(now, relay))
+                Box::new(move |now, relay| ports.poll(now, relay, |_| true))
             }
         });
     }

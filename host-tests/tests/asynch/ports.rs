@@ -125,7 +125,7 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
         let relay = AsyncRelay::new(&mut relay);
         {
             let mut cx = Context::from_waker(Waker::noop());
-            let mut run = pin!(ports.run(&relay, &time));
+            let mut run = pin!(ports.run(&relay, &time, |_| true));
             for millis in 0..3_000 {
                 time.run(&mut pool, Instant::from_millis(millis));
                 poll(run.as_mut(), &mut cx);
@@ -136,7 +136,7 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
         let half = taken.borrow().last() != Some(&0);
         writes.set(usize::MAX);
         let mut cx = Context::from_waker(Waker::noop());
-        let mut run = pin!(ports.run(&relay, &time));
+        let mut run = pin!(ports.run(&relay, &time, |_| true));
         for millis in 3_000..9_000 {
             time.run(&mut pool, Instant::from_millis(millis));
             poll(run.as_mut(), &mut cx);
@@ -169,7 +169,7 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
     let mut relay = relay(2, 1, Wiring::Pair);
     let relay = AsyncRelay::new(&mut relay);
     let mut cx = Context::from_waker(Waker::noop());
-    let mut run = pin!(ports.run(&relay, &time));
+    let mut run = pin!(ports.run(&relay, &time, |_| true));
     for millis in 0..20_000 {
         time.run(&mut pool, Instant::from_millis(millis));
         poll(run.as_mut(), &mut cx);
@@ -206,7 +206,7 @@ fn a_port_that_is_always_ready_starves_nobody() {
         let mut relay = relay(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
         let mut cx = Context::from_waker(Waker::noop());
-        let mut run = pin!(ports.run(&relay, &time));
+        let mut run = pin!(ports.run(&relay, &time, |_| true));
         for millis in 0..3_000 {
             time.run(&mut pool, Instant::from_millis(millis));
             poll(run.as_mut(), &mut cx);
@@ -288,7 +288,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
                     assert!(relay.stats(Port::Shared).pin <= 3);
                     Poll::<()>::Pending
                 });
-                embassy_futures::join::join(ports.run(&relay, &time), counted).await;
+                embassy_futures::join::join(ports.run(&relay, &time, |_| true), counted).await;
             }
         };
         pool.spawner().spawn_local(task).unwrap();

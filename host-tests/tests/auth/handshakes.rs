@@ -125,6 +125,7 @@ fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
     let mut fresh = relay(2, 2, Wiring::Pair, (2, start));
     let mut lost = [0; MAX_FRAME];
     fresh.handle_bytes(start, Port::Upstream, &old);
+    fresh.persist(|_| true);
     while fresh.poll_transmit(start, &mut lost).is_some() {}
     *net.relay(2) = fresh;
     net.genuine[1] = 0;
@@ -168,6 +169,7 @@ fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
             lonely.handle_bytes(now, Port::Downstream, &wire);
         }
         lonely.handle_timeout(now);
+        lonely.persist(|_| true);
         while lonely.poll_transmit(now, &mut frame).is_some() {}
         while let Some(event) = lonely.poll_event() {
             if matches!(

@@ -292,6 +292,7 @@ impl Net {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];
         let mut sent = 0;
+        self.relay(index).persist(|_| true);
         while let Some(transmit) = self.relay(index).poll_transmit(now, &mut frame) {
             sent += 1;
             let wire = frame[..transmit.len].to_vec();

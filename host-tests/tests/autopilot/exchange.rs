@@ -146,6 +146,7 @@ fn a_relay_is_handed_what_the_radio_hears() {
 /// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
 fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_silent: bool) {
     let mut frame = [0; MAX_FRAME];
+    first.persist(|_| true);
     while let Some(sent) = first.poll_transmit(now, &mut frame) {
         if sent.port == Port::Downstream && !is_silent {
             second.handle_bytes(now, Port::Upstream, &frame[..sent.len]);
@@ -157,6 +158,7 @@ fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_si
     second.handle_timeout(now);
     let at = second.setpoint().unwrap_or(place(start_m));
     second.handle_position(now, now, at);
+    second.persist(|_| true);
     while let Some(sent) = second.poll_transmit(now, &mut frame) {
         if sent.port == Port::Upstream {
             first.handle_bytes(now, Port::Downstream, &frame[..sent.len]);

@@ -95,6 +95,7 @@ impl Chain {
         for (at, relay) in self.relays.iter_mut().enumerate() {
             relay.handle_timeout(self.now);
             let mut frame = [0; MAX_FRAME];
+            relay.persist(|_| true);
             while let Some(transmit) = relay.poll_transmit(self.now, &mut frame) {
                 let (to, port) = match transmit.port {
                     Port::Downstream => (at + 1, Port::Upstream),

@@ -274,6 +274,7 @@ fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) 
     while said {
         said = false;
         for from in 0..relays.len() {
+            relays[from].persist(|_| true);
             while let Some(transmit) = relays[from].poll_transmit(now, &mut buffer) {
                 let bytes = &buffer[..transmit.len];
                 said = true;

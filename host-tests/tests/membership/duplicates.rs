@@ -161,6 +161,7 @@ fn flown(case: Case) -> Found {
                 relay.handle_timeout(now);
             }
             let mut frame = [0; MAX_FRAME];
+            relay.persist(|_| true);
             while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
                 flying.push((at, transmit.port, frame[..transmit.len].to_vec()));
             }

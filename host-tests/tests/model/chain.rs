@@ -60,8 +60,10 @@ impl<'a> World<'a> {
         let mut sent = 0;
         self.ledgers[at].look_up(relay)?;
         // A firmware stores the record before the votes leave.
-        self.ledgers[at].record = Some(relay.view_record());
+        let record = relay.unpersisted();
+        self.ledgers[at].record = record.or(self.ledgers[at].record);
         let most = MOST_FRAMES + if self.scenario.signs() { 2 } else { 0 };
+        relay.persist(|_| true);
         while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
             sent += 1;
             prop_assert!(sent <= most, "relay {} sends and sends", at + 1);

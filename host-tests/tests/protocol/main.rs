@@ -21,6 +21,7 @@ fn relay(mission: Mission, index: u16) -> Relay {
 fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
     let mut buffer = [0; MAX_FRAME];
     let mut sent = Vec::new();
+    relay.persist(|_| true);
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
         let bytes = buffer[..transmit.len].to_vec();
         let mut deframer = Deframer::new();

@@ -107,6 +107,7 @@ impl Line {
         let relay = &mut self.relays[at];
         relay.handle_timeout(self.now);
         let mut frame = [0; MAX_FRAME];
+        relay.persist(|_| true);
         while let Some(transmit) = relay.poll_transmit(self.now, &mut frame) {
             let bytes = frame[..transmit.len].to_vec();
             let all = 0..at + 2;

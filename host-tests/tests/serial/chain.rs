@@ -33,7 +33,7 @@ pub(crate) trait Driver {
 
 impl<U: SerialPort, D: SerialPort> Driver for Pair<U, D> {
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        self.poll(now, relay)
+        Self::poll(self, now, relay, |_| true)
     }
 
     fn stats(&self) -> Vec<SerialStats> {
@@ -43,7 +43,7 @@ impl<U: SerialPort, D: SerialPort> Driver for Pair<U, D> {
 
 impl<P: SerialPort> Driver for Shared<P> {
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant> {
-        self.poll(now, relay)
+        Self::poll(self, now, relay, |_| true)
     }
 
     fn stats(&self) -> Vec<SerialStats> {
@@ -165,6 +165,7 @@ pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
         let mut mail = Vec::new();
         for (at, relay) in chain.iter_mut().enumerate() {
             relay.handle_timeout(now);
+            relay.persist(|_| true);
             while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
                 mail.push((at, transmit.port, frame[..transmit.len].to_vec()));
             }

@@ -59,6 +59,7 @@ fn talk(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec
             relay.handle_bytes(now, port, &frame[..len]);
         }
         relay.handle_timeout(now);
+        relay.persist(|_| true);
         while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
             assert_eq!(transmit.port, port);
             ground.handle_bytes(&frame[..transmit.len]);

@@ -160,6 +160,7 @@ impl Wires {
                 relay.handle_position(now, now, *place);
             }
             relay.handle_timeout(now);
+            relay.persist(|_| true);
             while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
                 let (to, port) = match transmit.port {
                     Port::Upstream => (at - 1, Port::Downstream),

@@ -101,7 +101,7 @@ struct Drone {
     relay: Relay,
     is_on: bool,
     starts: u32,
-    stored: Option<(ViewRecord, Option<Upload>)>,
+    stored: (Option<ViewRecord>, Option<Upload>),
     wake_us: Option<u64>,
     /// Offset of the drone's clock from the simulated time, µs.
     ahead_us: i64,
@@ -160,7 +160,7 @@ impl Air {
                 relay: switched_on(&kind, at, 1, rng.random(), Instant::ZERO),
                 is_on: false,
                 starts: 0,
-                stored: None,
+                stored: (None, None),
                 wake_us: None,
                 ahead_us: 0,
                 free_us: [0; 2],
@@ -273,10 +273,11 @@ impl Air {
                 drone.wake_us = None;
                 let now = drone.clock(self.now_us);
                 drone.relay = switched_on(&self.kind, at, drone.starts, seed, now);
-                if let Some((record, upload)) = &drone.stored {
-                    if let Some(upload) = upload {
-                        drone.relay.resume(upload).unwrap();
-                    }
+                let (record, upload) = &drone.stored;
+                if let Some(upload) = upload {
+                    drone.relay.resume(upload).unwrap();
+                }
+                if let Some(record) = record {
                     drone.relay.resume_view(now, record).unwrap();
                 }
                 return Some(at);
@@ -323,8 +324,12 @@ impl Air {
                 // The timer has expired in the same microsecond.
                 drone.relay.handle_timeout(now);
             }
-            let upload = drone.relay.upload().copied();
-            drone.stored = Some((drone.relay.view_record(), upload));
+            drone.stored.1 = drone.relay.upload().copied();
+            let record = &mut drone.stored.0;
+            drone.relay.persist(|changed| {
+                *record = Some(*changed);
+                true
+            });
             while let Some(sent) = self.drones[at].relay.poll_transmit(now, &mut frame) {
                 self.send(at, sent.port, &frame[..sent.len]);
             }

@@ -139,6 +139,7 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     let mut relay = Relay::new(mission, identity, settings, seed, NOW).unwrap();
     let mut buffer = [0; MAX_FRAME];
     let mut frames = Vec::new();
+    relay.persist(|_| true);
     while let Some(transmit) = relay.poll_transmit(NOW, &mut buffer) {
         frames.push(buffer[..transmit.len].to_vec());
     }
@@ -159,6 +160,7 @@ fn with_a_key_handshakes_are_the_claims() {
             relay.handle_bytes(NOW, Port::Shared, frame);
             let mut buffer = [0; MAX_FRAME];
             let mut sent = 0;
+            relay.persist(|_| true);
             while relay.poll_transmit(NOW, &mut buffer).is_some() {
                 sent += 1;
             }

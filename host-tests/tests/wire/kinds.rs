@@ -73,6 +73,7 @@ pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
 pub(crate) fn sent_with_claims(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
+    relay.persist(|_| true);
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
         let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
         assert!(frame::decode(&plain).is_ok());

@@ -139,6 +139,7 @@ fn what_a_relay_sends_is_what_the_rules_give() {
     while counter < 3 {
         let now = head.poll_timeout().unwrap();
         head.handle_timeout(now);
+        head.persist(|_| true);
         while let Some(transmit) = head.poll_transmit(now, &mut buffer) {
             let chunk = &buffer[..transmit.len - 1];
             let bytes = unstuffed(chunk).unwrap();

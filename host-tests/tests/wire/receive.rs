@@ -144,6 +144,7 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
 pub(crate) fn drain(relay: &mut Relay, now: Instant) -> usize {
     let mut sent = 0;
     let mut buffer = [0; MAX_FRAME];
+    relay.persist(|_| true);
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
         let chunk = &buffer[..transmit.len - 1];
         let (header, _) = frame::decode(&unstuffed(chunk).unwrap()).unwrap();

@@ -161,6 +161,7 @@ impl Peer {
 fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
+    relay.persist(|_| true);
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
         let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
         let to = u16::from_le_bytes([plain[2], plain[3]]) & 0x0FFF;

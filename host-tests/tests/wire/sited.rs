@@ -247,6 +247,7 @@ fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has
             relay.handle_position(now, now, Placement::on_line(x_m, 20.0));
             relay.handle_timeout(now);
             let mut frame = [0; uav_relay::MAX_FRAME];
+            relay.persist(|_| true);
             while relay.poll_transmit(now, &mut frame).is_some() {}
         }
         now

@@ -38,6 +38,8 @@ pub(crate) struct Node {
     pub(super) echo: Option<Echo>,
     /// Side to which the next claim is sent.
     pub(super) claim_side: Side,
+    /// Acceptor state that the firmware has confirmed as stored.
+    persisted: ViewRecord,
     pub(super) telemetry: Telemetry,
 }
 
@@ -62,10 +64,12 @@ impl Node {
         let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
         let number = u16::from_le_bytes([a, b]);
         let member = Member::new(*mission, *settings, identity.index);
+        let view = ViewChange::new(member.all, mission.leader(), !seed);
         Self {
+            persisted: view.record(member.digest),
             layers: Layers {
                 neighbours: Neighbours::NONE,
-                view: ViewChange::new(member.all, mission.leader(), !seed),
+                view,
                 lease: Lease::new(!seed.rotate_left(16), now, settings),
                 update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
                 round: Round::new(leads, number, profile, settings, seed, now),
@@ -222,9 +226,19 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// Returns the acceptor state, for storage.
+    /// Returns the acceptor state if it differs from the one that is stored.
+    pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
+        let record = self.view_record();
+        (record != self.persisted).then_some(record)
+    }
+
     pub(crate) const fn view_record(&self) -> ViewRecord {
         self.layers.view.record(self.member.digest)
+    }
+
+    /// Records that `record` is stored.
+    pub(crate) const fn persisted(&mut self, record: &ViewRecord) {
+        self.persisted = *record;
     }
 
     /// Restores the stored acceptor state after a start.
@@ -237,6 +251,7 @@ impl Node {
         self.layers
             .view
             .resume(now, &self.member, record, untouched)?;
+        self.persisted = *record;
         self.layers.lease.resume(&self.member.settings);
         Ok(())
     }

@@ -14,11 +14,12 @@ const FORMAT: u32 = 1;
 ///
 /// | event | action of the firmware |
 /// | --- | --- |
-/// | after every input, before `Relay::poll_transmit` | store `Relay::view_record` if it differs from the stored record |
+/// | after every input, before `Relay::poll_transmit` | if `Relay::unpersisted` returns a record, store it, then pass it to `Relay::persisted` |
 /// | the relay is switched on in flight | pass the record to `Relay::resume_view` right after `Relay::new` |
 /// | the relay is switched on before another flight | delete the record |
 ///
-/// The record must be stored before the relay transmits. It changes a few times in a view change, and never otherwise.
+/// The relay transmits nothing while its record is not confirmed as stored. The record changes a few times in a view change, and
+/// never otherwise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ViewRecord {
     /// Digest of the mission that was loaded before flight.
@@ -222,9 +223,10 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::node::view::electorate::Held;
     use crate::relay::Relay;
-    use crate::settings::{Identity, Settings};
+    use crate::settings::{Identity, Settings, Wiring};
     use crate::time::Instant;
     use crate::view::{View, ViewId};
+    use crate::wire::digest::digest;
 
     fn view(number: u32, node: u32) -> ViewId {
         ViewId::from_bits(number << 10 | node)
@@ -296,6 +298,11 @@ mod tests {
         }
     }
 
+    /// Returns the record of a new relay of three.
+    fn fresh() -> ViewRecord {
+        ViewRecord::new(digest(relay(3).mission()), Electorate::new(3, 1))
+    }
+
     fn relay(relays: u16) -> Relay {
         let mission = Mission::try_new(paper(relays)).unwrap();
         let identity = Identity {
@@ -308,24 +315,56 @@ mod tests {
     #[test]
     fn a_relay_that_is_switched_on_again_has_said_what_it_had_said() {
         let mut first = relay(3);
-        assert_eq!(first.view_record(), relay(3).view_record());
-        let digest = crate::wire::digest::digest(first.mission());
-        let record = ViewRecord::new(digest, busy());
+        assert_eq!(first.unpersisted(), None);
+        let record = ViewRecord::new(digest(first.mission()), busy());
         assert_eq!(first.resume_view(Instant::ZERO, &record), Ok(()));
-        assert_eq!(first.view_record(), record);
+        assert_eq!(first.unpersisted(), None);
+        first.persisted(&fresh());
+        assert_eq!(first.unpersisted(), Some(record));
         let same = ViewRecord::from_bytes(&record.to_bytes()).unwrap();
-        assert_eq!(first.view_record(), same);
+        first.persisted(&same);
+        assert_eq!(first.unpersisted(), None);
+    }
+
+    /// Runs relay 2 of three on a shared channel, where it searches for its silent neighbours, while another record is stored than
+    /// its own.
+    #[test]
+    fn nothing_is_sent_before_the_record_is_stored() {
+        let mission = Mission::try_new(paper(3)).unwrap();
+        let identity = Identity {
+            network: 1,
+            index: 2,
+        };
+        let settings = Settings {
+            wiring: Wiring::Shared,
+            ..Settings::default()
+        };
+        let mut relay = Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap();
+        let other = ViewRecord::new(digest(relay.mission()), busy());
+        relay.persisted(&other);
+        let mut frame = [0; crate::wire::frame::MAX_FRAME];
+        let mut now = Instant::ZERO;
+        for _ in 0..100 {
+            now = now.max(relay.poll_timeout().unwrap());
+            relay.handle_timeout(now);
+            assert_eq!(relay.poll_transmit(now, &mut frame), None);
+        }
+        let record = relay.unpersisted().unwrap();
+        relay.persist(|_| false);
+        assert_eq!(relay.poll_transmit(now, &mut frame), None);
+        relay.persist(|stored| *stored == record);
+        assert!(relay.poll_transmit(now, &mut frame).is_some());
     }
 
     #[test]
     fn a_record_is_for_a_relay_of_its_mission_that_has_not_begun() {
-        let record = relay(3).view_record();
+        let record = fresh();
         let mut other = relay(4);
         assert_eq!(
             other.resume_view(Instant::ZERO, &record),
             Err(RecordError::Base)
         );
-        let digest = crate::wire::digest::digest(relay(3).mission());
+        let digest = digest(relay(3).mission());
         let stray = ViewRecord::new(digest.wrapping_add(1), busy());
         assert_eq!(
             relay(3).resume_view(Instant::ZERO, &stray),

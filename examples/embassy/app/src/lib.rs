@@ -29,7 +29,7 @@ use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
-use uav_relay::{Instant, Relay, Wiring};
+use uav_relay::{Instant, Relay, ViewRecord, Wiring};
 use uav_relay_chip::watchdog;
 
 use board::Board;
@@ -111,8 +111,11 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
         AsyncLink::new(down_rx, down_tx, BAUD),
     );
     let beside = beside(&relay, link.as_ref(), autopilot);
-    let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
-    let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);
+    let store = |record: &ViewRecord| {
+        votes.iter_mut().for_each(|votes| votes.store(record));
+        true
+    };
+    let runs = ports.run(&relay, &EmbassyClock, store);
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
@@ -136,8 +139,11 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     let relay = AsyncRelay::new(relay);
     let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
     let beside = beside(&relay, link.as_ref(), autopilot);
-    let mut keep = |relay: &Relay| votes.iter_mut().for_each(|votes| votes.keep(relay));
-    let runs = ports.run_keeping(&relay, &EmbassyClock, &mut keep);
+    let store = |record: &ViewRecord| {
+        votes.iter_mut().for_each(|votes| votes.store(record));
+        true
+    };
+    let runs = ports.run(&relay, &EmbassyClock, store);
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 

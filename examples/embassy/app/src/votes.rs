@@ -1,7 +1,7 @@
 //! Votes of the relay on views, persisted across a reboot in flight.
 
 use embedded_storage::nor_flash::NorFlash;
-use uav_relay::{Instant, Relay};
+use uav_relay::{Instant, Relay, ViewRecord};
 use uav_relay_block::Block;
 use uav_relay_kept::nor::Nor;
 use uav_relay_kept::views::{Views, log as journal};
@@ -33,10 +33,10 @@ impl<F: NorFlash> Votes<F> {
         Self { flash, block, said }
     }
 
-    /// Stores the votes of `relay` if they have changed. Call it before each send.
-    pub(crate) fn keep(&mut self, relay: &Relay) {
+    /// Stores a changed `record` of the relay; if the write fails the relay flies on.
+    pub(crate) fn store(&mut self, record: &ViewRecord) {
         let Self { flash, block, said } = self;
-        if let Some(kept) = said.keep(relay, || journal(flash, *block)) {
+        if let Some(kept) = said.store(record, journal(flash, *block)) {
             log::votes(kept);
         }
     }

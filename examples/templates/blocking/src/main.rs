@@ -93,7 +93,8 @@ fn main() -> ! {
     let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
     let mut relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
     loop {
-        ports.poll(now(), &mut relay);
+        // This board stores no view record: leave it off after a reboot in flight.
+        ports.poll(now(), &mut relay, |_| true);
         while let Some(event) = relay.poll_event() {
             if event == Event::SetpointChanged {
                 // Pass `relay.setpoint()` to the flight controller here.

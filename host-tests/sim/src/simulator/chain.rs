@@ -204,10 +204,8 @@ impl Chain {
                     seed: self.rng.random(),
                     now,
                 };
-                // The firmware persists the record before it sends, so the record survives the reboot.
-                let record = member.relay.view_record();
-                let stored = member.stored.as_ref();
-                let Ok(relay) = switched_on(&self.setup, start, stored, Some(&record)) else {
+                let (stored, record) = (member.stored.as_ref(), member.record.as_ref());
+                let Ok(relay) = switched_on(&self.setup, start, stored, record) else {
                     return;
                 };
                 member.swept += member.relay.stats().sweeps;
@@ -254,6 +252,13 @@ impl Chain {
     fn drain(&mut self, index: usize) {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];
+        if let Some(member) = self.members.get_mut(index) {
+            let stored = &mut member.record;
+            member.relay.persist(|record| {
+                *stored = Some(*record);
+                true
+            });
+        }
         while let Some(member) = self.members.get_mut(index)
             && let Some(transmit) = member.relay.poll_transmit(now, &mut frame)
         {

@@ -99,6 +99,7 @@ impl Air {
                 relay.handle_timeout(now);
             }
             let mut frame = [0; MAX_FRAME];
+            relay.persist(|_| true);
             while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
                 self.flying.push((at, frame[..transmit.len].to_vec()));
             }

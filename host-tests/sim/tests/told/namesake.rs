@@ -123,6 +123,7 @@ fn forged_frames_have_nobody_stand_down() {
     let mut liar = relay(&mission, 2, auth([1; 32], 99), air.now);
     let mut frame = [0; uav_relay::MAX_FRAME];
     for _ in 0..60 {
+        liar.persist(|_| true);
         while let Some(transmit) = liar.poll_transmit(air.now, &mut frame) {
             air.play(&frame[..transmit.len]);
         }

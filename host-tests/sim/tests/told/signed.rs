@@ -109,6 +109,7 @@ fn a_neighbour_that_is_heard_at_both_ports_is_told() {
         head.handle_timeout(at);
     }
     let mut told = Vec::new();
+    head.persist(|_| true);
     while let Some(transmit) = head.poll_transmit(now, &mut frame) {
         for port in [Port::Upstream, Port::Downstream] {
             middle.handle_bytes(now, port, &frame[..transmit.len]);

@@ -335,6 +335,7 @@ impl Bench {
         }
         let mut frame = [0; MAX_FRAME];
         for from in 0..self.others.len() {
+            self.others[from].persist(|_| true);
             while let Some(sent) = self.others[from].poll_transmit(now, &mut frame) {
                 if sent.port != port {
                     continue;

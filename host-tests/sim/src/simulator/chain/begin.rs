@@ -140,6 +140,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
             starts: 1,
             swept: 0,
             stored: None,
+            record: None,
             safe: None,
             been: None,
             measured: None,

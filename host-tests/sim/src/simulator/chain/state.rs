@@ -2,7 +2,7 @@
 
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Upload;
-use uav_relay::{Instant, Placement, Relay};
+use uav_relay::{Instant, Placement, Relay, ViewRecord};
 
 use super::super::attack::Attacker;
 use super::super::bursts::Bursts;
@@ -31,6 +31,8 @@ pub(super) struct Member {
     /// Sweeps begun before the last start.
     pub(super) swept: u32,
     pub(super) stored: Option<Upload>,
+    /// Stored view record, if the relay has voted.
+    pub(super) record: Option<ViewRecord>,
     /// Last setpoint that passed the limit check.
     pub(super) safe: Option<Placement>,
     /// Least and greatest setpoint coordinates since the drone was engaged.
