@@ -113,23 +113,18 @@ const LAST: &[Event] = &[
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Distance,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Sites,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Altitude,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Lateral,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Length,
     },

@@ -1,6 +1,17 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![doc = include_str!("tour.md")]
+// The tests of this workspace use more of the crate (`internals`), and a missing feature leaves out what uses an item: only a build with
+// all features can tell that an item is unused.
+#![cfg_attr(
+    not(all(feature = "internals", feature = "upload", feature = "mavlink-signing")),
+    allow(
+        dead_code,
+        unused_imports,
+        unreachable_pub,
+        clippy::trivially_copy_pass_by_ref
+    )
+)]
 
 #[cfg(feature = "async")]
 pub mod asynch;

@@ -82,17 +82,6 @@
 //!   replaced by `link`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 mod association;
 pub mod config;
 mod fence;

@@ -3,19 +3,12 @@
 use super::circulation::Path;
 use super::timing::{longest_lease, tenths};
 use super::view::electorate::Held;
-#[cfg(feature = "upload")]
-use crate::geodetic::LineError;
-use crate::geodetic::Sites;
-#[cfg(feature = "upload")]
-use crate::guard::config::Geofence;
-#[cfg(feature = "upload")]
-use crate::mission::MissionConfig;
 use crate::mission::{Band, Heading, Interference, Mission};
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::time::Instant;
 use crate::view::ViewId;
-use crate::wire::digest::{MissionId, between, digest};
+use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
@@ -30,17 +23,8 @@ pub(crate) struct Member {
     pub(crate) all: u16,
     /// Digest of the mission as loaded.
     pub(crate) digest: u16,
-    /// Distance of the mission as loaded, m.
-    #[cfg(feature = "upload")]
-    pub(crate) loaded_m: f32,
-    /// Altitudes of the mission as loaded, m.
-    #[cfg(feature = "upload")]
-    loaded_band: Band,
     /// Identifier of the active mission.
     pub(crate) active: MissionId,
-    /// Sites of the active mission if it has its own; positions are then along the line between them.
-    #[cfg(feature = "upload")]
-    sites: Option<Sites>,
     /// Last accepted view.
     pub(crate) view: ViewId,
     /// Index in the view, from 1 next to Tx.
@@ -55,89 +39,11 @@ impl Member {
             node,
             all: mission.relays(),
             digest,
-            #[cfg(feature = "upload")]
-            loaded_m: mission.config().distance_m,
-            #[cfg(feature = "upload")]
-            loaded_band: altitudes_of(mission.config()),
             active: MissionId { version: 0, digest },
-            #[cfg(feature = "upload")]
-            sites: None,
             view: ViewId::LOADED,
             index: node,
             interference: *mission.interference(),
             mission,
-        }
-    }
-
-    /// Returns the sites of the active mission, if it has its own.
-    #[cfg(feature = "upload")]
-    pub(crate) const fn sites(&self) -> Option<Sites> {
-        self.sites
-    }
-
-    /// Returns `None`: without uploads no mission has sites of its own.
-    #[cfg(not(feature = "upload"))]
-    #[expect(clippy::unused_self, reason = "as with uploads")]
-    pub(crate) const fn sites(&self) -> Option<Sites> {
-        None
-    }
-
-    /// Sets the sites of the active mission; returns true if they differ, so that positions are void.
-    #[cfg(feature = "upload")]
-    pub(crate) fn fly_between(&mut self, sites: Option<Sites>) -> bool {
-        core::mem::replace(&mut self.sites, sites) != sites
-    }
-
-    /// Returns the digest of the line of this relay's positions.
-    pub(crate) fn line(&self) -> u16 {
-        between(self.digest, self.sites())
-    }
-
-    /// Returns the configured geofence, if any; it grows with the line of a mission with its own sites.
-    #[cfg(feature = "upload")]
-    pub(crate) fn geofence(&self) -> Option<Geofence> {
-        let mut fence = self.settings.guard?.fence;
-        if self.sites.is_some() {
-            let longer_m = self.mission.config().distance_m - self.loaded_m;
-            fence.most_x_m = (fence.most_x_m + longer_m).max(fence.least_x_m);
-        }
-        Some(fence)
-    }
-
-    /// Checks a mission with `config` against the configured geofence; the error names the limit exceeded.
-    ///
-    /// The length of a mission with sites of its own (`sited`) is not limited. All relays must decide alike, so an altitude limit
-    /// that was extended to this relay's own altitude is replaced by that of the loaded mission.
-    #[cfg(feature = "upload")]
-    pub(crate) fn encloses(&self, config: &MissionConfig, sited: bool) -> Result<(), LineError> {
-        let Some(guard) = self.settings.guard else {
-            return Ok(());
-        };
-        let fence = guard.fence;
-        let own_m = self.settings.profile.map(|own| own.altitude_m);
-        let edge = |edge_m: f32, loaded_m: f32| match own_m {
-            Some(own_m) if own_m.to_bits() == edge_m.to_bits() => loaded_m,
-            _ => edge_m,
-        };
-        let altitudes_m = Band {
-            least_m: edge(fence.least_altitude_m, self.loaded_band.least_m),
-            most_m: edge(fence.most_altitude_m, self.loaded_band.most_m),
-        };
-        let is_within = |inner: Band, outer: Band| {
-            inner.least_m >= outer.least_m && inner.most_m <= outer.most_m
-        };
-        let sides_m = Band {
-            least_m: fence.least_y_m,
-            most_m: fence.most_y_m,
-        };
-        if !is_within(altitudes_of(config), altitudes_m) {
-            Err(LineError::Altitude)
-        } else if !is_within(config.lateral, sides_m) {
-            Err(LineError::Lateral)
-        } else if !sited && config.distance_m > fence.most_x_m.max(self.loaded_m) {
-            Err(LineError::Length)
-        } else {
-            Ok(())
         }
     }
 
@@ -153,16 +59,6 @@ impl Member {
     /// Returns the digest of passes in the accepted view.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
-    }
-}
-
-/// Returns the altitudes of a mission, m: its band, extended to the relays' common altitude.
-#[cfg(feature = "upload")]
-fn altitudes_of(config: &MissionConfig) -> Band {
-    let common_m = config.common.altitude_m;
-    Band {
-        least_m: config.band.least_m.min(common_m),
-        most_m: config.band.most_m.max(common_m),
     }
 }
 

@@ -168,7 +168,6 @@ impl Lease {
     }
 
     /// Returns true once all relays of the view are known to be in it.
-    #[cfg(feature = "upload")]
     pub(crate) const fn is_whole(&self) -> bool {
         self.is_whole
     }

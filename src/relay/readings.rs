@@ -142,7 +142,7 @@ impl Relay {
     ///
     /// They define the line of all positions: once they change, convert latitude and longitude by the new ones only.
     pub fn sites(&self) -> Option<Sites> {
-        self.node.member().sites()
+        self.node.sites()
     }
 
     /// Returns the estimate from the measurements at this position; `None` before there are enough.

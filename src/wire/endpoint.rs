@@ -174,7 +174,7 @@ impl Endpoint {
     }
 
     /// Schedules a handshake to node `to`.
-    #[cfg(feature = "upload")]
+    #[cfg(feature = "auth")]
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = &mut self.session {
             session.greet(to);
@@ -182,7 +182,7 @@ impl Endpoint {
     }
 
     /// Returns true if node `to` can check this node's tags, as far as is known.
-    #[cfg(feature = "upload")]
+    #[cfg(feature = "auth")]
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.session
             .as_ref()

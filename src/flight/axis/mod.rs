@@ -93,7 +93,6 @@ impl core::error::Error for AxisError {}
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
-    #[cfg(feature = "upload")]
     sites: Sites,
     middle: Vector,
     /// Unit vectors toward the receiver, to the right, and up.
@@ -131,7 +130,7 @@ impl Axis {
     ///
     /// # Errors
     /// [`AxisError`] if a latitude or longitude is out of range, or the sites are too close or too far apart.
-    #[cfg_attr(feature = "upload", inline(never))] // called from several places
+    #[inline(never)] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
             return Err(AxisError::Tx(tx));
@@ -156,7 +155,6 @@ impl Axis {
         let up = normal.minus(along.times(normal.dot(along))).unit();
         let radius_m = radius(normal, along);
         Ok(Self {
-            #[cfg(feature = "upload")]
             sites: Sites { tx, rx },
             middle,
             along,
@@ -179,7 +177,6 @@ impl Axis {
     }
 
     /// Returns the sites at the two ends.
-    #[cfg(feature = "upload")]
     pub(super) const fn sites(&self) -> Sites {
         self.sites
     }

@@ -3,17 +3,9 @@
 use crate::geodetic::Geodetic;
 
 /// Minimum length of a line, at which one unit of latitude turns it by a thousandth.
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unreachable_pub, reason = "public with the feature `internals`")
-)]
 pub const SHORTEST_M: f64 = 10.0;
 
 /// Maximum length of a line for which the accuracy is known.
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unreachable_pub, reason = "public with the feature `internals`")
-)]
 pub const LONGEST_M: f64 = 100_000.0;
 
 /// WGS84: semi-major axis, m, and squared eccentricity.

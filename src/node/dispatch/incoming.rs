@@ -13,6 +13,7 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
 use crate::wire::message::Message;
+use crate::wire::upload::UPLOAD;
 
 impl Node {
     /// Handles an intact message from node `from` at `side`; returns false if that node may not send it. Bounded by 16 reaches.
@@ -30,11 +31,9 @@ impl Node {
         if self.is_passive() {
             return false;
         }
-        #[cfg(feature = "upload")]
         if self.ground_side(from).is_some() {
             return self.on_ground(now, side, from, message);
         }
-        #[cfg(feature = "upload")]
         if let Message::Level { .. } = message {
             // Only the ground station sends levels.
             return false;
@@ -50,7 +49,6 @@ impl Node {
             }
             return true;
         }
-        #[cfg(feature = "upload")]
         if let Message::Offer { upload, answer } = message
             && !taken
             && takes_uploads(&self.member)
@@ -86,8 +84,7 @@ impl Node {
         };
         let (active, latest) = (self.member.active, self.layers.update.latest());
         let proposes = message.is_of_a_proposal();
-        #[cfg(feature = "upload")]
-        if let Message::Fence { .. } = message {
+        if UPLOAD && matches!(message, Message::Fence { .. }) {
             return self.is_of_line(now, side, from, digest);
         }
         if !proposes && !message.is_of_a_view() {
@@ -112,9 +109,8 @@ impl Node {
     }
 
     /// Returns true if positions of `from` are along the same line: both relays fly between the same sites.
-    #[cfg(feature = "upload")]
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
-        let same = digest == self.member.line();
+        let same = digest == self.layers.update.line(&self.member);
         if !same && self.layers.neighbours.at(side).holds.is_some() {
             bump(&mut self.telemetry.stats.stale);
         } else if !same {
@@ -155,7 +151,6 @@ impl Node {
                 let effects = self.steering.handle(side, from, fence);
                 return self.apply(now, effects);
             }
-            #[cfg(feature = "upload")]
             Message::Offer { upload, answer } => {
                 return self.on_offer(now, side, from, upload, *answer);
             }
@@ -394,16 +389,14 @@ impl Node {
         self.member.mission = mission;
         self.member.interference = *mission.interference();
         self.member.active = id;
-        #[cfg(feature = "upload")]
-        {
-            if self.member.fly_between(self.layers.update.sites()) {
+        if UPLOAD {
+            if self.layers.update.fly_between() {
                 self.layers.round.discard_place();
                 self.steering.leave_line(now);
             }
-            self.steering.set_box(self.member.geofence());
+            let fence = self.layers.update.geofence(&self.member);
+            self.steering.set_box(fence);
         }
-        #[cfg(not(feature = "upload"))]
-        let _ = now;
         let common = mission.config().common;
         let profile = self.member.settings.profile.unwrap_or(common);
         self.layers.round.load(profile);

@@ -14,13 +14,11 @@
 mod hellos;
 mod identity;
 mod incoming;
-#[cfg(feature = "upload")]
 mod offers;
 mod outgoing;
 mod state;
 
-#[cfg(feature = "upload")]
-#[cfg(test)]
+#[cfg(all(test, feature = "upload"))]
 mod tests;
 
 pub(crate) use state::Node;

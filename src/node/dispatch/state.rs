@@ -5,6 +5,7 @@
 //! forever. A part without a quorum loses nothing by it.
 
 use crate::event::{About, Event, Pending};
+use crate::geodetic::Sites;
 use crate::mission::Mission;
 use crate::node::context::{Context, Effects, Member};
 use crate::node::duplicate::DuplicateIndex;
@@ -67,7 +68,7 @@ impl Node {
                 neighbours: Neighbours::NONE,
                 view: ViewChange::new(member.all, mission.leader(), !seed),
                 lease: Lease::new(!seed.rotate_left(16), now, settings),
-                update: MissionUpdate::new(member.active, seed.rotate_left(4), now),
+                update: MissionUpdate::new(&member, seed.rotate_left(4), now),
                 round: Round::new(leads, number, profile, settings, seed, now),
             },
             steering: Steering::NONE,
@@ -204,6 +205,11 @@ impl Node {
 
     pub(crate) const fn member(&self) -> &Member {
         &self.member
+    }
+
+    /// Returns the sites of the active mission, if it has its own.
+    pub(crate) fn sites(&self) -> Option<Sites> {
+        self.layers.update.sites()
     }
 
     pub(crate) fn neighbours(&self) -> [Option<u16>; 2] {

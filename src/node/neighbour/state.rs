@@ -89,18 +89,6 @@ pub(crate) struct Neighbour {
     pub(super) signs: Signs,
     /// Newest mission of the selected node, as far as it has reported.
     pub(crate) holds: Option<MissionId>,
-    /// Number of its last hello, which an offer of a mission answers; 0 before any.
-    #[cfg(feature = "upload")]
-    pub(crate) asked: u16,
-    /// True if a newer mission is to be offered to it.
-    #[cfg(feature = "upload")]
-    pub(crate) offer: bool,
-    /// True if a hello to the ground station on this side is pending.
-    #[cfg(feature = "upload")]
-    pub(crate) ground: bool,
-    /// Number of the ground station's hello that requests the upload held here; 0 for none.
-    #[cfg(feature = "upload")]
-    pub(crate) ground_asks: u16,
     /// Time of the next check for a sign of life.
     look_at: Option<Instant>,
     pub(super) hellos: Hellos,
@@ -132,14 +120,6 @@ impl Neighbour {
         jitter: Jitter::NONE,
         signs: Signs::NONE,
         holds: None,
-        #[cfg(feature = "upload")]
-        asked: 0,
-        #[cfg(feature = "upload")]
-        offer: false,
-        #[cfg(feature = "upload")]
-        ground: false,
-        #[cfg(feature = "upload")]
-        ground_asks: 0,
         look_at: None,
         hellos: Hellos::NONE,
     };

@@ -8,7 +8,6 @@ mod claim;
 mod fence;
 mod hearing;
 mod hello;
-#[cfg(feature = "upload")]
 mod level;
 #[cfg(feature = "upload")]
 mod offer;
@@ -30,8 +29,7 @@ pub use self::turn::{AdjustStep, Moved, Token};
 pub use self::view::{Decision, Poll, Proposal, Successor};
 
 use self::parts::{Word, read, tag, write};
-#[cfg(feature = "upload")]
-use super::upload::Upload;
+use super::upload::{UPLOAD as UPLOADS, Upload};
 use crate::guard::Fence;
 
 /// Maximum body of a sweep: sixteen targets with a measured field or with a lateral offset.
@@ -48,14 +46,13 @@ const LONG: usize = if cfg!(feature = "sensing") {
 #[cfg(feature = "upload")]
 pub use self::offer::UPLOAD;
 
-/// Maximum body: an offer.
+/// Maximum body: an offer, measurements, or without those features a sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
     offer::LENGTH
 } else {
     LONG
 };
-/// Maximum body: measurements, or without the feature `sensing` a sweep.
 #[cfg(not(feature = "upload"))]
 pub const MAX_BODY: usize = LONG;
 
@@ -110,7 +107,6 @@ pub enum Message {
         fence: Fence,
     },
     /// Either direction, also from the ground: a mission that is newer than the destination's.
-    #[cfg(feature = "upload")]
     Offer {
         /// Uploaded mission.
         upload: Upload,
@@ -118,7 +114,6 @@ pub enum Message {
         answer: u16,
     },
     /// Ground to relay: interference level at that end of the chain.
-    #[cfg(feature = "upload")]
     Level {
         /// Digest of the mission loaded before flight.
         mission: u16,
@@ -146,9 +141,7 @@ impl Message {
             Self::Hello(hello) => Some(hello.mission),
             Self::Proposal(proposal) => Some(proposal.mission_id.digest),
             Self::Decision(count) => Some(count.mission_id.digest),
-            #[cfg(feature = "upload")]
             Self::Offer { upload, .. } => Some(upload.base()),
-            #[cfg(feature = "upload")]
             Self::Level { mission, .. } => Some(*mission),
         }
     }
@@ -198,8 +191,7 @@ impl Message {
             // Messages of a missing feature are never sent.
             Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
             Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
-            #[cfg(feature = "upload")]
-            Self::Level { .. } if !cfg!(feature = "sensing") => None,
+            Self::Level { .. } if !(cfg!(feature = "sensing") && UPLOADS) => None,
             Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
@@ -227,7 +219,8 @@ impl Message {
             Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
             #[cfg(feature = "upload")]
             Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
-            #[cfg(feature = "upload")]
+            #[cfg(not(feature = "upload"))]
+            Self::Offer { upload, .. } => match *upload {},
             Self::Level { mission, power_w } => level::encode(*mission, *power_w, buffer),
             Self::Claim(claim) => claim.encode(buffer),
         }
@@ -247,8 +240,7 @@ impl Message {
                 Err(MessageError::Value)
             }
             tag::SENSE | tag::SENSED if !cfg!(feature = "sensing") => Err(MessageError::Value),
-            #[cfg(feature = "upload")]
-            tag::LEVEL if !cfg!(feature = "sensing") => Err(MessageError::Value),
+            tag::LEVEL if UPLOADS && !cfg!(feature = "sensing") => Err(MessageError::Value),
             tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
             tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
@@ -286,8 +278,7 @@ impl Message {
                 let (upload, answer) = offer::decode(body)?;
                 Ok(Self::Offer { upload, answer })
             }
-            #[cfg(feature = "upload")]
-            tag::LEVEL => {
+            tag::LEVEL if UPLOADS => {
                 let (mission, power_w) = level::decode(body)?;
                 Ok(Self::Level { mission, power_w })
             }

@@ -35,7 +35,7 @@ fn proposal(mission_id: MissionId) -> Message {
 
 /// Returns an offer that answers a hello sent at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
-    let answer = node.ask_number(NOW);
+    let answer = node.layers.update.ask(NOW, &node.member);
     Message::Offer { upload, answer }
 }
 
@@ -119,10 +119,9 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     let mut at: heapless::Vec<u64, 40> = heapless::Vec::new();
     for ms in 1..4_000 {
         let now = NOW + Duration::from_millis(ms);
+        node.layers.update.handle_timeout(now);
         for side in [Side::Upstream, Side::Downstream] {
-            if node.layers.update.offers_again(side, now) {
-                node.layers.neighbours.at_mut(side).offer = true;
-                assert!(node.next_offer(now, side).is_some());
+            if node.next_offer(now, side).is_some() {
                 at.push(ms).unwrap();
             }
         }
@@ -221,9 +220,9 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             if hellos {
                 // The relay continues to send hellos, whose number has changed by then.
                 let step = Settings::default().dead_after;
-                node.ask_number(NOW + step);
-                node.ask_number(NOW + step.times(2));
-                node.ask_number(now);
+                node.layers.update.ask(NOW + step, &node.member);
+                node.layers.update.ask(NOW + step.times(2), &node.member);
+                node.layers.update.ask(now, &node.member);
             }
             let from = u16::from(!ground);
             assert!(node.handle_message(now, Side::Upstream, from, &withheld));
