@@ -414,8 +414,7 @@ pub(crate) fn check(
     if settings.hop_time.as_micros() == 0 {
         return Err(SetupError::HopTime);
     }
-    #[cfg(feature = "auth")]
-    if settings.auth.is_some_and(|auth| auth.epoch == 0) {
+    if settings.auth.is_some_and(|auth| auth.parts().1 == 0) {
         return Err(SetupError::Epoch);
     }
     if settings.probe_after.as_micros() == 0 || settings.dead_after <= settings.probe_after {

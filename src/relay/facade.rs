@@ -132,15 +132,10 @@ impl Relay {
 
     #[inline(never)] // a session is built on the stack
     fn begin(&mut self, identity: Identity, seed: u32, now: Instant) {
-        #[cfg(feature = "auth")]
-        {
+        let settings = &self.node.member().settings;
+        if let Some(auth) = settings.auth {
             let number = self.node.claim_number();
-            let Settings {
-                auth, dead_after, ..
-            } = self.node.member().settings;
-            if let Some(auth) = auth {
-                self.endpoint.sign(auth, number, dead_after);
-            }
+            self.endpoint.sign(auth, number, settings.dead_after);
         }
         self.node.begin(identity, seed, now);
     }

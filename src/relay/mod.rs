@@ -11,8 +11,7 @@ mod facade;
 mod frames;
 mod port;
 mod readings;
-#[cfg(feature = "auth")]
-#[cfg(test)]
+#[cfg(all(test, feature = "auth"))]
 mod tests;
 
 pub use facade::Relay;

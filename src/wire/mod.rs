@@ -3,14 +3,12 @@
 //! This file has the check sequence and the range of node numbers. `FORMAT.md` in this folder has byte tables and examples.
 
 pub mod auth;
-#[cfg(feature = "auth")]
 mod blake2s;
 pub mod deframe;
 pub mod digest;
 pub(crate) mod endpoint;
 pub mod frame;
 pub mod message;
-#[cfg(feature = "auth")]
 pub(crate) mod session;
 pub mod upload;
 

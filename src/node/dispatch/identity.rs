@@ -3,7 +3,6 @@
 use super::state::Node;
 use crate::event::{About, Event};
 use crate::node::duplicate::{Duplicated, Sender};
-#[cfg(feature = "auth")]
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::Instant;
@@ -25,7 +24,6 @@ impl Node {
         {
             let node = self.member.node;
             self.raise_about(About::Index, Side::Upstream, node);
-            #[cfg(feature = "auth")]
             if let Sender::Rival(rival) = sender
                 && rival.newer_epoch
             {
@@ -95,12 +93,10 @@ impl Node {
     }
 
     /// Returns the claim number if all sessions must be started again with it.
-    #[cfg(feature = "auth")]
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
 
-    #[cfg(feature = "auth")]
     pub(crate) const fn claim_number(&self) -> u32 {
         self.duplicate.number()
     }
@@ -108,7 +104,6 @@ impl Node {
     /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
     ///
     /// Another relay with this number then detects this one even if the chain sends nothing else.
-    #[cfg(feature = "auth")]
     pub(crate) fn shows_its_nonce(&self, message: &Message) -> bool {
         let once = match message {
             Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),

@@ -119,6 +119,7 @@ impl Node {
         same
     }
 
+    #[inline(never)] // called from several places
     fn is_of_mission(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.digest;
         if !same {
@@ -201,7 +202,6 @@ impl Node {
     }
 }
 
-#[cfg(feature = "auth")]
 impl Node {
     /// Handles an authentic frame of node `from` at `side`; after the `first` one, messages are sent again.
     pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {

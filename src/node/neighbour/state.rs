@@ -79,7 +79,6 @@ pub(crate) struct Neighbour {
     /// Nodes of another mission.
     pub(super) strangers: ToldOf,
     /// Consecutive handshakes with each node's index that were signed with another key.
-    #[cfg(feature = "auth")]
     pub(super) forged: InRow,
     /// Interval between questions.
     tick: Duration,
@@ -113,7 +112,6 @@ impl Neighbour {
         unheard: InRow::NONE,
         found: 0,
         strangers: ToldOf::NONE,
-        #[cfg(feature = "auth")]
         forged: InRow::NONE,
         tick: Duration::from_micros(0),
         patience: Duration::from_micros(0),
@@ -558,7 +556,6 @@ impl Signs {
 const UNHEARD: u8 = 8;
 
 /// Consecutive handshakes with a node's index that are signed with another key.
-#[cfg(feature = "auth")]
 const FORGED: u8 = 3;
 
 impl Neighbour {
@@ -628,13 +625,11 @@ impl Neighbour {
     }
 
     /// Counts a handshake that was signed with another key; returns true at the last of [`FORGED`] in a row.
-    #[cfg(feature = "auth")]
     pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
 
     /// Resets the count: the node `distance` places away has the key.
-    #[cfg(feature = "auth")]
     pub(crate) fn is_signed_right(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }
