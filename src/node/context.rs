@@ -160,34 +160,59 @@ impl<'a> Context<'a> {
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
 )]
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Effects {
-    /// A stale message was ignored.
-    pub(crate) stale: bool,
-    /// A duplicate was received.
-    pub(crate) repeated: bool,
+    /// Reason why the received message had no effect.
+    pub(crate) ignored: Option<Ignored>,
     /// A message is retransmitted.
     pub(crate) resent: bool,
     /// A pass or a proposal starts at this relay.
     pub(crate) began: bool,
-    /// The chain has agreed on a target.
-    pub(crate) converged: bool,
-    /// The leader has found no feasible target.
-    pub(crate) infeasible: bool,
     /// A new view is needed.
     pub(crate) view_needed: bool,
-    /// The lease has expired.
-    pub(crate) lapsed: bool,
-    /// Time at or after which the next relay, or the previous one, was alive.
-    pub(crate) heard_onward: Option<Instant>,
-    pub(crate) heard_back: Option<Instant>,
-    /// A proposal is outstanding, and no pass continues before its decision.
-    pub(crate) view_proposed: bool,
-    /// Origin of that proposal.
+    /// Neighbour that was alive at this time or later, by its reply.
+    pub(crate) alive: Option<(Peer, Instant)>,
+    /// Origin of the proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,
+    /// That proposal is outstanding, and no pass continues before its decision.
+    pub(crate) view_proposed: bool,
+    pub(crate) news: Option<News>,
+    /// Changes of the interference estimate and of the faulty receivers.
+    pub(crate) sensed: Sensed,
+}
+
+/// Reason why a message had no effect.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Ignored {
+    Stale,
+    Duplicate,
+}
+
+/// Neighbour on the path of passes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Peer {
+    Next,
+    Previous,
+}
+
+/// Result of a layer, which the others or the firmware need.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum News {
+    /// The chain has agreed on a target.
+    Converged,
+    /// The leader has found no feasible target.
+    Infeasible,
+    /// The lease has expired.
+    Lapsed,
     /// A request for a view is due to the neighbour toward the leader.
-    pub(crate) ask: bool,
-    pub(crate) decided: Option<Decided>,
+    Ask,
+    /// A proposal is decided.
+    Decided(Decided),
+}
+
+/// Results of sensing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Sensed {
     /// The interference estimate has changed.
     pub(crate) believes: bool,
     /// The measurements do not fit a single source.
@@ -216,39 +241,49 @@ pub(crate) enum Proposer {
 
 impl Effects {
     pub(crate) const NONE: Self = Self {
-        stale: false,
-        repeated: false,
+        ignored: None,
         resent: false,
         began: false,
-        converged: false,
-        infeasible: false,
         view_needed: false,
-        lapsed: false,
-        heard_onward: None,
-        heard_back: None,
-        view_proposed: false,
+        alive: None,
         proposed_by: None,
-        ask: false,
-        decided: None,
-        believes: false,
-        unclear: false,
-        off: None,
+        view_proposed: false,
+        news: None,
+        sensed: Sensed {
+            believes: false,
+            unclear: false,
+            off: None,
+        },
     };
 
     pub(crate) const STALE: Self = Self {
-        stale: true,
+        ignored: Some(Ignored::Stale),
+        ..Self::NONE
+    };
+
+    pub(crate) const DUPLICATE: Self = Self {
+        ignored: Some(Ignored::Duplicate),
         ..Self::NONE
     };
 
     /// Effects of a message that cannot be joined: a new view is needed.
     pub(crate) const FOREIGN: Self = Self {
-        stale: true,
         view_needed: true,
-        ..Self::NONE
+        ..Self::STALE
     };
 
-    pub(crate) const REPEATED: Self = Self {
-        repeated: true,
-        ..Self::NONE
-    };
+    pub(crate) const fn of(news: News) -> Self {
+        Self {
+            news: Some(news),
+            ..Self::NONE
+        }
+    }
+
+    /// Adds the origin of a proposal.
+    pub(crate) const fn by(self, proposer: Proposer) -> Self {
+        Self {
+            proposed_by: Some(proposer),
+            ..self
+        }
+    }
 }

@@ -1,6 +1,5 @@
 //! Setpoint on the way to the agreed position: limited by the [guard](crate::guard), or without a guard the agreed position.
 
-use super::context::Effects;
 use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
@@ -83,11 +82,10 @@ impl Steering {
     }
 
     /// Handles a fence message of the neighbour `from` at `side`.
-    pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) -> Effects {
+    pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
             guard.hear(side, from, fence);
         }
-        Effects::NONE
     }
 
     /// Schedules fence messages again that may be lost.

@@ -149,8 +149,7 @@ impl Node {
                 return;
             }
             Message::Fence { fence, .. } => {
-                let effects = self.steering.handle(side, from, fence);
-                return self.apply(now, effects);
+                return self.steering.handle(side, from, fence);
             }
             Message::Offer { upload, answer } => {
                 return self.on_offer(now, side, from, upload, *answer);

@@ -7,7 +7,7 @@
 use crate::event::{About, Event, Pending};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
-use crate::node::context::{Context, Effects, Member};
+use crate::node::context::{Context, Effects, Ignored, Member, News, Peer};
 use crate::node::duplicate::DuplicateIndex;
 use crate::node::lease::Lease;
 use crate::node::mission_update::MissionUpdate;
@@ -115,8 +115,11 @@ impl Node {
     pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
         for (happened, counter) in [
-            (effects.stale, &mut stats.stale),
-            (effects.repeated, &mut stats.repeated),
+            (effects.ignored == Some(Ignored::Stale), &mut stats.stale),
+            (
+                effects.ignored == Some(Ignored::Duplicate),
+                &mut stats.repeated,
+            ),
             (effects.resent, &mut stats.repeats),
             (effects.began, &mut stats.sweeps),
         ] {
@@ -124,18 +127,16 @@ impl Node {
                 bump(counter);
             }
         }
+        let (back, onward) = (self.back(), self.onward());
         if let Some(proposer) = effects.proposed_by {
-            let back = self.back();
             self.layers.neighbours.at_mut(back).proposed_by(proposer);
         }
-        let (back, onward) = (self.back(), self.onward());
-        for (side, at) in [(onward, effects.heard_onward), (back, effects.heard_back)] {
-            if let Some(at) = at {
-                self.confirm(now, side, at);
-            }
-        }
-        if effects.lapsed && !core::mem::replace(&mut self.telemetry.told_lapsed, true) {
-            self.raise(Event::LeaseLapsed);
+        if let Some((peer, at)) = effects.alive {
+            let side = match peer {
+                Peer::Next => onward,
+                Peer::Previous => back,
+            };
+            self.confirm(now, side, at);
         }
         if effects.view_proposed {
             self.layers.round.suspend();
@@ -143,30 +144,36 @@ impl Node {
         if effects.view_needed {
             self.layers.view.asking.ask(now);
         }
-        if effects.ask {
-            let back = self.back();
-            let to = self.layers.neighbours.at(back).node();
-            self.owe_hello(back, to, true);
+        match effects.news {
+            Some(News::Lapsed) => {
+                if !core::mem::replace(&mut self.telemetry.told_lapsed, true) {
+                    self.raise(Event::LeaseLapsed);
+                }
+            }
+            Some(News::Ask) => {
+                let to = self.layers.neighbours.at(back).node();
+                self.owe_hello(back, to, true);
+            }
+            Some(News::Decided(decided)) => {
+                self.decided(now, decided);
+                self.drift(now);
+            }
+            Some(News::Converged) => {
+                self.raise(Event::Converged);
+                let leads = self.layers.context(now, &self.member).leads();
+                self.layers.lease.begin(now, leads);
+            }
+            Some(News::Infeasible) => self.raise(Event::Infeasible),
+            None => {}
         }
-        if let Some(decided) = effects.decided {
-            self.decided(now, decided);
-            self.drift(now);
-        }
-        if effects.converged {
-            self.raise(Event::Converged);
-            let leads = self.layers.context(now, &self.member).leads();
-            self.layers.lease.begin(now, leads);
-        }
-        if effects.infeasible {
-            self.raise(Event::Infeasible);
-        }
-        if effects.believes {
+        let sensed = effects.sensed;
+        if sensed.believes {
             self.believe();
         }
-        if effects.unclear {
+        if sensed.unclear {
             self.raise(Event::InterfererUnclear);
         }
-        if let Some(node) = effects.off {
+        if let Some(node) = sensed.off {
             self.raise_about(About::Sensor, onward, node);
         }
     }

@@ -18,7 +18,7 @@ use super::electorate;
 use super::electorate::{Electorate, Outcome};
 use super::record::{RecordError, ViewRecord};
 use crate::node::circulation::{Circulation, Reply};
-use crate::node::context::{Context, Decided, Effects, Member, Proposer};
+use crate::node::context::{Context, Decided, Effects, Member, News, Proposer};
 use crate::node::numbering::Stragglers;
 use crate::node::timing::earliest;
 use crate::time::Instant;
@@ -179,17 +179,10 @@ impl ViewChange {
                 && known.mission_id == proposal.mission_id
                 && known.place == proposal.place.saturating_add(1)
         });
-        let from = Effects {
-            proposed_by: Some(Proposer::Neighbour),
-            ..Effects::NONE
-        };
         if again {
             let path = context.path(proposal.place);
             self.circulation.on_duplicate(context.now, path);
-            return Effects {
-                repeated: true,
-                ..from
-            };
+            return Effects::DUPLICATE.by(Proposer::Neighbour);
         }
         let told = Some(proposal.poll);
         let effects = self.propose(
@@ -200,10 +193,7 @@ impl ViewChange {
             told,
         );
         if let Some(effects) = effects {
-            return Effects {
-                proposed_by: from.proposed_by,
-                ..effects
-            };
+            return effects.by(Proposer::Neighbour);
         }
         // The proposal is late, or its leader has missed a later one.
         if self.stragglers.one_more() {
@@ -211,15 +201,9 @@ impl ViewChange {
             if let Some(later) = self.newest.next_by(context.member.node) {
                 self.heard_of(later);
             }
-            return Effects {
-                proposed_by: from.proposed_by,
-                ..Effects::FOREIGN
-            };
+            return Effects::FOREIGN.by(Proposer::Neighbour);
         }
-        Effects {
-            stale: true,
-            ..from
-        }
+        Effects::STALE.by(Proposer::Neighbour)
     }
 
     /// Votes on a proposal that `place` relays have forwarded; `None` if this relay has promised a later one.
@@ -369,18 +353,14 @@ impl ViewChange {
                 self.wait_after_refusal(context);
             }
         }
-        let came = match decided {
+        Effects::of(News::Decided(match decided {
             Some(view) if view.id == proposal => Decided::Granted {
                 relays: view.relays,
                 lease_left,
             },
             Some(_) => Decided::Earlier,
             None => Decided::Refused,
-        };
-        Effects {
-            decided: Some(came),
-            ..Effects::NONE
-        }
+        }))
     }
 }
 
@@ -469,10 +449,7 @@ impl ViewChange {
             return Effects::NONE;
         }
         if !leads {
-            return Effects {
-                ask: true,
-                ..Effects::NONE
-            };
+            return Effects::of(News::Ask);
         }
         let under_way = self.awaited().is_some_and(|proposed| {
             proposed.view >= self.newest && proposed.mission_id == context.latest
@@ -499,8 +476,7 @@ impl ViewChange {
         };
         Effects {
             began: true,
-            proposed_by: Some(Proposer::Itself),
-            ..effects
+            ..effects.by(Proposer::Itself)
         }
     }
 

@@ -11,7 +11,7 @@ use super::chain::{Body, Chain, Decree, Frame, Unit, put};
 use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::circulation::Circulation;
-use crate::node::context::{Context, Decided, Effects, Member};
+use crate::node::context::{Context, Decided, Effects, Member, News};
 use crate::node::numbering::Stragglers;
 use crate::node::view::asking::Asking;
 use crate::node::view::change::ViewChange;
@@ -142,7 +142,7 @@ impl Check {
             }
         }
         if let Some(proposed) = unit.change.proposed
-            && let Some(decided) = effects.decided
+            && let Some(News::Decided(decided)) = effects.news
         {
             if let Decided::Granted { relays, .. } = decided {
                 unit.flies = (proposed.view, proposed.place, relays);

@@ -2,7 +2,7 @@
 
 use super::relay::{PROPOSED, Relay, all, came, id};
 use crate::node::circulation::Stage;
-use crate::node::context::{Decided, Effects};
+use crate::node::context::{Decided, Effects, News};
 use crate::node::view::change::Proposed;
 use crate::node::view::electorate::{Electorate, Held};
 use crate::view::View;
@@ -67,10 +67,10 @@ fn the_last_one_decides() {
     proposal.place = 3;
     proposal.poll.votes = 3;
     let granted = Effects {
-        decided: Some(Decided::Granted {
+        news: Some(News::Decided(Decided::Granted {
             relays: 4,
             lease_left: 0,
-        }),
+        })),
         ..PROPOSED
     };
     assert_eq!(relay.handle(&Message::Proposal(proposal)), granted);
@@ -134,17 +134,20 @@ fn a_refusal_says_which_view_was_agreed_on() {
         let Some(Message::Decision(back)) = third.view.take_back() else {
             panic!("nothing is handed back")
         };
-        if effects.decided == Some(Decided::Refused) {
+        if effects.news == Some(News::Decided(Decided::Refused)) {
             refused += 1;
             assert_eq!((back.base, back.view), (view, None));
         }
-        let decided = second.handle(&Message::Decision(back)).decided;
+        let decided = second.handle(&Message::Decision(back)).news;
         if round == 0 {
-            assert_eq!(decided, Some(Decided::Refused));
+            assert_eq!(decided, Some(News::Decided(Decided::Refused)));
             assert_eq!(second.view.electorate.agreed(), view);
         } else {
             // Two of its three members are polled, now that both know the view.
-            assert!(matches!(decided, Some(Decided::Granted { relays: 2, .. })));
+            assert!(matches!(
+                decided,
+                Some(News::Decided(Decided::Granted { relays: 2, .. }))
+            ));
         }
     }
     assert_eq!(refused, 1);
@@ -201,8 +204,8 @@ fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
     };
     proposal.place = 2;
     proposal.poll.votes = 2;
-    let decided = relay.handle(&Message::Proposal(proposal)).decided;
-    assert_eq!(decided, Some(Decided::Earlier));
+    let decided = relay.handle(&Message::Proposal(proposal)).news;
+    assert_eq!(decided, Some(News::Decided(Decided::Earlier)));
     let poll = relay.view.proposed.unwrap().poll;
     assert_eq!(
         poll.successor,

@@ -1,7 +1,7 @@
 //! Leaders: who proposes, and abandoned proposals.
 
-use super::relay::{FROM, LATE, Relay, came, id};
-use crate::node::context::{Decided, Effects};
+use super::relay::{LATE, Relay, came, id};
+use crate::node::context::{Decided, Effects, Proposer};
 use crate::node::numbering::SUSPICIOUS;
 use crate::wire::message::{Message, Proposal};
 
@@ -31,7 +31,7 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
     }
     // A later proposal may end here.
     let later = relay.proposal(id(3, 1));
-    assert!(relay.handle(&later).decided.is_some());
+    assert!(relay.handle(&later).news.is_some());
 }
 
 /// Regression test: two views had one identifier, relays 1 to 3, and 1 and 4, when only relay 1 had lost relay 2.
@@ -64,7 +64,7 @@ fn a_proposal_is_handed_to_one_node_alone() {
 fn a_leader_that_is_refused_stays_and_asks_again_later() {
     let mut relay = Relay::second();
     relay.end = true;
-    assert_eq!(relay.leads().decided, Some(Decided::Refused));
+    assert_eq!(relay.leads().news, came(Decided::Refused).news);
     assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
     assert!(!relay.view.electorate.has_voted(relay.view.newest()));
     let again = relay.view.asking.next_timeout().unwrap();
@@ -93,7 +93,7 @@ fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
 fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
     let mut relay = Relay::second();
     relay.end = true;
-    assert_eq!(relay.leads().decided, Some(Decided::Refused));
+    assert_eq!(relay.leads().news, came(Decided::Refused).news);
     let newest = relay.view.newest();
     for _ in 0..1_000 {
         assert_eq!(relay.leads(), Effects::NONE);
@@ -115,10 +115,7 @@ fn who_has_missed_something_is_told_after_some_late_proposals() {
     for _ in 1..SUSPICIOUS {
         assert_eq!(relay.handle(&late), LATE);
     }
-    let foreign = Effects {
-        proposed_by: FROM.proposed_by,
-        ..Effects::FOREIGN
-    };
+    let foreign = Effects::FOREIGN.by(Proposer::Neighbour);
     assert_eq!(relay.handle(&late), foreign);
     assert_eq!(relay.view.newest(), id(4, 2));
 }

@@ -2,7 +2,7 @@
 
 use crate::mission::Mission;
 use crate::mission::tests::paper;
-use crate::node::context::{Context, Decided, Effects, Member, Proposer};
+use crate::node::context::{Context, Decided, Effects, Member, News, Proposer};
 use crate::node::view::change::ViewChange;
 use crate::node::view::electorate::Held;
 use crate::settings::Settings;
@@ -124,28 +124,14 @@ pub(super) const fn all(id: ViewId) -> View {
 }
 
 pub(super) const fn came(decided: Decided) -> Effects {
-    Effects {
-        decided: Some(decided),
-        ..Effects::NONE
-    }
+    Effects::of(News::Decided(decided))
 }
-
-pub(super) const FROM: Effects = Effects {
-    proposed_by: Some(Proposer::Neighbour),
-    ..Effects::NONE
-};
 
 pub(super) const PROPOSED: Effects = Effects {
     view_proposed: true,
-    ..FROM
+    ..Effects::NONE.by(Proposer::Neighbour)
 };
 
-pub(super) const REPEATED: Effects = Effects {
-    repeated: true,
-    ..FROM
-};
+pub(super) const REPEATED: Effects = Effects::DUPLICATE.by(Proposer::Neighbour);
 
-pub(super) const LATE: Effects = Effects {
-    stale: true,
-    ..FROM
-};
+pub(super) const LATE: Effects = Effects::STALE.by(Proposer::Neighbour);
