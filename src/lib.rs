@@ -69,8 +69,8 @@ mod wire;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod wire;
-mod without_quorum;
 
+pub use self::settings::WithoutQuorum;
 pub use channel::Channel;
 pub use channel_load::{ChannelFull, ChannelLoad};
 pub use event::Event;
@@ -101,7 +101,6 @@ pub use wire::digest::MissionId;
 pub use wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]
 pub use wire::upload::{Upload, UploadError};
-pub use without_quorum::WithoutQuorum;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

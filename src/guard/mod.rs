@@ -84,7 +84,6 @@
 
 mod association;
 pub mod config;
-mod fence;
 mod follower;
 mod own;
 mod owner;
@@ -96,10 +95,10 @@ use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Instant, Jitter};
 
+use self::association::is_place;
+pub use self::association::{Fence, HoldReason};
 use association::Association;
 use config::{Geofence, GuardConfig};
-use fence::is_place;
-pub use fence::{Fence, HoldReason};
 use follower::FenceFollower;
 use own::{Own, ReachableInterval};
 use owner::FenceOwner;

@@ -369,7 +369,7 @@ impl DuplicateIndex {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        super::timing::earliest(self.passive_until, self.next_claim)
+        super::context::earliest(self.passive_until, self.next_claim)
     }
 }
 

@@ -30,7 +30,7 @@
 
 use super::circulation::{Circulation, Reply};
 use super::context::{Context, Effects, News, Peer};
-use super::timing::{PAUSE, earliest, longest_lease, tenths};
+use super::context::{PAUSE, earliest, longest_lease, tenths};
 use super::view::electorate::Held;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};

@@ -28,7 +28,7 @@
 //! | decision received, view granted | fly its mission; `Event::Adopted` |
 
 use super::context::Member;
-use super::timing::earliest;
+use super::context::earliest;
 use crate::geodetic::{LineError, Sites};
 use crate::guard::config::Geofence;
 use crate::mission::{Band, Mission, MissionConfig};

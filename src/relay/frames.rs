@@ -1,6 +1,6 @@
 //! Frames to and from the protocol: address and tag are checked before a message is decoded.
 
-use super::port::Port;
+use super::Port;
 use crate::node::Node;
 use crate::node::duplicate::Sender;
 use crate::side::Side;

@@ -95,7 +95,6 @@
 pub mod link;
 pub mod port;
 pub mod queue;
-mod ring;
 
 use embedded_hal::digital::OutputPin;
 

@@ -1,6 +1,6 @@
 //! Pending hellos, and received ones, by which the neighbours are selected.
 
-use super::state::Node;
+use super::Node;
 use crate::event::About;
 use crate::node::mission_update::takes_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;

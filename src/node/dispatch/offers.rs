@@ -1,6 +1,6 @@
 //! Newer missions in flight, exchanged with neighbours and the ground, and measurements from the ground.
 
-use super::state::Node;
+use super::Node;
 use crate::event::Event;
 use crate::node::mission_update::{Offered, takes_uploads};
 use crate::node::sample::Sample;

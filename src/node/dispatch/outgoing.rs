@@ -1,11 +1,11 @@
 //! Output of a relay: the next message in order of urgency, expired timers, and the setpoint.
 
-use super::state::Node;
+use super::Node;
 use crate::event::{About, Event};
 use crate::guard::HoldReason;
 use crate::node::context::Member;
+use crate::node::context::first_pass;
 use crate::node::neighbour::liveness::patient_tick;
-use crate::node::timing::first_pass;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;

@@ -28,7 +28,7 @@ use super::hearing::Hellos;
 use super::hearing::{CANDIDATES, Hearing, InRow, ToldOf, mask};
 use super::liveness::{Liveness, patience, tick};
 use crate::node::context::Proposer;
-use crate::node::timing::{first_pass, longest_lease};
+use crate::node::context::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant, Jitter};
 use crate::wire::digest::MissionId;

@@ -25,8 +25,8 @@ mod turn;
 
 use super::circulation::{Circulation, Path, Reply};
 use super::context::{Context, Effects, Member, News, Peer};
+use super::context::{PAUSE, earliest};
 use super::sample::{Meter, Sample};
-use super::timing::{PAUSE, earliest};
 use crate::mission::Profile;
 use crate::place::Placement;
 use crate::settings::Settings;

@@ -14,14 +14,14 @@
 
 use super::computation::{Computation, PassKind};
 use super::state::{Action, Phase};
+use crate::node::context::PAUSE;
 use crate::node::context::{Context, Member, Sensed};
 use crate::node::sample::Sample;
-use crate::node::timing::PAUSE;
 use crate::place::Placement;
 use crate::sensing::belief::{Belief, Knowledge, Spread, Told, review};
 use crate::sensing::doubt::{Next, Trial, is_absurd, is_deaf, is_off};
 use crate::sensing::fit::{Unfit, expected_at};
-use crate::sensing::listener::{Average, Listener, left};
+use crate::sensing::sums::{Average, Listener, left};
 use crate::sensing::sums::{EndsOff, Level, Levels, Sums, UNIT_W, is_level, terms};
 use crate::settings::Listen;
 use crate::side::Side;

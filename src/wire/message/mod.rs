@@ -1,32 +1,23 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
-//! Each kind of message has one file with its type, its encoder and its decoder, which checks all ranges: a decoded message has
-//! no invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
+//! Each kind of message has its type, its encoder and its decoder beside each other: in `round` those of passes, in `view` those of view
+//! changes and leases, in `link` those between two neighbours, in `offer` uploads. A decoder checks all ranges: a decoded message has no
+//! invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
 //! shared parts.
 
-mod claim;
-mod fence;
-mod hearing;
-mod hello;
-mod level;
+mod link;
 #[cfg(feature = "upload")]
 mod offer;
 mod parts;
-mod pulse;
-mod roster;
-mod sweep;
-mod turn;
+mod round;
 mod view;
 
-pub use self::claim::Claim;
-pub use self::hearing::Heard;
-pub use self::hello::Hello;
+pub use self::link::{Claim, Hello};
 pub use self::parts::MessageError;
-pub use self::pulse::{Pulse, Pulsed};
-pub use self::roster::{MOST_NAMED, OwnSeat, OwnSeats, Roster};
-pub use self::sweep::{Answer, Sweep};
-pub use self::turn::{AdjustStep, Moved, Token};
-pub use self::view::{Decision, Poll, Proposal, Successor};
+pub use self::round::{
+    AdjustStep, Answer, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, Token,
+};
+pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
 
 use self::parts::{Word, read, tag, write};
 use super::upload::{UPLOAD as UPLOADS, Upload};
@@ -37,7 +28,7 @@ const SWEEP: usize = 88;
 
 /// Maximum body except for an offer: measurements, or without the feature `sensing` a sweep.
 const LONG: usize = if cfg!(feature = "sensing") {
-    hearing::LENGTH
+    round::HEARD
 } else {
     SWEEP
 };
@@ -216,12 +207,12 @@ impl Message {
             Self::Hello(hello) => hello.encode(buffer),
             Self::Proposal(proposal) => proposal.encode(buffer),
             Self::Decision(decision) => decision.encode(buffer),
-            Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
+            Self::Fence { mission, fence } => link::encode_fence(*mission, fence, buffer),
             #[cfg(feature = "upload")]
             Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
             #[cfg(not(feature = "upload"))]
             Self::Offer { upload, .. } => match *upload {},
-            Self::Level { mission, power_w } => level::encode(*mission, *power_w, buffer),
+            Self::Level { mission, power_w } => round::encode_level(*mission, *power_w, buffer),
             Self::Claim(claim) => claim.encode(buffer),
         }
     }
@@ -270,7 +261,7 @@ impl Message {
             tag::PROPOSAL => Proposal::decode(body).map(Self::Proposal),
             tag::DECISION => Decision::decode(body).map(Self::Decision),
             tag::FENCE => {
-                let (mission, fence) = fence::decode(body)?;
+                let (mission, fence) = link::decode_fence(body)?;
                 Ok(Self::Fence { mission, fence })
             }
             #[cfg(feature = "upload")]
@@ -279,7 +270,7 @@ impl Message {
                 Ok(Self::Offer { upload, answer })
             }
             tag::LEVEL if UPLOADS => {
-                let (mission, power_w) = level::decode(body)?;
+                let (mission, power_w) = round::decode_level(body)?;
                 Ok(Self::Level { mission, power_w })
             }
             tag::CLAIM => Claim::decode(body).map(Self::Claim),
