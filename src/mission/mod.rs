@@ -14,7 +14,7 @@ use crate::wire::digest::digest;
 #[cfg(test)]
 pub(crate) mod tests;
 
-/// Value of [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
+/// Value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
 /// Two f32 steps just below the distance, as a fraction of it: positions this far apart near Rx remain distinct.
@@ -23,14 +23,14 @@ pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 /// Maximum rounding error of a step between two positions, as a fraction of the distance.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
-/// Parameters of a mission; [`Mission::try_new`](crate::Mission::try_new) checks them.
+/// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
 ///
 /// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
 /// altitude is height above the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionConfig {
-    /// Number of relays N, 1 to [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
+    /// Number of relays N, 1 to [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
     pub relays: u16,
     /// Distance D from transmitter to receiver, m: 1 to 1e6.
     pub distance_m: f32,
@@ -69,12 +69,12 @@ impl MissionConfig {
     }
 }
 
-/// Parameter of a [`MissionConfig`](crate::MissionConfig) that is rejected, and its range.
+/// Parameter of a [`MissionConfig`] that is rejected, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MissionError {
-    /// `relays` is not within 1 to [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
+    /// `relays` is not within 1 to [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
     Relays,
     /// `distance_m` is not within 1 to 1e6.
     Distance,

@@ -7,7 +7,8 @@
 
 mod facade;
 mod frames;
-#[cfg(all(test, feature = "auth"))]
+#[cfg(feature = "auth")]
+#[cfg(test)]
 mod tests;
 
 pub use facade::Relay;

@@ -457,5 +457,6 @@ fn said(frame: &Opened<'_>) -> Option<Nonces> {
     })
 }
 
-#[cfg(all(test, feature = "auth"))]
+#[cfg(feature = "auth")]
+#[cfg(test)]
 mod tests;

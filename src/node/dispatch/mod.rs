@@ -39,7 +39,8 @@ mod incoming;
 mod offers;
 mod outgoing;
 
-#[cfg(all(test, feature = "upload"))]
+#[cfg(feature = "upload")]
+#[cfg(test)]
 mod tests;
 
 /// Claim to repeat: side, destination node and claim.
@@ -162,11 +163,8 @@ impl Node {
             self.layers.view.asking.ask(now);
         }
         match effects.news {
-            Some(News::Lapsed) => {
-                if !core::mem::replace(&mut self.telemetry.told_lapsed, true) {
-                    self.raise(Event::LeaseLapsed);
-                }
-            }
+            Some(News::Lapsed) if core::mem::replace(&mut self.telemetry.told_lapsed, true) => {}
+            Some(News::Lapsed) => self.raise(Event::LeaseLapsed),
             Some(News::Ask) => {
                 let to = self.layers.neighbours.at(back).node();
                 self.owe_hello(back, to, true);

@@ -202,12 +202,12 @@ impl Node {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.holds);
         let update = &mut self.layers.update;
-        let message = match update.take_offer((side, to), holds, now, &self.member)? {
-            (upload, Some(answer)) => Message::Offer { upload, answer },
-            (_, None) => {
-                let nonce = update.ask(now, &self.member);
-                Message::Hello(self.hello(now, side, true, nonce))
-            }
+        let (upload, answer) = update.take_offer((side, to), holds, now, &self.member)?;
+        let message = if let Some(answer) = answer {
+            Message::Offer { upload, answer }
+        } else {
+            let nonce = update.ask(now, &self.member);
+            Message::Hello(self.hello(now, side, true, nonce))
         };
         Some((side, to, message))
     }

@@ -122,7 +122,9 @@ impl Message {
             Self::Sweep(sweep) => Some(sweep.mission),
             Self::Verdict(answer) => Some(answer.mission),
             Self::Busy { .. } | Self::Claim(_) => None,
-            Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
+            Self::Heartbeat { mission, .. }
+            | Self::Fence { mission, .. }
+            | Self::Level { mission, .. } => Some(*mission),
             Self::Pulse(pulse) => Some(pulse.mission),
             Self::Pulsed(pulsed) => Some(pulsed.mission),
             Self::Gather(roster) | Self::Gathered(roster) => Some(roster.mission),
@@ -133,7 +135,6 @@ impl Message {
             Self::Proposal(proposal) => Some(proposal.mission_id.digest),
             Self::Decision(count) => Some(count.mission_id.digest),
             Self::Offer { upload, .. } => Some(upload.base()),
-            Self::Level { mission, .. } => Some(*mission),
         }
     }
 
