@@ -133,7 +133,6 @@ impl Channel {
 
     /// Creates a channel from its path-loss factors. `None` unless `mu_los` is within 1e-3 to 1e30, `mu_nlos` within 1 to 1e20
     /// times `mu_los`, and `eta` between the two.
-    #[cfg(feature = "upload")]
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
             && (mu_los..=1e20 * mu_los).contains(&mu_nlos)
@@ -147,7 +146,6 @@ impl Channel {
 
     /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`]. With equal losses the weighted sum may be rounded out of
     /// that range, which [`Channel::from_factors`] would reject.
-    #[cfg(feature = "upload")]
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),

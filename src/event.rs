@@ -113,23 +113,18 @@ const LAST: &[Event] = &[
     Event::Reformed,
     Event::LeaseLapsed,
     Event::NoQuorum,
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Distance,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Sites,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Altitude,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Lateral,
     },
-    #[cfg(feature = "upload")]
     Event::UploadRefused {
         why: LineError::Length,
     },
@@ -146,9 +141,7 @@ pub(crate) enum About {
     Back,
     NotHeard,
     Mission,
-    #[cfg(feature = "auth")]
     Key,
-    #[cfg(feature = "auth")]
     Epoch,
     /// Duplicate index; for this relay's own index, at either side.
     Index,
@@ -162,9 +155,7 @@ impl About {
         Self::Back,
         Self::NotHeard,
         Self::Mission,
-        #[cfg(feature = "auth")]
         Self::Key,
-        #[cfg(feature = "auth")]
         Self::Epoch,
         Self::Index,
         Self::Sensor,
@@ -176,9 +167,7 @@ impl About {
             Self::Back => Event::NeighbourBack { side, node },
             Self::NotHeard => Event::NotHeard { node },
             Self::Mission => Event::MissionMismatch { node },
-            #[cfg(feature = "auth")]
             Self::Key => Event::KeyMismatch { node },
-            #[cfg(feature = "auth")]
             Self::Epoch => Event::EpochWentBack { node },
             Self::Index => Event::IndexTaken { node },
             Self::Sensor => Event::SensorOff { node },

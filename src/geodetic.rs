@@ -79,7 +79,6 @@ impl Sites {
         bytes
     }
 
-    #[cfg(feature = "upload")]
     pub(crate) fn from_bytes(bytes: [u8; SITES_LENGTH]) -> Self {
         let mut numbers = [0; SITES_LENGTH / 4];
         for (number, place) in numbers.iter_mut().zip(bytes.as_chunks().0) {
@@ -97,7 +96,6 @@ impl Sites {
         }
     }
 
-    #[cfg(feature = "upload")]
     pub(crate) const fn are_valid(self) -> bool {
         self.tx.is_valid() && self.rx.is_valid()
     }

@@ -1,6 +1,17 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![doc = include_str!("tour.md")]
+// The tests of this workspace use more of the crate (`internals`), and a missing feature leaves out what uses an item: only a build with
+// all features can tell that an item is unused.
+#![cfg_attr(
+    not(all(feature = "internals", feature = "upload", feature = "mavlink-signing")),
+    allow(
+        dead_code,
+        unused_imports,
+        unreachable_pub,
+        clippy::trivially_copy_pass_by_ref
+    )
+)]
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -58,8 +69,8 @@ mod wire;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod wire;
-mod without_quorum;
 
+pub use self::settings::WithoutQuorum;
 pub use channel::Channel;
 pub use channel_load::{ChannelFull, ChannelLoad};
 pub use event::Event;
@@ -90,7 +101,6 @@ pub use wire::digest::MissionId;
 pub use wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]
 pub use wire::upload::{Upload, UploadError};
-pub use without_quorum::WithoutQuorum;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

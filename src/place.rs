@@ -1,16 +1,5 @@
 //! Positions in the air, and the power of a relay there.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 /// Position in the air.
 ///
 /// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.

@@ -1,16 +1,5 @@
 //! Power ratio with twice the precision of an f32.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 /// Power or path-loss ratio as the sum of two f32, so that its difference to a nearby target is exact.
 ///
 /// A target gamma is compared with a gain A through gamma - A. With A rounded to one f32 this difference has an error of up to

@@ -29,17 +29,6 @@
 //! For X >= 0 the largest SIR_1 in [0, D] is at x = 0, as without noise: anywhere else s / (x^2 + h^2) is smaller. Where s is
 //! larger, 1 / (1 + nu s) is smaller too; where s is smaller, s / (1 + nu s) is smaller and x^2 + h^2 is larger.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;

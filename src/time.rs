@@ -139,7 +139,6 @@ impl MonotonicClock {
     }
 
     /// Returns the internal time of the last call.
-    #[cfg(feature = "upload")]
     pub(crate) const fn now(&self) -> Instant {
         self.internal
     }

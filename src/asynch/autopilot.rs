@@ -10,7 +10,7 @@ use embassy_futures::select::{Either3, select, select3};
 use embassy_futures::yield_now;
 use embedded_io_async::{Read, Write};
 
-use super::clock::Clock;
+use super::link::Clock;
 use super::link::watched;
 use super::relay::{AsyncRelay, keep, wake};
 use crate::event::Event;

@@ -2,10 +2,8 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | [`clock`] | time and timers of an executor |
 //! | [`relay`] | a relay that several tasks share |
-//! | [`link`] | one port: reader, writer, pending frames, driver-enable pin |
-//! | `frames` | pending frames |
+//! | [`link`] | time and timers of an executor; one port: reader, writer, pending frames, driver-enable pin |
 //! | `autopilot` | with the feature `flight`: link to an autopilot on a port of its own |
 //! | this file | the whole: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
@@ -107,8 +105,6 @@
 
 #[cfg(feature = "flight")]
 pub mod autopilot;
-pub mod clock;
-mod frames;
 pub mod link;
 pub mod relay;
 
@@ -120,19 +116,19 @@ use embassy_futures::yield_now;
 use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 
+pub use self::link::Clock;
 #[cfg(feature = "flight")]
 pub use autopilot::AsyncAutopilot;
-pub use clock::Clock;
 pub use link::AsyncLink;
 pub use relay::AsyncRelay;
 
+use self::link::Frames;
 use crate::node::view::record::ViewRecord;
 use crate::relay::{Port, Relay, Transmit};
 use crate::serial::NoPin;
 use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
-use frames::Frames;
 use link::watched;
 
 /// Two links, one to each neighbour, full duplex unless a link has a pin.

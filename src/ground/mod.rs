@@ -9,15 +9,6 @@
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
 //! | `Outdated` | holds a newer mission | done: the upload needs a larger version |
 
-mod flown;
-mod levels;
-mod progress;
-
-pub use flown::FlownMission;
-pub use progress::Progress;
-
-use levels::Levels;
-
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
@@ -500,4 +491,118 @@ const fn is_under_way(progress: Progress) -> bool {
         progress,
         Progress::Offering | Progress::Held { .. } | Progress::Adopted { .. }
     )
+}
+
+/// The newest mission that a relay holds.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FlownMission {
+    /// Node number of the relay that answered.
+    pub by: u16,
+    /// Version of the mission: 0 for the one that was loaded before flight.
+    pub version: u16,
+    /// True if the relay flies it; false while it only holds it.
+    pub flies: bool,
+    /// Values of the mission. `None` for the one that was loaded before flight, and until the relay has sent them; older firmware
+    /// never sends them.
+    pub upload: Option<Upload>,
+}
+
+impl FlownMission {
+    /// Returns true once the values of the mission are known: received, or those loaded before flight.
+    pub const fn is_known(&self) -> bool {
+        self.version == 0 || self.upload.is_some()
+    }
+}
+
+/// Progress of an upload.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Progress {
+    /// Idle: there is no upload.
+    #[default]
+    Idle,
+    /// The mission is offered; no relay is known to hold it.
+    Offering,
+    /// A relay holds the mission; the ground station polls until the chain flies it.
+    Held {
+        /// Node number of the relay.
+        by: u16,
+    },
+    /// A relay flies the mission, but not all relays of its view are known to.
+    Adopted {
+        /// Node number of the relay.
+        by: u16,
+    },
+    /// The mission is active in all relays of a view. Relays outside the view take no part until they fly it, too.
+    Flown {
+        /// Node number of the relay that reports it.
+        by: u16,
+        /// Latest view known to that relay.
+        view: ViewId,
+        /// Number of relays that fly the mission: that relay and all of its view beyond it.
+        relays: u16,
+    },
+    /// A relay refuses the mission: no line on earth, or outside that relay's own geofence. The chain does not fly it.
+    Refused {
+        /// Node number of the relay that reports it: it refuses the mission, or a relay beyond it does.
+        by: u16,
+    },
+    /// The chain has a newer mission.
+    Outdated {
+        /// Version of the newer mission.
+        version: u16,
+    },
+}
+
+/// Number of reports between handshakes: a relay that has restarted can read reports after the next handshake.
+const LEVELS_A_GREETING: u8 = 16;
+
+/// Last measurement, and the relays that have not received it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Levels {
+    /// Last measured interference, W; 0 before the first.
+    power_w: f32,
+    /// Distances of relays without the last report: bit d - 1 for d.
+    untold: u8,
+    measured: u8,
+}
+
+impl Levels {
+    /// State before the first measurement.
+    pub(super) const NONE: Self = Self {
+        power_w: 0.0,
+        untold: 0,
+        measured: 0,
+    };
+
+    /// Records a measurement, W, for the relays at distances 1 to `within`; returns true if a handshake to them is due first.
+    pub(super) fn measured(&mut self, power_w: f32, within: u16) -> bool {
+        self.power_w = power_w;
+        self.untold = (1..=within).fold(0, |all, distance| all | bit(distance));
+        self.measured = (self.measured + 1) % LEVELS_A_GREETING;
+        self.measured == 0
+    }
+
+    /// Schedules the report to the relay at `distance`, which has answered and may not have it.
+    pub(super) fn owe(&mut self, distance: u16) {
+        if self.power_w > 0.0 {
+            self.untold |= bit(distance);
+        }
+    }
+
+    /// Returns the distance of the next relay to send the report to, at most `within`, and the power, W.
+    pub(super) fn take(&mut self, within: u16) -> Option<(u16, f32)> {
+        let distance = (1..=within).find(|distance| self.untold & bit(*distance) != 0)?;
+        self.untold &= !bit(distance);
+        Some((distance, self.power_w))
+    }
+}
+
+/// Returns the bit of the relay at `distance`, 1 to 8.
+const fn bit(distance: u16) -> u8 {
+    match 1_u8.checked_shl(distance.saturating_sub(1) as u32) {
+        Some(bit) => bit,
+        None => 0,
+    }
 }

@@ -3,10 +3,10 @@
 use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
+use crate::settings::WithoutQuorum;
 use crate::time::Duration;
-use crate::without_quorum::WithoutQuorum;
 
-use super::fence::is_place;
+use super::association::is_place;
 
 /// Default `lag`: stopping time of the autopilot link's default pace.
 const LAG: Duration = Duration::from_millis(9_800);

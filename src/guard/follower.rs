@@ -1,7 +1,7 @@
 //! Fence upstream, which the neighbour places.
 
 use super::association::{Association, KeepOut};
-use super::fence::{Fence, HoldReason};
+use super::association::{Fence, HoldReason};
 use super::own::Own;
 use crate::side::Side;
 use crate::time::Jitter;

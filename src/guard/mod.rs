@@ -82,20 +82,8 @@
 //!   replaced by `link`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 mod association;
 pub mod config;
-mod fence;
 mod follower;
 mod own;
 mod owner;
@@ -107,10 +95,10 @@ use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Instant, Jitter};
 
+use self::association::is_place;
+pub use self::association::{Fence, HoldReason};
 use association::Association;
 use config::{Geofence, GuardConfig};
-use fence::is_place;
-pub use fence::{Fence, HoldReason};
 use follower::FenceFollower;
 use own::{Own, ReachableInterval};
 use owner::FenceOwner;

@@ -1,7 +1,7 @@
 //! Fence downstream, which this relay places.
 
 use super::association::{Association, KeepOut};
-use super::fence::{Fence, HoldReason};
+use super::association::{Fence, HoldReason};
 use super::own::Own;
 use crate::place::CrossSection;
 use crate::side::Side;

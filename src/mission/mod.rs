@@ -1,17 +1,765 @@
 //! The mission: everything the relays agree on before flight, validated once.
 //!
-//! | file | content |
-//! | --- | --- |
-//! | `config` | the parameters as plain numbers, and the error that names a rejected one |
-//! | `validated` | a mission with checked parameters, and quantities derived from them |
+//! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has checked parameters, and
+//! quantities derived from them.
 
-mod config;
+use crate::channel::Channel;
+use crate::field::{Field, InNoise};
+use crate::place::{CrossSection, Station};
+use crate::power_ratio::PowerRatio;
+use crate::root::sqrt;
+use crate::sensing::belief::{Belief, Spread};
+use crate::wire::digest::digest;
+
 #[cfg(test)]
 pub(crate) mod tests;
-mod validated;
 
-pub(crate) use config::MAX_RELAYS;
-pub use config::MissionConfig;
-pub use config::MissionError;
-pub use config::{Band, Heading, Interference, Interferer, Profile};
-pub use validated::Mission;
+/// Value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
+pub(crate) const MAX_RELAYS: u16 = 1000;
+
+/// Two f32 steps just below the distance, as a fraction of it: positions this far apart near Rx remain distinct.
+pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
+
+/// Maximum rounding error of a step between two positions, as a fraction of the distance.
+pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
+
+/// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
+///
+/// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
+/// altitude is height above the ground.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MissionConfig {
+    /// Number of relays N, 1 to [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
+    pub relays: u16,
+    /// Distance D from transmitter to receiver, m: 1 to 1e6.
+    pub distance_m: f32,
+    /// Minimum distance between two relays, m: 0 to 1e5.
+    pub min_separation_m: f32,
+    /// Transmit power of the ground transmitter, W: 1e-6 to 1e6.
+    pub tx_power_w: f32,
+    /// Altitude and power of every relay without a profile of its own.
+    pub common: Profile,
+    /// Altitudes for methods that choose altitudes, within 0.1 to 1e5; includes `common.altitude_m`.
+    pub band: Band,
+    /// Lateral range y for the joint method, within -1e5 to 1e5; includes 0.
+    pub lateral: Band,
+    /// Path loss of the three kinds of link.
+    pub channel: Channel,
+    /// Interference on the hops.
+    pub interference: Interference,
+    /// Noise power at the input of every receiver, W: 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
+    /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
+    pub noise_w: f32,
+    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
+    pub tolerance: f32,
+}
+
+impl MissionConfig {
+    /// Checks the number of relays, and that they fit into the distance.
+    pub(super) const fn room(&self) -> Result<(), MissionError> {
+        if self.relays < 1 || self.relays > MAX_RELAYS {
+            return Err(MissionError::Relays);
+        }
+        let step = self.min_separation_m + self.distance_m * ROUNDING;
+        if (self.relays - 1) as f32 * step > self.distance_m {
+            return Err(MissionError::TooManyForDistance);
+        }
+        Ok(())
+    }
+}
+
+/// Parameter of a [`MissionConfig`] that is rejected, and its range.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum MissionError {
+    /// `relays` is not within 1 to [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
+    Relays,
+    /// `distance_m` is not within 1 to 1e6.
+    Distance,
+    /// `min_separation_m` is not within 0 to 1e5.
+    Separation,
+    /// The relays with `min_separation_m` (plus a rounding of 5e-7 `distance_m`) between them need more than `distance_m`.
+    TooManyForDistance,
+    /// `tx_power_w` is not within 1e-6 to 1e6.
+    TxPower,
+    /// `common.altitude_m` is not within 0.1 to 1e5, or `common.power_w` not within 1e-6 to 1e6.
+    Common,
+    /// `band` is not in order, not within 0.1 to 1e5, or leaves out `common.altitude_m`.
+    Band,
+    /// `lateral` is not in order, not within -1e5 to 1e5, or leaves out 0.
+    Lateral,
+    /// `interferer.power_w` is not within 1e-6 to 1e9.
+    InterfererPower,
+    /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
+    InterfererPlace,
+    /// `noise_w` is not within 0 to 1, or above 1e12 times the interferer's power received at 1 m.
+    Noise,
+    /// The crate was built without its feature `field`.
+    Field,
+    /// `tolerance` is not within 1e-6 to 0.1.
+    Tolerance,
+}
+
+impl core::fmt::Display for MissionError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Relays => "relays must be within 1 to 1000",
+            Self::Distance => "distance_m must be within 1 to 1e6",
+            Self::Separation => "min_separation_m must be within 0 to 1e5",
+            Self::TooManyForDistance => {
+                "(relays - 1) x min_separation_m must not be above distance_m"
+            }
+            Self::TxPower => "tx_power_w must be within 1e-6 to 1e6",
+            Self::Common => {
+                "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6"
+            }
+            Self::Band => {
+                "band must be within 0.1 to 1e5, from least to most, with common.altitude_m in it"
+            }
+            Self::Lateral => "lateral must be within -1e5 to 1e5, from least to most, with 0 in it",
+            Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
+            Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
+            Self::Noise => {
+                "noise_w must be within 0 to 1, and at most 1e12 times what of the interferer arrives a metre from it"
+            }
+            Self::Field => "a field of interference needs the feature `field`",
+            Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
+        })
+    }
+}
+
+impl core::error::Error for MissionError {}
+
+/// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Interferer {
+    /// Transmit power, W.
+    pub power_w: f32,
+    /// Position along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
+    pub x_m: f32,
+    /// Distance from that line, m: to its right above 0, to its left below.
+    pub y_m: f32,
+}
+
+impl Interferer {
+    pub(super) const fn is_powered(&self) -> bool {
+        within(self.power_w, 1e-6, 1e9)
+    }
+
+    pub(super) const fn is_placed(&self) -> bool {
+        within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
+    }
+
+    /// Returns true if all values are within their ranges.
+    pub const fn is_valid(&self) -> bool {
+        self.is_powered() && self.is_placed()
+    }
+}
+
+/// Interference on the hops.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Interference {
+    /// Single transmitter at a known position.
+    Source(Interferer),
+    /// Interference that is known as a distribution along x only.
+    Field(Field),
+    /// Single transmitter at an unknown position. Relays spread evenly until they find it ([`crate::Settings::listen`]).
+    Unknown,
+}
+
+/// Order in which the positions of a chain are computed; it determines the leader.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Heading {
+    /// Relay 1 first (Algorithm 1), with an interferer. The SIR of a hop determines the position of its *receiver*.
+    TowardRx,
+    /// Relay N first (Algorithm 4), in a field. The interference at the receiver determines the position of the *sender*.
+    TowardTx,
+}
+
+/// Range of altitudes or of lateral offsets that a relay may choose from.
+///
+/// ```
+/// use uav_relay::Band;
+///
+/// let altitudes = Band { least_m: 20.0, most_m: 120.0 };
+/// assert_eq!(altitudes.nearest(300.0), 120.0);
+/// assert!(Band::at(20.0).is_single());
+/// ```
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Band {
+    /// Lower limit, m.
+    pub least_m: f32,
+    /// Upper limit, m: at least `least_m`.
+    pub most_m: f32,
+}
+
+impl Band {
+    /// Lateral range 0: relays stay in the vertical plane through transmitter and receiver, as in the paper.
+    pub const NONE: Self = Self::at(0.0);
+
+    /// Returns the band of a single value.
+    pub const fn at(at_m: f32) -> Self {
+        Self {
+            least_m: at_m,
+            most_m: at_m,
+        }
+    }
+
+    /// Returns the value in the band that is nearest to `at_m`.
+    pub const fn nearest(self, at_m: f32) -> f32 {
+        if at_m >= self.most_m {
+            self.most_m
+        } else if at_m > self.least_m {
+            at_m
+        } else {
+            self.least_m
+        }
+    }
+
+    /// Width of the band, m.
+    pub const fn span_m(self) -> f32 {
+        self.most_m - self.least_m
+    }
+
+    /// Returns true if the band has a single value.
+    pub const fn is_single(self) -> bool {
+        !(self.least_m < self.most_m)
+    }
+
+    /// Returns true if the limits are in order and within 0.1 to 1e5.
+    pub(super) const fn is_of_altitudes(self) -> bool {
+        within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
+    }
+
+    /// Returns true if the limits are in order, within -1e5 to 1e5, and include 0.
+    pub(super) const fn is_room_beside(self) -> bool {
+        within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
+    }
+}
+
+/// Altitude and transmit power of one relay.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Profile {
+    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
+    pub altitude_m: f32,
+    /// Transmit power, W: 1e-6 to 1e6.
+    pub power_w: f32,
+}
+
+impl Profile {
+    /// Returns true if both values are within their ranges.
+    pub const fn is_valid(&self) -> bool {
+        within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
+    }
+
+    /// Returns a relay with this profile right above the line.
+    pub const fn on_line(self) -> Station {
+        Station {
+            at: CrossSection::on_line(self.altitude_m),
+            power_w: self.power_w,
+        }
+    }
+}
+
+pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
+    value >= least && value <= most
+}
+
+/// Validated mission, with precomputed derived quantities.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Mission {
+    pub(super) config: MissionConfig,
+    pub(super) tx_gain: PowerRatio,
+    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
+    /// `Upsilon_max` / `mu_los`.
+    pub(super) relay_gain_per_w: f64,
+    /// Gain of a relay on the last hop per watt, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) /
+    /// eta. With noise, of the interference plus noise at Rx.
+    pub(super) receiver_gain_per_w: f64,
+    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m; 0 without noise and in a field.
+    pub(super) noise_at_a_metre: f32,
+}
+
+/// Maximum noise relative to the interferer's power received at 1 m: above it the interferer would be lost in f32 rounding.
+const MOST_NOISE: f64 = 1e12;
+
+impl Mission {
+    /// Maximum number of relays of a mission; addresses on the wire are 12 bits wide.
+    pub const MAX_RELAYS: u16 = MAX_RELAYS;
+
+    /// Creates a mission after checking every parameter.
+    ///
+    /// Usable in a constant, where [`Mission::new`] turns an error into a failed build.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::mission::MissionError;
+    /// use uav_relay::{Mission, MissionConfig};
+    ///
+    /// let too_near = MissionConfig { distance_m: 0.5, ..*MISSION.config() };
+    /// assert_eq!(Mission::try_new(too_near).err(), Some(MissionError::Distance));
+    /// ```
+    ///
+    /// # Errors
+    /// [`MissionError`] names the parameter that is outside its range.
+    pub const fn try_new(config: MissionConfig) -> Result<Self, MissionError> {
+        let MissionConfig {
+            relays: _,
+            distance_m,
+            min_separation_m,
+            tx_power_w,
+            common,
+            band,
+            lateral,
+            channel,
+            interference,
+            noise_w,
+            tolerance,
+        } = config;
+        if !within(distance_m, 1.0, 1e6) {
+            return Err(MissionError::Distance);
+        }
+        if !within(min_separation_m, 0.0, 1e5) {
+            return Err(MissionError::Separation);
+        }
+        if let Err(error) = config.room() {
+            return Err(error);
+        }
+        if !within(tx_power_w, 1e-6, 1e6) {
+            return Err(MissionError::TxPower);
+        }
+        if !common.is_valid() {
+            return Err(MissionError::Common);
+        }
+        if !band.is_of_altitudes() || !within(common.altitude_m, band.least_m, band.most_m) {
+            return Err(MissionError::Band);
+        }
+        if !lateral.is_room_beside() {
+            return Err(MissionError::Lateral);
+        }
+        if let Interference::Source(interferer) = &interference {
+            if !interferer.is_powered() {
+                return Err(MissionError::InterfererPower);
+            }
+            if !interferer.is_placed() {
+                return Err(MissionError::InterfererPlace);
+            }
+        }
+        if !within(tolerance, 1e-6, 0.1) {
+            return Err(MissionError::Tolerance);
+        }
+        if !within(noise_w, 0.0, 1.0) {
+            return Err(MissionError::Noise);
+        }
+        if matches!(interference, Interference::Field(_)) && !cfg!(feature = "field") {
+            return Err(MissionError::Field);
+        }
+        let eta = channel.eta();
+        let (noise, mut noise_at_a_metre) = (noise_w as f64, 0.0);
+        let (tx_gain, relay_gain_per_w, receiver_gain_per_w) = match interference {
+            Interference::Source(interferer) => {
+                let p_msi = interferer.power_w as f64;
+                let beyond = interferer.x_m as f64 - distance_m as f64;
+                let aside = interferer.y_m as f64;
+                let squared = beyond * beyond + aside * aside;
+                noise_at_a_metre = noise * eta / p_msi;
+                if noise_at_a_metre > MOST_NOISE {
+                    return Err(MissionError::Noise);
+                }
+                // (I + N) / I at Rx.
+                let louder = 1.0 + noise * channel.mu_nlos() * squared / p_msi;
+                (
+                    tx_power_w as f64 / p_msi,
+                    eta / channel.mu_los() / p_msi,
+                    channel.mu_nlos() / eta * squared / p_msi / louder,
+                )
+            }
+            Interference::Unknown => even_gains(distance_m, common.power_w),
+            Interference::Field(field) => {
+                let heard = field.in_noise(noise_w);
+                let most = heard.largest() as f64;
+                (
+                    tx_power_w as f64 * most / eta,
+                    most / channel.mu_los(),
+                    heard.upsilon(distance_m) as f64 / eta,
+                )
+            }
+        };
+        Ok(Self {
+            config,
+            tx_gain: PowerRatio::new(tx_gain),
+            relay_gain_per_w,
+            receiver_gain_per_w,
+            #[expect(clippy::cast_possible_truncation, reason = "it is given as an f32")]
+            noise_at_a_metre: noise_at_a_metre as f32,
+        })
+    }
+
+    /// Creates a mission that is a constant of the firmware; otherwise as [`Mission::try_new`].
+    ///
+    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant; [`Channel::new`](crate::Channel::new), which
+    /// takes the losses as factors, 10^(dB / 10), can:
+    ///
+    /// ```
+    /// use uav_relay::channel::AirGround;
+    /// use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+    ///
+    /// // 0.1 dB and 21 dB.
+    /// const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
+    ///     Ok(channel) => channel,
+    ///     Err(_) => panic!("the channel is out of range"),
+    /// };
+    /// const MISSION: Mission = Mission::new(MissionConfig {
+    ///     relays: 5,
+    ///     distance_m: 1_000.0,
+    ///     min_separation_m: 4.0,
+    ///     tx_power_w: 80.0,
+    ///     common: Profile { altitude_m: 20.0, power_w: 1.0 },
+    ///     band: Band::at(20.0),
+    ///     lateral: Band::NONE,
+    ///     channel: CHANNEL,
+    ///     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+    ///     noise_w: 0.0,
+    ///     tolerance: 1e-4,
+    /// });
+    /// assert_eq!(MISSION.relays(), 5);
+    /// ```
+    ///
+    /// A value out of range fails the build:
+    ///
+    /// ```compile_fail,E0080
+    /// # use uav_relay::channel::AirGround;
+    /// # use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+    /// # const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
+    /// #     Ok(channel) => channel,
+    /// #     Err(_) => panic!("the channel is out of range"),
+    /// # };
+    /// const MISSION: Mission = Mission::new(MissionConfig {
+    ///     relays: 0,
+    ///     // and the rest as above
+    /// #   distance_m: 1_000.0,
+    /// #   min_separation_m: 4.0,
+    /// #   tx_power_w: 80.0,
+    /// #   common: Profile { altitude_m: 20.0, power_w: 1.0 },
+    /// #   band: Band::at(20.0),
+    /// #   lateral: Band::NONE,
+    /// #   channel: CHANNEL,
+    /// #   interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
+    /// #   noise_w: 0.0,
+    /// #   tolerance: 1e-4,
+    /// });
+    /// # assert_eq!(MISSION.relays(), 0);
+    /// ```
+    ///
+    /// # Panics
+    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at run time
+    /// use [`Mission::try_new`].
+    #[expect(
+        clippy::panic,
+        reason = "in a constant this fails the build, as documented"
+    )]
+    pub const fn new(config: MissionConfig) -> Self {
+        match Self::try_new(config) {
+            Ok(mission) => mission,
+            Err(MissionError::Relays) => panic!("relays must be within 1 to 1000"),
+            Err(MissionError::Distance) => panic!("distance_m must be within 1 to 1e6"),
+            Err(MissionError::TooManyForDistance) => {
+                panic!("(relays - 1) x min_separation_m is above distance_m")
+            }
+            Err(MissionError::TxPower) => panic!("tx_power_w must be within 1e-6 to 1e6"),
+            Err(MissionError::Common) => {
+                panic!("common.altitude_m or common.power_w is out of range")
+            }
+            Err(_) => panic!("a mission parameter is out of range"),
+        }
+    }
+
+    /// Returns the parameters.
+    pub const fn config(&self) -> &MissionConfig {
+        &self.config
+    }
+
+    /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
+    ///
+    /// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
+    pub fn digest(&self) -> u16 {
+        digest(self)
+    }
+
+    /// Number of relays N.
+    pub const fn relays(&self) -> u16 {
+        self.config.relays
+    }
+
+    /// Interference on the hops.
+    pub const fn interference(&self) -> &Interference {
+        &self.config.interference
+    }
+
+    /// Returns the interferer; `None` in a field. An unknown one is replaced by one far away, with equal interference everywhere.
+    pub const fn interferer(&self) -> Option<&Interferer> {
+        match &self.config.interference {
+            Interference::Source(interferer) => Some(interferer),
+            Interference::Unknown => Some(&FAR),
+            Interference::Field(_) => None,
+        }
+    }
+
+    /// Returns the field, if there is one.
+    pub const fn field(&self) -> Option<&Field> {
+        match &self.config.interference {
+            Interference::Field(field) if cfg!(feature = "field") => Some(field),
+            _ => None,
+        }
+    }
+
+    /// Returns the field with receiver noise, if there is one.
+    pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
+        match self.field() {
+            Some(field) => Some(field.in_noise(self.config.noise_w)),
+            None => None,
+        }
+    }
+
+    /// nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m.
+    ///
+    /// 0 without noise and in a field, whose Upsilon includes the noise.
+    pub const fn noise_at_a_metre(&self) -> f32 {
+        self.noise_at_a_metre
+    }
+
+    /// Order in which the positions are computed.
+    pub const fn heading(&self) -> Heading {
+        match self.field() {
+            None => Heading::TowardRx,
+            Some(_) => Heading::TowardTx,
+        }
+    }
+
+    /// Relay that computes its position first and starts the passes: 1, or N in a field.
+    pub const fn leader(&self) -> u16 {
+        match self.heading() {
+            Heading::TowardRx => 1,
+            Heading::TowardTx => self.config.relays,
+        }
+    }
+
+    /// Returns the relay after `index` in a pass; `None` after the last.
+    pub const fn after(&self, index: u16) -> Option<u16> {
+        match self.heading() {
+            Heading::TowardRx if index < self.config.relays => Some(index + 1),
+            Heading::TowardTx if index > 1 => Some(index - 1),
+            _ => None,
+        }
+    }
+
+    /// Returns the same mission with another number of relays.
+    ///
+    /// # Errors
+    /// [`MissionError::Relays`] or [`MissionError::TooManyForDistance`].
+    pub const fn with_relays(&self, relays: u16) -> Result<Self, MissionError> {
+        let config = MissionConfig {
+            relays,
+            ..self.config
+        };
+        match config.room() {
+            Ok(()) => Ok(Self { config, ..*self }),
+            Err(error) => Err(error),
+        }
+    }
+
+    pub(crate) const fn unseparated(&self) -> Self {
+        let config = MissionConfig {
+            min_separation_m: 0.0,
+            ..self.config
+        };
+        Self { config, ..*self }
+    }
+}
+
+impl Mission {
+    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR: `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
+    /// eta.
+    #[doc(hidden)]
+    pub const fn tx_gain(&self) -> PowerRatio {
+        self.tx_gain
+    }
+
+    /// Gain of a hop from a relay of `power_w` watts: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` /
+    /// `mu_los`.
+    #[doc(hidden)]
+    pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
+        PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
+    }
+
+    /// K of the last hop, m^2: the SIR at the receiver is K / squared distance to the relay of `power_w` watts.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a float that fits by the ranges of the mission"
+    )]
+    #[inline(never)] // called from many places
+    pub const fn receiver_gain(&self, power_w: f32) -> f32 {
+        (power_w as f64 * self.receiver_gain_per_w) as f32
+    }
+
+    /// Last hop's K over the first hop's gain, m^2: (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2).
+    pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
+        f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
+    }
+
+    /// Received power of Tx's signal at a relay with the squared distance `squared_m2`, W.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a float that fits by the ranges of the mission"
+    )]
+    pub(crate) fn first_hop_power_w(&self, squared_m2: f32) -> f32 {
+        let loss = self.config.channel.eta() * f64::from(squared_m2);
+        (f64::from(self.config.tx_power_w) / loss) as f32
+    }
+}
+
+impl Mission {
+    /// Returns the minimum step in x that keeps the separation of neighbours `across_squared` m^2 apart across the line.
+    pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
+        let apart = self.config.min_separation_m;
+        if !(across_squared > 0.0) {
+            return apart;
+        }
+        sqrt(apart * apart - across_squared)
+    }
+
+    /// Returns [`Mission::least_step`] plus a margin for rounding.
+    pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
+        self.step_of(self.least_step(across_squared))
+    }
+
+    /// Returns the last x in pass order that leaves the relays after `index` their minimum separation, m. `across_squared` is the
+    /// maximum squared distance across the line between two neighbours among them, m^2; it reduces the steps in x.
+    pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
+        self.end_after(self.behind(index), self.least_step(across_squared))
+    }
+
+    /// Returns the last x in pass order if the relays after `index` need no separation, m.
+    pub(crate) fn end_freely(&self, index: u16) -> f32 {
+        self.end_after(self.behind(index), 0.0)
+    }
+
+    /// Number of relays after `index` in pass order.
+    fn behind(&self, index: u16) -> f32 {
+        f32::from(match self.heading() {
+            Heading::TowardRx => self.config.relays.saturating_sub(index),
+            Heading::TowardTx => index.saturating_sub(1),
+        })
+    }
+
+    /// Returns the largest x of relay `index` that leaves the relays between it and Rx their separation, m.
+    pub(crate) fn latest(&self, index: u16) -> f32 {
+        self.latest_at(index, self.config.min_separation_m)
+    }
+
+    /// Returns the largest x of relay `index` if those relays need no separation, m.
+    pub(crate) fn latest_freely(&self, index: u16) -> f32 {
+        self.latest_at(index, 0.0)
+    }
+
+    fn latest_at(&self, index: u16, least: f32) -> f32 {
+        let after = f32::from(self.config.relays.saturating_sub(index));
+        self.config.distance_m - after * self.step_of(least)
+    }
+
+    /// Returns the minimum step of two relays `least` apart, plus a margin for rounding, m.
+    fn step_of(&self, least: f32) -> f32 {
+        let distance_m = self.config.distance_m;
+        if least > 0.0 {
+            least + distance_m * ROUNDING
+        } else {
+            distance_m * FINEST_STEP
+        }
+    }
+
+    fn end_after(&self, behind: f32, least: f32) -> f32 {
+        let (distance_m, step) = (self.config.distance_m, self.step_of(least));
+        match self.heading() {
+            Heading::TowardRx => (distance_m - behind * step).max(0.0),
+            Heading::TowardTx => (behind * step).min(distance_m),
+        }
+    }
+}
+
+/// Gain factor that makes a hop half as long as the others.
+const HALF_AS_LONG: f64 = 0.25;
+
+impl Mission {
+    /// Returns the interferer if it is known.
+    pub const fn known_source(&self) -> Option<Interferer> {
+        match self.config.interference {
+            Interference::Source(interferer) => Some(interferer),
+            _ => None,
+        }
+    }
+
+    /// Returns the mission with the interference of `belief`, or with `own` if that refers to the mission.
+    ///
+    /// # Errors
+    /// [`MissionError`] if the estimated interference is out of range.
+    pub(crate) fn believing(
+        &self,
+        own: Interference,
+        belief: &Belief,
+    ) -> Result<Self, MissionError> {
+        let (interference, spread, receiver_w) = match *belief {
+            Belief::Mission => (own, Spread::Even, 0.0),
+            Belief::Unknown(spread) => (Interference::Unknown, spread, 0.0),
+            Belief::Source { source, receiver_w } => {
+                (Interference::Source(source), Spread::Even, receiver_w)
+            }
+        };
+        let config = MissionConfig {
+            interference,
+            ..self.config
+        };
+        let mut mission = Self::try_new(config)?;
+        if receiver_w > 0.0 {
+            let eta = config.channel.eta();
+            let heard = f64::from(receiver_w) + f64::from(config.noise_w);
+            mission.receiver_gain_per_w = 1.0 / (eta * heard);
+        }
+        match spread {
+            Spread::Even => {}
+            Spread::TowardTx => {
+                mission.tx_gain = PowerRatio::new(mission.tx_gain.wide() * HALF_AS_LONG);
+            }
+            Spread::TowardRx => mission.receiver_gain_per_w *= HALF_AS_LONG,
+        }
+        Ok(mission)
+    }
+}
+
+/// Substitute for an unknown interferer, so far away that (X - x)^2 + Y^2 is constant to 1e-7.
+pub(super) const FAR: Interferer = Interferer {
+    power_w: 1.0,
+    x_m: 0.0,
+    y_m: 1e7,
+};
+
+const FAR_AWAY: f64 = 1e-14;
+
+/// Gains for an unknown interferer with relays of `power_w`: SIR = (D / d)^2 on every hop, so equal hops are best.
+pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
+    let squared = distance_m as f64 * distance_m as f64;
+    let power_w = power_w as f64;
+    (
+        squared * FAR_AWAY,
+        squared * FAR_AWAY / power_w,
+        squared / power_w,
+    )
+}

@@ -1,21 +1,13 @@
-//! Shared state that every layer receives, and the effects of a layer on the others.
+//! Shared state that every layer receives, the effects of a layer on the others, and durations that several layers share.
 
-use super::circulation::Path;
-use super::timing::{longest_lease, tenths};
-use super::view::electorate::Held;
-#[cfg(feature = "upload")]
-use crate::geodetic::LineError;
-use crate::geodetic::Sites;
-#[cfg(feature = "upload")]
-use crate::guard::config::Geofence;
-#[cfg(feature = "upload")]
-use crate::mission::MissionConfig;
 use crate::mission::{Band, Heading, Interference, Mission};
+use crate::node::circulation::Path;
+use crate::node::view::electorate::Held;
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::digest::{MissionId, between, digest};
+use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
@@ -30,17 +22,8 @@ pub(crate) struct Member {
     pub(crate) all: u16,
     /// Digest of the mission as loaded.
     pub(crate) digest: u16,
-    /// Distance of the mission as loaded, m.
-    #[cfg(feature = "upload")]
-    pub(crate) loaded_m: f32,
-    /// Altitudes of the mission as loaded, m.
-    #[cfg(feature = "upload")]
-    loaded_band: Band,
     /// Identifier of the active mission.
     pub(crate) active: MissionId,
-    /// Sites of the active mission if it has its own; positions are then along the line between them.
-    #[cfg(feature = "upload")]
-    sites: Option<Sites>,
     /// Last accepted view.
     pub(crate) view: ViewId,
     /// Index in the view, from 1 next to Tx.
@@ -55,89 +38,11 @@ impl Member {
             node,
             all: mission.relays(),
             digest,
-            #[cfg(feature = "upload")]
-            loaded_m: mission.config().distance_m,
-            #[cfg(feature = "upload")]
-            loaded_band: altitudes_of(mission.config()),
             active: MissionId { version: 0, digest },
-            #[cfg(feature = "upload")]
-            sites: None,
             view: ViewId::LOADED,
             index: node,
             interference: *mission.interference(),
             mission,
-        }
-    }
-
-    /// Returns the sites of the active mission, if it has its own.
-    #[cfg(feature = "upload")]
-    pub(crate) const fn sites(&self) -> Option<Sites> {
-        self.sites
-    }
-
-    /// Returns `None`: without uploads no mission has sites of its own.
-    #[cfg(not(feature = "upload"))]
-    #[expect(clippy::unused_self, reason = "as with uploads")]
-    pub(crate) const fn sites(&self) -> Option<Sites> {
-        None
-    }
-
-    /// Sets the sites of the active mission; returns true if they differ, so that positions are void.
-    #[cfg(feature = "upload")]
-    pub(crate) fn fly_between(&mut self, sites: Option<Sites>) -> bool {
-        core::mem::replace(&mut self.sites, sites) != sites
-    }
-
-    /// Returns the digest of the line of this relay's positions.
-    pub(crate) fn line(&self) -> u16 {
-        between(self.digest, self.sites())
-    }
-
-    /// Returns the configured geofence, if any; it grows with the line of a mission with its own sites.
-    #[cfg(feature = "upload")]
-    pub(crate) fn geofence(&self) -> Option<Geofence> {
-        let mut fence = self.settings.guard?.fence;
-        if self.sites.is_some() {
-            let longer_m = self.mission.config().distance_m - self.loaded_m;
-            fence.most_x_m = (fence.most_x_m + longer_m).max(fence.least_x_m);
-        }
-        Some(fence)
-    }
-
-    /// Checks a mission with `config` against the configured geofence; the error names the limit exceeded.
-    ///
-    /// The length of a mission with sites of its own (`sited`) is not limited. All relays must decide alike, so an altitude limit
-    /// that was extended to this relay's own altitude is replaced by that of the loaded mission.
-    #[cfg(feature = "upload")]
-    pub(crate) fn encloses(&self, config: &MissionConfig, sited: bool) -> Result<(), LineError> {
-        let Some(guard) = self.settings.guard else {
-            return Ok(());
-        };
-        let fence = guard.fence;
-        let own_m = self.settings.profile.map(|own| own.altitude_m);
-        let edge = |edge_m: f32, loaded_m: f32| match own_m {
-            Some(own_m) if own_m.to_bits() == edge_m.to_bits() => loaded_m,
-            _ => edge_m,
-        };
-        let altitudes_m = Band {
-            least_m: edge(fence.least_altitude_m, self.loaded_band.least_m),
-            most_m: edge(fence.most_altitude_m, self.loaded_band.most_m),
-        };
-        let is_within = |inner: Band, outer: Band| {
-            inner.least_m >= outer.least_m && inner.most_m <= outer.most_m
-        };
-        let sides_m = Band {
-            least_m: fence.least_y_m,
-            most_m: fence.most_y_m,
-        };
-        if !is_within(altitudes_of(config), altitudes_m) {
-            Err(LineError::Altitude)
-        } else if !is_within(config.lateral, sides_m) {
-            Err(LineError::Lateral)
-        } else if !sited && config.distance_m > fence.most_x_m.max(self.loaded_m) {
-            Err(LineError::Length)
-        } else {
-            Ok(())
         }
     }
 
@@ -153,16 +58,6 @@ impl Member {
     /// Returns the digest of passes in the accepted view.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
-    }
-}
-
-/// Returns the altitudes of a mission, m: its band, extended to the relays' common altitude.
-#[cfg(feature = "upload")]
-fn altitudes_of(config: &MissionConfig) -> Band {
-    let common_m = config.common.altitude_m;
-    Band {
-        least_m: config.band.least_m.min(common_m),
-        most_m: config.band.most_m.max(common_m),
     }
 }
 
@@ -264,34 +159,59 @@ impl<'a> Context<'a> {
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
 )]
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Effects {
-    /// A stale message was ignored.
-    pub(crate) stale: bool,
-    /// A duplicate was received.
-    pub(crate) repeated: bool,
+    /// Reason why the received message had no effect.
+    pub(crate) ignored: Option<Ignored>,
     /// A message is retransmitted.
     pub(crate) resent: bool,
     /// A pass or a proposal starts at this relay.
     pub(crate) began: bool,
-    /// The chain has agreed on a target.
-    pub(crate) converged: bool,
-    /// The leader has found no feasible target.
-    pub(crate) infeasible: bool,
     /// A new view is needed.
     pub(crate) view_needed: bool,
-    /// The lease has expired.
-    pub(crate) lapsed: bool,
-    /// Time at or after which the next relay, or the previous one, was alive.
-    pub(crate) heard_onward: Option<Instant>,
-    pub(crate) heard_back: Option<Instant>,
-    /// A proposal is outstanding, and no pass continues before its decision.
-    pub(crate) view_proposed: bool,
-    /// Origin of that proposal.
+    /// Neighbour that was alive at this time or later, by its reply.
+    pub(crate) alive: Option<(Peer, Instant)>,
+    /// Origin of the proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,
+    /// That proposal is outstanding, and no pass continues before its decision.
+    pub(crate) view_proposed: bool,
+    pub(crate) news: Option<News>,
+    /// Changes of the interference estimate and of the faulty receivers.
+    pub(crate) sensed: Sensed,
+}
+
+/// Reason why a message had no effect.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Ignored {
+    Stale,
+    Duplicate,
+}
+
+/// Neighbour on the path of passes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Peer {
+    Next,
+    Previous,
+}
+
+/// Result of a layer, which the others or the firmware need.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum News {
+    /// The chain has agreed on a target.
+    Converged,
+    /// The leader has found no feasible target.
+    Infeasible,
+    /// The lease has expired.
+    Lapsed,
     /// A request for a view is due to the neighbour toward the leader.
-    pub(crate) ask: bool,
-    pub(crate) decided: Option<Decided>,
+    Ask,
+    /// A proposal is decided.
+    Decided(Decided),
+}
+
+/// Results of sensing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Sensed {
     /// The interference estimate has changed.
     pub(crate) believes: bool,
     /// The measurements do not fit a single source.
@@ -320,39 +240,78 @@ pub(crate) enum Proposer {
 
 impl Effects {
     pub(crate) const NONE: Self = Self {
-        stale: false,
-        repeated: false,
+        ignored: None,
         resent: false,
         began: false,
-        converged: false,
-        infeasible: false,
         view_needed: false,
-        lapsed: false,
-        heard_onward: None,
-        heard_back: None,
-        view_proposed: false,
+        alive: None,
         proposed_by: None,
-        ask: false,
-        decided: None,
-        believes: false,
-        unclear: false,
-        off: None,
+        view_proposed: false,
+        news: None,
+        sensed: Sensed {
+            believes: false,
+            unclear: false,
+            off: None,
+        },
     };
 
     pub(crate) const STALE: Self = Self {
-        stale: true,
+        ignored: Some(Ignored::Stale),
+        ..Self::NONE
+    };
+
+    pub(crate) const DUPLICATE: Self = Self {
+        ignored: Some(Ignored::Duplicate),
         ..Self::NONE
     };
 
     /// Effects of a message that cannot be joined: a new view is needed.
     pub(crate) const FOREIGN: Self = Self {
-        stale: true,
         view_needed: true,
-        ..Self::NONE
+        ..Self::STALE
     };
 
-    pub(crate) const REPEATED: Self = Self {
-        repeated: true,
-        ..Self::NONE
-    };
+    pub(crate) const fn of(news: News) -> Self {
+        Self {
+            news: Some(news),
+            ..Self::NONE
+        }
+    }
+
+    /// Adds the origin of a proposal.
+    pub(crate) const fn by(self, proposer: Proposer) -> Self {
+        Self {
+            proposed_by: Some(proposer),
+            ..self
+        }
+    }
+}
+
+/// Pause between two portions of a computation, so that the caller's loop can run.
+pub(crate) const PAUSE: Duration = Duration::from_micros(250);
+
+/// Maximum duration of a lease, as a multiple of `dead_after`.
+const LONGEST: u32 = 8;
+
+/// Returns the maximum duration of a lease.
+pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
+    settings.dead_after.times(LONGEST)
+}
+
+/// Returns the maximum round trip of the first pass through `all` relays with half of the frames lost.
+pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
+    settings.hop_time.times(24 * u32::from(all))
+}
+
+/// Converts a duration to tenths of a second, rounded up.
+#[inline(never)] // called from several places
+pub(crate) fn tenths(span: Duration) -> u16 {
+    // Uses 32-bit words: the 64-bit division, which nothing else in a relay needs, takes 900 bytes of flash.
+    let micros = u32::try_from(span.as_micros().div_ceil(32)).unwrap_or(u32::MAX);
+    u16::try_from(micros.div_ceil(3_125)).unwrap_or(u16::MAX)
+}
+
+/// Returns the earlier of two times; `None` is later than any.
+pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
+    [a, b].into_iter().flatten().min()
 }

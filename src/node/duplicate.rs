@@ -322,7 +322,6 @@ impl DuplicateIndex {
     }
 
     /// Returns the claim number with which all sessions must restart, if that is due.
-    #[cfg(feature = "auth")]
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
@@ -370,7 +369,7 @@ impl DuplicateIndex {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        super::timing::earliest(self.passive_until, self.next_claim)
+        super::context::earliest(self.passive_until, self.next_claim)
     }
 }
 
@@ -466,7 +465,6 @@ mod tests {
                         assert_eq!(duplicate.is_passive(), becomes);
                         let claimed = if raises { own | RAISED } else { own };
                         assert_eq!(duplicate.number(), claimed);
-                        #[cfg(feature = "auth")]
                         assert_eq!(duplicate.poll_sessions(), raises.then_some(claimed));
                         assert!(duplicate.poll_claim(), "the other one has to know");
                     }

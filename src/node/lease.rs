@@ -29,8 +29,8 @@
 //! for at most a quarter of `dead_after`.
 
 use super::circulation::{Circulation, Reply};
-use super::context::{Context, Effects};
-use super::timing::{PAUSE, earliest, longest_lease, tenths};
+use super::context::{Context, Effects, News, Peer};
+use super::context::{PAUSE, earliest, longest_lease, tenths};
 use super::view::electorate::Held;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -168,7 +168,6 @@ impl Lease {
     }
 
     /// Returns true once all relays of the view are known to be in it.
-    #[cfg(feature = "upload")]
     pub(crate) const fn is_whole(&self) -> bool {
         self.is_whole
     }
@@ -197,11 +196,12 @@ impl Lease {
                 0 => {
                     let path = context.path_to_leader();
                     self.circulation.on_duplicate(context.now, path);
-                    return Effects::REPEATED;
+                    return Effects::DUPLICATE;
                 }
                 1 if !self.circulation.is_outstanding() => {
                     self.grant(context, current, pulse.lease);
-                    effects.heard_back = self.circulation.completed_at();
+                    let reported_at = self.circulation.completed_at();
+                    effects.alive = reported_at.map(|at| (Peer::Previous, at));
                 }
                 // The leader has restarted, or this relay has missed renewals.
                 2..=0x7FFF => {}
@@ -303,7 +303,7 @@ impl Lease {
             self.circulation.on_in_progress(context.now, path);
         }
         Effects {
-            heard_onward: forwarded_at,
+            alive: forwarded_at.map(|at| (Peer::Next, at)),
             ..Effects::NONE
         }
     }
@@ -325,8 +325,8 @@ impl Lease {
         }
         Effects {
             resent,
-            lapsed,
             view_needed: lapsed,
+            news: lapsed.then_some(News::Lapsed),
             ..Effects::NONE
         }
     }

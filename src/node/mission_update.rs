@@ -28,29 +28,18 @@
 //! | decision received, view granted | fly its mission; `Event::Adopted` |
 
 use super::context::Member;
-#[cfg(feature = "upload")]
-use super::timing::earliest;
-#[cfg(feature = "upload")]
+use super::context::earliest;
 use crate::geodetic::{LineError, Sites};
-use crate::mission::Mission;
-#[cfg(feature = "upload")]
-use crate::settings::Settings;
-#[cfg(feature = "upload")]
+use crate::guard::config::Geofence;
+use crate::mission::{Band, Mission, MissionConfig};
 use crate::side::Side;
-use crate::time::Instant;
-#[cfg(feature = "upload")]
-use crate::time::Jitter;
-use crate::wire::digest::MissionId;
-#[cfg(feature = "upload")]
-use crate::wire::upload::{Upload, UploadError, check_line};
-
-/// True with the feature `upload`; without it uploads are not accepted.
-const UPLOAD: bool = cfg!(feature = "upload");
+use crate::time::{Instant, Jitter};
+use crate::wire::digest::{MissionId, between};
+use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
 /// Number of this relay's hellos, for the offers that answer them, with its first and last use.
 ///
 /// The number 0 means none.
-#[cfg(feature = "upload")]
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -58,38 +47,36 @@ struct Asked {
     last: Instant,
 }
 
-#[cfg(feature = "upload")]
-impl Asked {
-    /// Returns true if `number` equals this number, and a hello used it within the last two `dead_after`.
-    fn is(&self, number: u16, now: Instant, settings: &Settings) -> bool {
-        number != 0
-            && number == self.number
-            && now.since(self.last).as_micros() <= settings.dead_after.times(2).as_micros()
-    }
-}
-
-/// State of the offers to the neighbour on one side.
-#[cfg(feature = "upload")]
+/// State of the offers to the neighbour on one side, and of the ground station there.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Time of the neighbour's last hello, which an offer can answer.
+    /// Number of the neighbour's last hello, which an offer answers, and its time; 0 before any.
+    nonce: u16,
     heard: Option<Instant>,
+    /// True if an offer is pending.
+    is_due: bool,
     /// Time of the next repetition, and number of offers so far.
     at: Option<Instant>,
     tries: u8,
+    /// True if a hello to the ground station is pending.
+    reports: bool,
+    /// Number of the ground station's hello that requests the stored upload; 0 for none.
+    ground_asks: u16,
 }
 
-#[cfg(feature = "upload")]
 impl Offering {
     const NONE: Self = Self {
+        nonce: 0,
         heard: None,
+        is_due: false,
         at: None,
         tries: 0,
+        reports: false,
+        ground_asks: 0,
     };
 }
 
 /// Result of an offered mission.
-#[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
     /// Stored.
@@ -101,11 +88,8 @@ pub(crate) enum Offered {
 }
 
 /// Hop times until the first repetition, offers until the time doubles, and number of repetitions.
-#[cfg(feature = "upload")]
 const OFFER_HOPS: u32 = 4;
-#[cfg(feature = "upload")]
 const OFFERS_AT_A_PACE: u8 = 4;
-#[cfg(feature = "upload")]
 const OFFERS: u8 = 16;
 
 /// Missions known to one relay, and its offers to the neighbours.
@@ -113,19 +97,26 @@ const OFFERS: u8 = 16;
 pub(crate) struct MissionUpdate {
     /// Newest stored mission.
     latest: MissionId,
-    /// Upload of that mission; `None` for the one loaded before flight.
-    #[cfg(feature = "upload")]
+    /// State of the uploads; without the feature `upload` there is none.
+    uploads: [Uploads; UPLOAD as usize],
+}
+
+/// State that only relays with the feature `upload` have.
+#[derive(Clone, Copy, Debug)]
+struct Uploads {
+    /// Upload of the newest stored mission; `None` for the one loaded before flight.
     upload: Option<Upload>,
+    /// Sites of the active mission if it has its own; positions are then along the line between them.
+    sites: Option<Sites>,
+    /// Distance and altitudes of the mission as loaded, m.
+    loaded_m: f32,
+    loaded_band: Band,
     /// Last mission refused by this relay or by one beyond a neighbour.
-    #[cfg(feature = "upload")]
     refused: Option<MissionId>,
     /// Current number of this relay's hellos, and the previous one.
-    #[cfg(feature = "upload")]
     asked: [Asked; 2],
     /// Offers toward Tx and toward Rx.
-    #[cfg(feature = "upload")]
     offering: [Offering; 2],
-    #[cfg(feature = "upload")]
     jitter: Jitter,
 }
 
@@ -135,28 +126,31 @@ pub(crate) const fn takes_uploads(member: &Member) -> bool {
 }
 
 impl MissionUpdate {
-    pub(crate) const fn new(loaded: MissionId, seed: u32, now: Instant) -> Self {
-        #[cfg(not(feature = "upload"))]
-        let _ = (seed, now);
-        #[cfg(feature = "upload")]
+    pub(crate) fn new(member: &Member, seed: u32, now: Instant) -> Self {
         let asked = Asked {
             number: Jitter::new(seed).number(),
             first: now,
             last: now,
         };
-        Self {
-            latest: loaded,
-            #[cfg(feature = "upload")]
+        let loaded = member.mission.config();
+        let uploads = Uploads {
             upload: None,
-            #[cfg(feature = "upload")]
+            sites: None,
+            loaded_m: loaded.distance_m,
+            loaded_band: altitudes_of(loaded),
             refused: None,
-            #[cfg(feature = "upload")]
             asked: [asked, Asked { number: 0, ..asked }],
-            #[cfg(feature = "upload")]
             offering: [Offering::NONE; 2],
-            #[cfg(feature = "upload")]
             jitter: Jitter::new(seed),
+        };
+        Self {
+            latest: member.active,
+            uploads: [uploads; UPLOAD as usize],
         }
+    }
+
+    const fn uploads(&self) -> Option<&Uploads> {
+        self.uploads.first()
     }
 
     pub(crate) const fn latest(&self) -> MissionId {
@@ -168,25 +162,18 @@ impl MissionUpdate {
         if id == member.active {
             return Some(member.mission);
         }
-        if id != self.latest {
-            return None;
-        }
-        #[cfg(feature = "upload")]
-        let held = self
-            .upload
-            .and_then(|upload| Mission::try_new(*upload.config()).ok());
-        #[cfg(not(feature = "upload"))]
-        let held = None;
-        held
+        let upload = self.upload().filter(|_| id == self.latest)?;
+        Mission::try_new(*upload.config()).ok()
     }
-}
 
-#[cfg(feature = "upload")]
-impl MissionUpdate {
-    /// Returns the number for a hello sent now.
-    pub(crate) fn ask(&mut self, now: Instant, settings: &Settings) -> u16 {
-        let [current, before] = &mut self.asked;
-        if now.since(current.first) >= settings.dead_after {
+    /// Returns the number for a hello sent now; 0 if uploads are not accepted.
+    pub(crate) fn ask(&mut self, now: Instant, member: &Member) -> u16 {
+        let uploads = self.uploads.first_mut();
+        let Some(uploads) = uploads.filter(|_| takes_uploads(member)) else {
+            return 0;
+        };
+        let [current, before] = &mut uploads.asked;
+        if now.since(current.first) >= member.settings.dead_after {
             *before = *current;
             current.number = match current.number.wrapping_add(1) {
                 0 => 1,
@@ -198,77 +185,126 @@ impl MissionUpdate {
         current.number
     }
 
-    pub(crate) fn asked(&self, answer: u16, now: Instant, settings: &Settings) -> bool {
-        self.asked
-            .iter()
-            .any(|asked| asked.is(answer, now, settings))
+    /// Returns true if `answer` is the number of a hello that was sent within the last two `dead_after`.
+    pub(crate) fn asked(&self, answer: u16, now: Instant, member: &Member) -> bool {
+        let span = member.settings.dead_after.times(2);
+        let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
+        answer != 0 && self.uploads().is_some_and(|it| it.asked.iter().any(is_it))
     }
 
-    const fn offering(&mut self, side: Side) -> &mut Offering {
-        let [upstream, downstream] = &mut self.offering;
-        match side {
+    fn offering(&mut self, side: Side) -> Option<&mut Offering> {
+        let [upstream, downstream] = &mut self.uploads.first_mut()?.offering;
+        Some(match side {
             Side::Upstream => upstream,
             Side::Downstream => downstream,
+        })
+    }
+
+    /// Records the number of a hello of the neighbour at `side`, which an offer can answer.
+    pub(crate) fn may_answer(&mut self, side: Side, nonce: u16, now: Instant) {
+        if let Some(offering) = self.offering(side) {
+            offering.nonce = nonce;
+            offering.heard = Some(now);
         }
     }
 
-    /// Records a hello of the neighbour at `side`, which an offer can answer.
-    pub(crate) const fn may_answer(&mut self, side: Side, now: Instant) {
-        self.offering(side).heard = Some(now);
-    }
-
-    /// Returns true if the last hello at `side` is at most half of `dead_after` old: its number is valid.
-    pub(crate) fn has_asked(&mut self, side: Side, now: Instant, settings: &Settings) -> bool {
-        let heard = self.offering(side).heard;
-        heard.is_some_and(|heard| now.since(heard).times(2) <= settings.dead_after)
+    /// Schedules an offer at `side`.
+    pub(crate) fn offer(&mut self, side: Side) {
+        if let Some(offering) = self.offering(side) {
+            offering.is_due = true;
+        }
     }
 
     /// Restarts the repetitions at `side`: there is a new mission or a new neighbour.
-    pub(crate) const fn begin_offers(&mut self, side: Side) {
-        self.offering(side).tries = 0;
+    pub(crate) fn begin_offers(&mut self, side: Side) {
+        if let Some(offering) = self.offering(side) {
+            offering.tries = 0;
+        }
     }
 
-    /// Records an offer, or the request for a hello, and starts the timer of the next one.
-    pub(crate) fn offered(&mut self, side: Side, now: Instant, settings: &Settings) {
-        let tries = self.offering(side).tries;
-        let hops = OFFER_HOPS << (tries / OFFERS_AT_A_PACE).min(OFFERS);
-        let wait = settings.hop_time.times(hops).min(settings.probe_after);
-        let at = now + self.jitter.spread(wait);
-        *self.offering(side) = Offering {
-            at: (tries < OFFERS).then_some(at),
-            tries: tries.saturating_add(1),
-            ..*self.offering(side)
-        };
-    }
-
-    pub(crate) const fn stop_offers(&mut self, side: Side) {
-        self.offering(side).at = None;
-    }
-
-    /// Returns true once when the timer of the next offer at `side` has expired.
-    pub(crate) fn offers_again(&mut self, side: Side, now: Instant) -> bool {
-        let offering = self.offering(side);
-        let due = offering.at.is_some_and(|at| at <= now);
-        if due {
+    pub(crate) fn stop_offers(&mut self, side: Side) {
+        if let Some(offering) = self.offering(side) {
             offering.at = None;
         }
-        due
+    }
+
+    /// Returns the pending offer to the neighbour `to` at `side` that `holds` an older or unknown mission, and marks it as sent. The number is
+    /// that of the hello that it answers; `None` if a hello has to be requested first, because the last one is older than half of
+    /// `dead_after`.
+    pub(crate) fn take_offer(
+        &mut self,
+        (side, to): (Side, u16),
+        holds: Option<MissionId>,
+        now: Instant,
+        member: &Member,
+    ) -> Option<(Upload, Option<u16>)> {
+        let settings = &member.settings;
+        let is_due = core::mem::take(&mut self.offering(side)?.is_due);
+        let upload = self.offer_to(holds).filter(|_| is_due && to != 0)?;
+        let tries = self.offering(side)?.tries;
+        let hops = OFFER_HOPS << (tries / OFFERS_AT_A_PACE).min(OFFERS);
+        let wait = settings.hop_time.times(hops).min(settings.probe_after);
+        let at = now + self.uploads.first_mut()?.jitter.spread(wait);
+        let offering = self.offering(side)?;
+        offering.at = (tries < OFFERS).then_some(at);
+        offering.tries = tries.saturating_add(1);
+        let is_valid = |heard: Instant| now.since(heard).times(2) <= settings.dead_after;
+        let answers = offering.heard.is_some_and(is_valid);
+        Some((upload, answers.then_some(offering.nonce)))
+    }
+
+    /// Schedules the offer at `side` again once its timer has expired.
+    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        for side in [Side::Upstream, Side::Downstream] {
+            if let Some(offering) = self.offering(side)
+                && offering.at.is_some_and(|at| at <= now)
+            {
+                offering.at = None;
+                offering.is_due = true;
+            }
+        }
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        let [upstream, downstream] = self.offering;
+        let [upstream, downstream] = self.uploads()?.offering;
         earliest(upstream.at, downstream.at)
+    }
+
+    /// Schedules a hello to the ground station at `side`, or the stored upload in answer to its hello `asks`.
+    pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
+        if let Some(offering) = self.offering(side) {
+            offering.reports |= reports;
+            offering.ground_asks = asks.unwrap_or(offering.ground_asks);
+        }
+    }
+
+    /// Returns true if a hello to the ground station at `side` is pending, and marks it as sent.
+    pub(crate) fn take_report(&mut self, side: Side) -> bool {
+        let offering = self.offering(side);
+        offering.is_some_and(|offering| core::mem::take(&mut offering.reports))
+    }
+
+    /// Returns the upload that the ground station at `side` has requested, and the number of its hello.
+    pub(crate) fn take_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
+        let answer = core::mem::take(&mut self.offering(side)?.ground_asks);
+        Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
     /// Returns the refused mission if it is the stored or a newer one, and not `active`.
     pub(crate) fn refused_of(&self, active: MissionId) -> Option<MissionId> {
-        self.refused
-            .filter(|refused| *refused >= self.latest && *refused != active)
+        let refused = self.uploads()?.refused;
+        refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
     /// Records a neighbour's refusal; returns true if it is new and concerns the stored mission.
     pub(crate) fn hear_refused(&mut self, refused: MissionId) -> bool {
-        refused == self.latest && self.refused.replace(refused) != Some(refused)
+        refused == self.latest && self.refuse(refused)
+    }
+
+    /// Records that `id` is refused; returns true if that is new.
+    fn refuse(&mut self, id: MissionId) -> bool {
+        let uploads = self.uploads.first_mut();
+        uploads.is_some_and(|uploads| uploads.refused.replace(id) != Some(id))
     }
 
     /// Stores `upload` if it is for this relay and newer than the stored mission.
@@ -277,18 +313,24 @@ impl MissionUpdate {
         if id <= self.latest {
             return Offered::Passed;
         }
-        match fits(member, upload) {
+        match self.fits(member, upload) {
             Ok(()) => {
-                self.latest = id;
-                self.upload = Some(*upload);
-                self.refused = None;
+                self.store(upload);
                 Offered::Held
             }
             Err(UploadError::Line(why)) => Offered::Refused {
                 why,
-                is_new: self.refused.replace(id) != Some(id),
+                is_new: self.refuse(id),
             },
             Err(_) => Offered::Passed,
+        }
+    }
+
+    fn store(&mut self, upload: &Upload) {
+        if let Some(uploads) = self.uploads.first_mut() {
+            self.latest = upload.id();
+            uploads.upload = Some(*upload);
+            uploads.refused = None;
         }
     }
 
@@ -296,7 +338,7 @@ impl MissionUpdate {
         if !takes_uploads(member) {
             return Err(UploadError::Unsigned);
         }
-        fits(member, upload)?;
+        self.fits(member, upload)?;
         match self.hold(member, upload) {
             Offered::Held => Ok(()),
             _ => Err(UploadError::Old),
@@ -310,50 +352,132 @@ impl MissionUpdate {
         upload: &Upload,
         untouched: bool,
     ) -> Result<Mission, UploadError> {
-        fits(member, upload)?;
-        if self.upload.is_some() || !untouched {
+        self.fits(member, upload)?;
+        if self.upload().is_some() || !untouched {
             return Err(UploadError::Begun);
         }
         let mission = Mission::try_new(*upload.config()).map_err(UploadError::Mission)?;
-        self.latest = upload.id();
-        self.upload = Some(*upload);
+        self.store(upload);
         Ok(mission)
-    }
-
-    pub(crate) fn sites(&self) -> Option<Sites> {
-        self.upload.and_then(|upload| upload.sites())
     }
 
     /// Returns the stored mission if it is an upload.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
-        self.upload.as_ref()
+        match self.uploads() {
+            Some(uploads) => uploads.upload.as_ref(),
+            None => None,
+        }
     }
 
     /// Returns the upload to offer to a neighbour that `holds` an older or unknown mission.
     pub(crate) fn offer_to(&self, holds: Option<MissionId>) -> Option<Upload> {
         let older = holds.is_none_or(|holds| holds < self.latest);
-        self.upload.filter(|_| older)
+        self.upload().copied().filter(|_| older)
+    }
+
+    /// Checks that `upload` is for this relay. Relays in a field accept none, even if the digest of the base matches.
+    fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
+        let config = upload.config();
+        let loaded = self.uploads().ok_or(UploadError::Base)?;
+        if upload.base() != member.digest
+            || config.relays != member.all
+            || member.mission.field().is_some()
+        {
+            return Err(UploadError::Base);
+        }
+        let is_other = config.distance_m.to_bits() != loaded.loaded_m.to_bits();
+        loaded
+            .encloses(member, config, upload.sites().is_some())
+            .map_err(UploadError::Line)?;
+        match upload.sites() {
+            // Relays without a line on earth check it too, so that either all relays store the mission or none.
+            Some(sites) => check_line(sites, config.distance_m).map_err(UploadError::Line),
+            None if member.settings.sited && is_other => {
+                Err(UploadError::Line(LineError::Distance))
+            }
+            None => Ok(()),
+        }
     }
 }
 
-/// Checks that `upload` is for this relay. Relays in a field accept none, even if the digest of the base matches.
-#[cfg(feature = "upload")]
-fn fits(member: &Member, upload: &Upload) -> Result<(), UploadError> {
-    let config = upload.config();
-    if upload.base() != member.digest
-        || config.relays != member.all
-        || member.mission.field().is_some()
-    {
-        return Err(UploadError::Base);
+/// Line of the active mission.
+impl MissionUpdate {
+    /// Returns the sites of the active mission, if it has its own.
+    pub(crate) fn sites(&self) -> Option<Sites> {
+        self.uploads()?.sites
     }
-    let is_other = config.distance_m.to_bits() != member.loaded_m.to_bits();
-    member
-        .encloses(config, upload.sites().is_some())
-        .map_err(UploadError::Line)?;
-    match upload.sites() {
-        // Relays without a line on earth check it too, so that either all relays store the mission or none.
-        Some(sites) => check_line(sites, config.distance_m).map_err(UploadError::Line),
-        None if member.settings.sited && is_other => Err(UploadError::Line(LineError::Distance)),
-        None => Ok(()),
+
+    /// Returns the digest of the line of this relay's positions.
+    pub(crate) fn line(&self, member: &Member) -> u16 {
+        between(member.digest, self.sites())
+    }
+
+    /// Adopts the sites of the stored mission; returns true if they differ, so that positions are void.
+    pub(crate) fn fly_between(&mut self) -> bool {
+        let sites = self.upload().and_then(Upload::sites);
+        let uploads = self.uploads.first_mut();
+        uploads.is_some_and(|uploads| core::mem::replace(&mut uploads.sites, sites) != sites)
+    }
+
+    /// Returns the configured geofence, if any; it grows with the line of a mission with its own sites.
+    pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
+        let mut fence = member.settings.guard?.fence;
+        if self.sites().is_some() {
+            let longer_m = member.mission.config().distance_m - self.uploads()?.loaded_m;
+            fence.most_x_m = (fence.most_x_m + longer_m).max(fence.least_x_m);
+        }
+        Some(fence)
+    }
+}
+
+impl Uploads {
+    /// Checks a mission with `config` against the configured geofence; the error names the limit exceeded.
+    ///
+    /// The length of a mission with sites of its own (`sited`) is not limited. All relays must decide alike, so an altitude limit
+    /// that was extended to this relay's own altitude is replaced by that of the loaded mission.
+    fn encloses(
+        &self,
+        member: &Member,
+        config: &MissionConfig,
+        sited: bool,
+    ) -> Result<(), LineError> {
+        let Some(guard) = member.settings.guard else {
+            return Ok(());
+        };
+        let fence = guard.fence;
+        let own_m = member.settings.profile.map(|own| own.altitude_m);
+        let edge = |edge_m: f32, loaded_m: f32| match own_m {
+            Some(own_m) if own_m.to_bits() == edge_m.to_bits() => loaded_m,
+            _ => edge_m,
+        };
+        let altitudes_m = Band {
+            least_m: edge(fence.least_altitude_m, self.loaded_band.least_m),
+            most_m: edge(fence.most_altitude_m, self.loaded_band.most_m),
+        };
+        let is_within = |inner: Band, outer: Band| {
+            inner.least_m >= outer.least_m && inner.most_m <= outer.most_m
+        };
+        let sides_m = Band {
+            least_m: fence.least_y_m,
+            most_m: fence.most_y_m,
+        };
+        if !is_within(altitudes_of(config), altitudes_m) {
+            Err(LineError::Altitude)
+        } else if !is_within(config.lateral, sides_m) {
+            Err(LineError::Lateral)
+        } else if !sited && config.distance_m > fence.most_x_m.max(self.loaded_m) {
+            Err(LineError::Length)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Returns the altitudes of a mission, m: its band, extended to the relays' common altitude.
+fn altitudes_of(config: &MissionConfig) -> Band {
+    let common_m = config.common.altitude_m;
+    Band {
+        least_m: config.band.least_m.min(common_m),
+        most_m: config.band.most_m.max(common_m),
     }
 }

@@ -20,10 +20,8 @@
 //!
 //! | below the layers | content |
 //! | --- | --- |
-//! | `context` | state that every layer receives, and the effects of a layer |
-//! | `circulation` | message along the chain and the reply with its result: stages, duplicates, retransmission |
-//! | `numbering` | detection of a restarted leader by late message numbers |
-//! | `timing` | durations that several layers share |
+//! | `context` | state that every layer receives, the effects of a layer, and durations that several layers share |
+//! | `circulation` | message along the chain and the reply with its result: stages, duplicates, retransmission, late numbers |
 //! | [`sample`] | measurements of a relay |
 //!
 //! A received message only sets flags, and a pending message is built from the state when it is polled. So there are no queues,
@@ -36,11 +34,9 @@ pub(crate) mod duplicate;
 mod lease;
 pub(crate) mod mission_update;
 pub(crate) mod neighbour;
-mod numbering;
 pub(crate) mod round;
 pub(crate) mod sample;
 mod steering;
-mod timing;
 pub(crate) mod view;
 
 pub(crate) use dispatch::Node;

@@ -1,7 +1,5 @@
 //! Setpoint on the way to the agreed position: limited by the [guard](crate::guard), or without a guard the agreed position.
 
-use super::context::Effects;
-#[cfg(feature = "upload")]
 use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
@@ -84,11 +82,10 @@ impl Steering {
     }
 
     /// Handles a fence message of the neighbour `from` at `side`.
-    pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) -> Effects {
+    pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
             guard.hear(side, from, fence);
         }
-        Effects::NONE
     }
 
     /// Schedules fence messages again that may be lost.
@@ -112,14 +109,12 @@ impl Steering {
     }
 
     /// Changes the line of the positions at time `now`, or after a start if `None`.
-    #[cfg(feature = "upload")]
     pub(crate) fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
         }
     }
 
-    #[cfg(feature = "upload")]
     pub(crate) fn set_box(&mut self, fence: Option<Geofence>) {
         if let Some(guard) = self.guard()
             && let Some(fence) = fence

@@ -9,17 +9,6 @@
 //!
 //! The node calls the same functions, one hop per relay.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 pub mod joint;
 pub mod ladder;
 pub mod local;

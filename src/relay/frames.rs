@@ -1,6 +1,6 @@
 //! Frames to and from the protocol: address and tag are checked before a message is decoded.
 
-use super::port::Port;
+use super::Port;
 use crate::node::Node;
 use crate::node::duplicate::Sender;
 use crate::side::Side;
@@ -9,12 +9,10 @@ use crate::time::Instant;
 use crate::wire::endpoint::{Endpoint, Sent};
 use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
-#[cfg(feature = "auth")]
 use crate::wire::session::{Checked, Session};
 
 /// Questions to a silent neighbour of which one comes with a handshake that requests a reply. The reply shows whether the
 /// neighbour takes another node with this relay's index for this relay.
-#[cfg(feature = "auth")]
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network.
@@ -56,12 +54,9 @@ pub(super) fn receive(
 
 /// Handles a frame with this relay's own index as its sender.
 fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: &Opened<'_>) {
-    #[cfg(feature = "auth")]
     if let Some(session) = endpoint.session() {
         return node.hear_duplicate(now, session.sender(frame));
     }
-    #[cfg(not(feature = "auth"))]
-    let _ = endpoint;
     if frame.tag.is_some() {
         return;
     }
@@ -82,20 +77,16 @@ fn receive_addressed(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    #[cfg(feature = "auth")]
     if let Some(checked) = endpoint.check(now, frame, node.stats_mut()) {
         let rival = endpoint.session_mut().and_then(Session::poll_rival);
         return receive_signed(node, rival, checked, now, side, frame);
     }
-    #[cfg(not(feature = "auth"))]
-    let _ = endpoint;
     if frame.tag.is_some() {
         return bump(&mut node.stats_mut().version);
     }
     decode(node, now, side, frame);
 }
 
-#[cfg(feature = "auth")]
 fn receive_signed(
     node: &mut Node,
     rival: Option<crate::node::duplicate::Rival>,
@@ -151,7 +142,6 @@ pub(super) fn poll_transmit(
     if endpoint.is_exhausted() {
         return None;
     }
-    #[cfg(feature = "auth")]
     if let Some(session) = endpoint.session_mut() {
         if node.is_passive() {
             return None;
@@ -169,7 +159,6 @@ pub(super) fn poll_transmit(
         }
     }
     let (_, to, message) = node.poll_message(now)?;
-    #[cfg(feature = "auth")]
     if let Some(session) = endpoint.session_mut() {
         schedule_handshake(node, session, to, &message);
     }
@@ -177,7 +166,6 @@ pub(super) fn poll_transmit(
 }
 
 /// Schedules the handshake that accompanies `message`, if there is one.
-#[cfg(feature = "auth")]
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { ask, .. } = message
         && *ask != 0

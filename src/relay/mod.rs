@@ -2,18 +2,35 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `facade` | relay: bytes and time in, frames and events out; records and uploads across a reboot |
-//! | `readings` | getters, and inputs besides bytes |
-//! | `port` | ports |
+//! | `facade` | relay: bytes and time in, frames and events out; records and uploads across a reboot; getters, and inputs besides bytes |
 //! | `frames` | frames to and from the protocol |
 
 mod facade;
 mod frames;
-mod port;
-mod readings;
 #[cfg(feature = "auth")]
 #[cfg(test)]
 mod tests;
 
 pub use facade::Relay;
-pub use port::{Port, Transmit};
+
+/// Port of a relay.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Port {
+    /// Link toward the transmitter, with [`Wiring::Pair`](crate::Wiring::Pair).
+    Upstream,
+    /// Link toward the receiver, with [`Wiring::Pair`](crate::Wiring::Pair).
+    Downstream,
+    /// Shared channel, with [`Wiring::Shared`](crate::Wiring::Shared).
+    Shared,
+}
+
+/// Frame to send: the first `len` bytes of the buffer, through `port`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Transmit {
+    /// Port to send through.
+    pub port: Port,
+    /// Length in bytes, delimiter included; at most [`MAX_FRAME`](crate::wire::frame::MAX_FRAME).
+    pub len: usize,
+}

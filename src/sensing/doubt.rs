@@ -40,7 +40,7 @@
 //! does not.
 
 use super::fit::Fit;
-use super::listener::Place;
+use super::sums::Place;
 use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms};
 use crate::mission::Mission;
 use crate::place::Placement;

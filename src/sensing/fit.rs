@@ -10,17 +10,6 @@
 //!
 //! The symmetric positive 4 x 4 system is solved by L D L^T factorisation in f64; the last unknown may be omitted.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 use super::sums::{Sums, Terms, coefficients, expected_v, strength, value};
 use crate::mission::{Interferer, Mission};
 

@@ -14,7 +14,6 @@
 //! | file | content |
 //! | --- | --- |
 //! | `sums` | the terms of a position; the levels of the transmitter and the receiver; the sums that a pass collects |
-//! | `listener` | the measurements of one relay by position, with fading |
 //! | `fit` | the source that fits the sums, or the closest one, its uncertainty, and the reasons for no source |
 //! | [`belief`] | the chain's interference estimate, and the rules for its replacement; the velocity of a moving interferer |
 //! | `doubt` | the relay whose measurements do not fit those of the others; the same for the transmitter and the receiver |
@@ -30,7 +29,6 @@ pub(crate) mod fit;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod fit;
-pub(crate) mod listener;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod sums;
 #[cfg(feature = "internals")]

@@ -95,8 +95,6 @@
 pub mod link;
 pub mod port;
 pub mod queue;
-mod read_limit;
-mod ring;
 
 use embedded_hal::digital::OutputPin;
 
@@ -106,18 +104,16 @@ pub(crate) use link::byte_time;
 pub use link::{NoPin, SerialLink};
 pub use port::{Fault, Io, Nb, SerialPort};
 pub use queue::{ByteQueues, InterruptEnd, Pend, QueuedPort, queue_depth};
-#[cfg(not(any(doc, feature = "internals")))]
-pub(crate) use read_limit::READ_LIMIT;
-// Documentation of public functions links to it.
-#[cfg(any(doc, feature = "internals"))]
-#[doc(hidden)]
-pub use read_limit::READ_LIMIT;
 
 use crate::node::view::record::ViewRecord;
 use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::FrameLink;
+
+/// Largest number of bytes, or of failed reads, that one poll takes from one port.
+#[doc(hidden)] // public because the documentation of public functions links to it
+pub const READ_LIMIT: usize = 64;
 
 /// Two serial ports, one to each neighbour, full duplex unless a link has a pin.
 #[derive(Debug)]

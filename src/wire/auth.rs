@@ -4,18 +4,18 @@
 //! use a MAC and not a cipher, because anyone who sees the drones knows their positions, and because a MAC remains secure even if
 //! a counter is used twice, which a stream cipher does not.
 
-#[cfg(feature = "auth")]
 use super::blake2s::mac;
 
-/// Length of a tag, bytes; 0 without the feature `auth`.
-pub const TAG: usize = if cfg!(feature = "auth") { 8 } else { 0 };
+/// Length of a tag, bytes.
+pub const TAG: usize = 8;
+
+/// True with the feature `auth`; without it no node has credentials and no frame has a tag.
+pub(crate) const AUTH: bool = cfg!(feature = "auth");
 
 /// Secret key that the members of a network share.
-#[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key([u8; 32]);
 
-#[cfg(feature = "auth")]
 impl Key {
     /// Creates a key of 256 random bits. Do not use a password.
     pub const fn new(bytes: [u8; 32]) -> Self {
@@ -31,7 +31,6 @@ impl Key {
     }
 }
 
-#[cfg(feature = "auth")]
 impl core::fmt::Debug for Key {
     /// Omits the bytes, since keys must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -39,7 +38,7 @@ impl core::fmt::Debug for Key {
     }
 }
 
-#[cfg(all(feature = "auth", feature = "defmt"))]
+#[cfg(feature = "defmt")]
 impl defmt::Format for Key {
     fn format(&self, fmt: defmt::Formatter<'_>) {
         defmt::write!(fmt, "Key(..)");
@@ -67,14 +66,27 @@ pub struct Auth {
     pub epoch: u32,
 }
 
-/// Credentials; uninhabited without the feature `auth`.
+#[cfg(feature = "auth")]
+impl Auth {
+    pub(crate) const fn parts(self) -> (Key, u32) {
+        (self.key, self.epoch)
+    }
+}
+
+/// Credentials; uninhabited without the feature `auth`, so that the compiler drops all that signs.
 #[cfg(not(feature = "auth"))]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Auth {}
 
+#[cfg(not(feature = "auth"))]
+impl Auth {
+    pub(crate) const fn parts(self) -> (Key, u32) {
+        match self {}
+    }
+}
+
 /// Nonces of the two ends of a link: an epoch, and below it a link number that starts at the relay's claim number.
-#[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
@@ -82,7 +94,6 @@ pub(crate) struct Nonces {
     pub(crate) receiver: u64,
 }
 
-#[cfg(feature = "auth")]
 impl Nonces {
     pub(crate) const fn turned(self) -> Self {
         Self {
@@ -93,14 +104,12 @@ impl Nonces {
 }
 
 /// Key and nonces for the tags of the frames from one node to another.
-#[cfg(feature = "auth")]
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,
     pub(crate) nonces: Nonces,
 }
 
-#[cfg(feature = "auth")]
 impl Signer<'_> {
     pub(crate) fn tag(self, signed: &[u8]) -> [u8; TAG] {
         let Nonces { sender, receiver } = self.nonces;
@@ -108,26 +117,12 @@ impl Signer<'_> {
     }
 }
 
-/// Signer; uninhabited without the feature `auth`.
-#[cfg(not(feature = "auth"))]
-#[derive(Clone, Copy)]
-pub(crate) struct Signer<'a>(core::convert::Infallible, core::marker::PhantomData<&'a ()>);
-
-#[cfg(not(feature = "auth"))]
-impl Signer<'_> {
-    pub(crate) const fn tag(self, _: &[u8]) -> [u8; TAG] {
-        match self.0 {}
-    }
-}
-
 /// Compares two tags in constant time.
-#[cfg(feature = "auth")]
 pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
 /// Sliding window of the accepted counters of one sender: the newest, and those up to 63 below it.
-#[cfg(feature = "auth")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
@@ -137,7 +132,6 @@ pub(crate) struct Window {
     taken: u64,
 }
 
-#[cfg(feature = "auth")]
 impl Window {
     /// Accepts `counter` once; false if it was accepted before or is too old to know. `u32::MAX` is never accepted.
     pub(crate) const fn take(&mut self, counter: u32) -> bool {
@@ -159,7 +153,6 @@ impl Window {
     }
 }
 
-#[cfg(feature = "auth")]
 #[cfg(test)]
 mod tests {
     use super::Window;

@@ -2,15 +2,12 @@
 //!
 //! A relay and a ground station have one each. What a frame then means to them is theirs.
 
-#[cfg(feature = "auth")]
-use super::auth::Auth;
+use super::auth::{AUTH, Auth};
 use super::deframe::DeframeError;
 use super::frame::{self, FrameBuf, FrameError, Header, Opened};
 use super::message::Message;
-#[cfg(feature = "auth")]
 use super::session::{Checked, Session};
 use crate::stats::{Stats, bump};
-#[cfg(feature = "auth")]
 use crate::time::{Duration, Instant};
 
 /// A frame to send.
@@ -28,26 +25,26 @@ pub(crate) struct Endpoint {
     network: u16,
     node: u16,
     counter: u32,
-    #[cfg(feature = "auth")]
-    session: Option<Session>,
+    /// Sessions with other nodes; `None` if this node does not sign, and without the feature `auth` not even that.
+    session: [Option<Session>; AUTH as usize],
 }
 
 impl Endpoint {
     /// Node `node` of `network`, which does not sign.
-    pub(crate) const fn new(network: u16, node: u16) -> Self {
+    pub(crate) fn new(network: u16, node: u16) -> Self {
         Self {
             network,
             node,
             counter: 0,
-            #[cfg(feature = "auth")]
-            session: None,
+            session: core::array::from_fn(|_| None),
         }
     }
 
     /// Signs from now on, with the claim number `claim`. The session of a node that is silent for `gone_after` ends.
-    #[cfg(feature = "auth")]
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
-        self.session = Some(Session::new(auth, claim, gone_after));
+        if let Some(session) = self.session.first_mut() {
+            *session = Some(Session::new(auth, claim, gone_after));
+        }
     }
 
     /// Opens what the deframer gives. Returns an intact frame of this network; anything else is counted in `stats`.
@@ -70,14 +67,13 @@ impl Endpoint {
     }
 
     /// Checks the tag of `frame` and counts every result but a fresh message; `None` if this node does not sign.
-    #[cfg(feature = "auth")]
     pub(crate) fn check(
         &mut self,
         now: Instant,
         frame: &Opened<'_>,
         stats: &mut Stats,
     ) -> Option<Checked> {
-        let session = self.session.as_mut()?;
+        let session = self.session_mut()?;
         let checked = session.check(now, frame.header.sender, frame);
         match checked {
             Checked::Fresh { .. } => {}
@@ -90,23 +86,12 @@ impl Endpoint {
     }
 
     /// Returns true once no more frames can be sent: a signed counter is used once, and after four billion frames a new epoch is due.
-    #[cfg_attr(
-        not(feature = "auth"),
-        expect(clippy::unused_self, reason = "only signed counters end")
-    )]
     pub(crate) const fn is_exhausted(&self) -> bool {
-        #[cfg(feature = "auth")]
-        return self.counter == u32::MAX && self.session.is_some();
-        #[cfg(not(feature = "auth"))]
-        false
+        self.counter == u32::MAX && self.session().is_some()
     }
 
     /// Writes `message` to node `to`. If that node could not check its tag yet, writes a handshake in its place: the message is due again
     /// later.
-    #[cfg_attr(
-        not(feature = "auth"),
-        expect(clippy::unnecessary_wraps, reason = "as with signatures")
-    )]
     pub(crate) fn transmit(
         &mut self,
         to: u16,
@@ -115,8 +100,7 @@ impl Endpoint {
         stats: &mut Stats,
     ) -> Option<Sent> {
         let header = self.header(to);
-        #[cfg(feature = "auth")]
-        let len = match &mut self.session {
+        let len = match self.session_mut() {
             Some(session) if !session.knows(to) => {
                 session.greet(to);
                 return self.transmit_handshake(frame, stats);
@@ -124,13 +108,10 @@ impl Endpoint {
             Some(session) => frame::encode_signed(header, message, session.signer(to), frame),
             None => frame::encode(header, message, frame),
         };
-        #[cfg(not(feature = "auth"))]
-        let len = frame::encode(header, message, frame);
         Some(self.sent(to, len, stats))
     }
 
     /// Writes the next pending handshake.
-    #[cfg(feature = "auth")]
     #[inline(never)] // called from two places
     pub(crate) fn transmit_handshake(
         &mut self,
@@ -138,7 +119,7 @@ impl Endpoint {
         stats: &mut Stats,
     ) -> Option<Sent> {
         let mut header = self.header(0);
-        let session = self.session.as_mut()?;
+        let session = self.session_mut()?;
         let to = session.take_handshake()?;
         header.destination = to;
         let body = session.handshake(to);
@@ -162,31 +143,30 @@ impl Endpoint {
     }
 
     /// Returns the sessions with other nodes; `None` if this node does not sign.
-    #[cfg(feature = "auth")]
     pub(crate) const fn session(&self) -> Option<&Session> {
-        self.session.as_ref()
+        match self.session.first() {
+            Some(session) => session.as_ref(),
+            None => None,
+        }
     }
 
-    /// Returns the sessions with other nodes; `None` if this node does not sign.
-    #[cfg(feature = "auth")]
     pub(crate) const fn session_mut(&mut self) -> Option<&mut Session> {
-        self.session.as_mut()
+        match self.session.first_mut() {
+            Some(session) => session.as_mut(),
+            None => None,
+        }
     }
 
     /// Schedules a handshake to node `to`.
-    #[cfg(feature = "upload")]
     pub(crate) fn greet(&mut self, to: u16) {
-        if let Some(session) = &mut self.session {
+        if let Some(session) = self.session_mut() {
             session.greet(to);
         }
     }
 
     /// Returns true if node `to` can check this node's tags, as far as is known.
-    #[cfg(feature = "upload")]
     pub(crate) fn knows(&self, to: u16) -> bool {
-        self.session
-            .as_ref()
-            .is_some_and(|session| session.knows(to))
+        self.session().is_some_and(|session| session.knows(to))
     }
 
     #[cfg(test)]

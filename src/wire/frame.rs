@@ -2,7 +2,7 @@
 
 use super::CRC_32C;
 pub use super::MAX_NODE;
-use super::auth::{Signer, TAG};
+use super::auth::{AUTH, Signer, TAG};
 use super::message::{MAX_BODY, Message, MessageError};
 
 /// Version of the format, in the top four bits of the first word.
@@ -13,14 +13,17 @@ pub const HEADER: usize = 10;
 
 const CHECK: usize = 4;
 
+/// Room for a tag, bytes; 0 without the feature `auth`.
+const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
+
 /// Maximum length of a frame before COBS, bytes.
-pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG + CHECK;
+pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
 /// Maximum length of a frame on the wire: COBS adds one byte below 254 bytes, the delimiter another one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
 /// Maximum length of a sweep on the wire, with sixteen targets.
-pub const MAX_SWEEP: usize = 100 + TAG;
+pub const MAX_SWEEP: usize = 100 + TAG_ROOM;
 
 /// Flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
@@ -81,7 +84,6 @@ pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     close(header, 0, len, None, out)
 }
 
-#[cfg(feature = "auth")]
 pub(crate) fn encode_signed(
     header: Header,
     message: &Message,
@@ -92,7 +94,6 @@ pub(crate) fn encode_signed(
     close(header, SIGNED, len, Some(signer), out)
 }
 
-#[cfg(feature = "auth")]
 pub(crate) fn encode_handshake(
     header: Header,
     handshake: &[u8],
@@ -186,8 +187,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let first = u16::from_le_bytes([a, b]);
     let second = u16::from_le_bytes([c, d]);
     let flags = second & 0xF000;
-    let known =
-        flags == 0 || cfg!(feature = "auth") && (flags == SIGNED || flags == SIGNED | HELLO);
+    let known = flags == 0 || AUTH && (flags == SIGNED || flags == SIGNED | HELLO);
     if first >> 12 != u16::from(VERSION) || !known {
         return Err(FrameError::Version);
     }

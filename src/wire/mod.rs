@@ -2,28 +2,14 @@
 //! messages, [`digest`] the digest of a mission, [`auth`] the authentication, `endpoint` one node's frames, `upload` uploaded missions.
 //! This file has the check sequence and the range of node numbers. `FORMAT.md` in this folder has byte tables and examples.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 pub mod auth;
-#[cfg(feature = "auth")]
 mod blake2s;
 pub mod deframe;
 pub mod digest;
 pub(crate) mod endpoint;
 pub mod frame;
 pub mod message;
-#[cfg(feature = "auth")]
 pub(crate) mod session;
-#[cfg(feature = "upload")]
 pub mod upload;
 
 use crc::{CRC_32_ISCSI, Crc, Table};

@@ -25,7 +25,7 @@
 //! is replaced by the current one, which is larger. So it does no lasting harm: before the current handshake, nothing can be sent
 //! to that node.
 
-use super::auth::{Auth, Nonces, Signer, TAG, Window, is_same};
+use super::auth::{Auth, Key, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
 use crate::node::duplicate::{RAISED, Rival, Sender};
 use crate::time::{Duration, Instant};
@@ -103,7 +103,8 @@ impl Peer {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Session {
-    auth: Auth,
+    key: Key,
+    epoch: u32,
     /// Silence after which another node of the same number is accepted in place of the known one.
     gone_after: Duration,
     /// Claim number; the lower halves of this relay's nonces are above it.
@@ -142,8 +143,10 @@ impl Session {
     /// Creates a session without known nodes for a node with claim number `claim`. A node that is silent for `gone_after` is
     /// replaced by another one with its number.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
+        let (key, epoch) = auth.parts();
         Self {
-            auth,
+            key,
+            epoch,
             gone_after,
             claim,
             made: claim,
@@ -227,7 +230,7 @@ impl Session {
 
     pub(crate) fn handshake(&mut self, to: u16) -> [u8; HELLO] {
         let mut body = [0; HELLO];
-        let epoch = self.auth.epoch;
+        let epoch = self.epoch;
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             let Nonces { sender, receiver } = peer.nonces(epoch);
             let asks = core::mem::take(&mut peer.asks) || !peer.proven;
@@ -242,7 +245,7 @@ impl Session {
     }
 
     pub(crate) fn signer(&mut self, to: u16) -> Signer<'_> {
-        let epoch = self.auth.epoch;
+        let epoch = self.epoch;
         let nonces = self
             .touch(to)
             .map_or_else(Nonces::default, |peer| peer.nonces(epoch));
@@ -251,7 +254,7 @@ impl Session {
 
     const fn with(&self, nonces: Nonces) -> Signer<'_> {
         Signer {
-            key: &self.auth.key,
+            key: &self.key,
             nonces,
         }
     }
@@ -266,7 +269,7 @@ impl Session {
                 .meet(now, sender, frame, told)
                 .unwrap_or(Checked::Forged);
         }
-        let epoch = self.auth.epoch;
+        let epoch = self.epoch;
         let Some(nonces) = self.find(sender).map(|peer| peer.nonces(epoch).turned()) else {
             return Checked::Forged;
         };
@@ -308,7 +311,7 @@ impl Session {
             !(succeeds && now.since(peer.heard) >= gone_after)
         });
         self.make(sender);
-        let epoch = self.auth.epoch;
+        let epoch = self.epoch;
         let peer = self.touch(sender)?;
         let begins = nonces.sender > peer.other;
         if begins {
@@ -348,7 +351,7 @@ impl Session {
 
     /// Returns the sender of `frame`, which has this relay's own number. Work: that of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
-        let epoch = self.auth.epoch;
+        let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
         let nonces = if frame.handshake { said(frame) } else { own() };
         let Some((nonces, told)) = nonces.zip(frame.tag) else {
@@ -363,16 +366,16 @@ impl Session {
     /// Returns the node of this relay's number that has `nonce`; unknown for 0 or an older epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
-        if epoch < self.auth.epoch {
+        if epoch < self.epoch {
             return Sender::Unknown;
         }
         let made = (number & !RAISED).wrapping_sub(self.claim & !RAISED);
-        if epoch == self.auth.epoch && made <= (self.made - self.claim).saturating_add(NEAR) {
+        if epoch == self.epoch && made <= (self.made - self.claim).saturating_add(NEAR) {
             return Sender::Itself;
         }
         Sender::Rival(Rival {
             number,
-            newer_epoch: epoch > self.auth.epoch,
+            newer_epoch: epoch > self.epoch,
             passive: false,
             is_current: true,
         })
@@ -454,5 +457,6 @@ fn said(frame: &Opened<'_>) -> Option<Nonces> {
     })
 }
 
+#[cfg(feature = "auth")]
 #[cfg(test)]
 mod tests;

@@ -4,12 +4,19 @@
 //! relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it has one
 //! interferer, because a field does not fit into a frame.
 
-use super::digest::{MissionId, between, digest, of};
-use super::message::UPLOAD;
+use super::digest::MissionId;
+#[cfg(feature = "upload")]
+use super::digest::{between, digest, of};
 use crate::geodetic::{LineError, Sites};
-use crate::mission::{Interference, Mission, MissionConfig, MissionError};
+#[cfg(feature = "upload")]
+use crate::mission::{Interference, Mission};
+use crate::mission::{MissionConfig, MissionError};
+
+/// True with the feature `upload`; without it no upload exists and none is accepted.
+pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 
 /// Mission with a version.
+#[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
@@ -66,9 +73,10 @@ impl core::fmt::Display for UploadError {
 
 impl core::error::Error for UploadError {}
 
+#[cfg(feature = "upload")]
 impl Upload {
     /// Length of an encoded upload, bytes.
-    pub const LENGTH: usize = UPLOAD;
+    pub const LENGTH: usize = super::message::UPLOAD;
 
     /// Creates an upload of `config` with `version`, 1 to 65535, for relays with the mission `base`.
     ///
@@ -154,18 +162,41 @@ impl Upload {
     }
 }
 
-/// Accepts every mission, since a relay without the feature `flight` has no line on earth.
-#[cfg(not(feature = "flight"))]
-#[expect(clippy::unnecessary_wraps, reason = "as with a line")]
-pub(crate) const fn check_line(_: Sites, _: f32) -> Result<(), LineError> {
-    Ok(())
+/// Mission with a version; uninhabited without the feature `upload`, so that the compiler drops all that handles one.
+#[cfg(not(feature = "upload"))]
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Upload {}
+
+#[cfg(not(feature = "upload"))]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as with the feature")]
+impl Upload {
+    pub(crate) const fn base(&self) -> u16 {
+        match *self {}
+    }
+
+    pub(crate) const fn config(&self) -> &MissionConfig {
+        match *self {}
+    }
+
+    pub(crate) const fn sites(&self) -> Option<Sites> {
+        match *self {}
+    }
+
+    pub(crate) const fn id(&self) -> MissionId {
+        match *self {}
+    }
 }
 
-/// Checks that a mission over `distance_m` metres fits the distance between `sites`.
-#[cfg(feature = "flight")]
+/// Checks that a mission over `distance_m` metres fits the distance between `sites`. A relay without the feature `flight` has no line
+/// on earth, and accepts every mission.
 pub(crate) fn check_line(sites: Sites, distance_m: f32) -> Result<(), LineError> {
-    let axis = crate::flight::axis::Axis::between(sites).map_err(|_| LineError::Sites)?;
-    if axis.is_of(distance_m) {
+    #[cfg(feature = "flight")]
+    let fits = crate::flight::axis::Axis::between(sites)
+        .map_err(|_| LineError::Sites)?
+        .is_of(distance_m);
+    #[cfg(not(feature = "flight"))]
+    let fits = sites.are_valid() && distance_m > 0.0;
+    if fits {
         Ok(())
     } else {
         Err(LineError::Distance)

@@ -2,11 +2,11 @@
 
 use super::link::Autopilot;
 use super::vehicle::Position;
-#[cfg(feature = "upload")]
 use crate::flight::axis::Axis;
 use crate::relay::Relay;
 use crate::side::Side;
 use crate::time::Instant;
+use crate::wire::upload::UPLOAD;
 
 impl Autopilot {
     /// Exchanges data with the relay of the same drone, in both directions, and handles the link's timeouts.
@@ -68,7 +68,6 @@ impl Autopilot {
     /// ```
     #[inline(never)] // called from two places of a firmware's loop; its stack frame is released
     pub fn exchange(&mut self, relay: &mut Relay, now: Instant) -> (bool, Option<Position>) {
-        #[cfg(feature = "upload")]
         self.follow(relay, now);
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
@@ -96,12 +95,12 @@ impl Autopilot {
     }
 
     /// Switches to the line between the sites of the relay's mission.
-    #[cfg(feature = "upload")]
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let sites = relay.sites().unwrap_or(self.loaded);
         // The relay has checked that its sites form a valid line.
-        if sites != self.axis.sites()
+        if UPLOAD
+            && sites != self.axis.sites()
             && let Ok(axis) = Axis::between(sites)
         {
             self.fly_along(now, axis);

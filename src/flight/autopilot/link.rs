@@ -21,7 +21,6 @@ use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing};
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 use crate::geodetic::Geodetic;
-#[cfg(feature = "upload")]
 use crate::geodetic::Sites;
 use crate::guard::HoldReason;
 use crate::node::sample::Sample;
@@ -68,7 +67,6 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 pub struct Autopilot {
     pub(super) axis: Axis,
     /// Sites of the line that the link was created with.
-    #[cfg(feature = "upload")]
     pub(super) loaded: Sites,
     pace: Pace,
     clock: MonotonicClock,
@@ -116,7 +114,6 @@ impl Autopilot {
     /// The link to the autopilot of a drone that flies along `axis`, at most as fast as `pace` says.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
-            #[cfg(feature = "upload")]
             loaded: axis.sites(),
             axis,
             pace,

@@ -10,17 +10,6 @@
 //! Unknown enum values and unknown messages cost only their bytes. MAVLink 1 is not supported; an autopilot that starts with it
 //! changes to MAVLink 2 once it has received a frame of that.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 pub mod frame;
 pub mod incoming;
 pub mod outgoing;

@@ -1,6 +1,6 @@
 //! Pending hellos, and received ones, by which the neighbours are selected.
 
-use super::state::Node;
+use super::Node;
 use crate::event::About;
 use crate::node::mission_update::takes_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
@@ -9,6 +9,7 @@ use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
+use crate::wire::upload::UPLOAD;
 
 /// Mission state in a hello.
 struct MissionSaid {
@@ -39,7 +40,7 @@ impl Node {
                     Side::Downstream => own.saturating_add(distance),
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
-                    let nonce = self.ask_number(now);
+                    let nonce = self.layers.update.ask(now, &self.member);
                     let ready = self.is_between(now, side, to);
                     let hello = self.hello(now, side, ask, nonce);
                     return Some((side, to, Hello { ready, ..hello }));
@@ -76,7 +77,6 @@ impl Node {
     /// Returns the state of the stored mission, or of a newer one that was refused.
     fn says_of_mission(&self) -> MissionSaid {
         let (active, latest) = (self.member.active, self.layers.update.latest());
-        #[cfg(feature = "upload")]
         if let Some(refused) = self.layers.update.refused_of(active) {
             return MissionSaid {
                 holds: refused,
@@ -86,10 +86,7 @@ impl Node {
             };
         }
         let flies = active == latest;
-        #[cfg(feature = "upload")]
-        let whole = flies && latest.version > 0 && self.layers.lease.is_whole();
-        #[cfg(not(feature = "upload"))]
-        let whole = false;
+        let whole = UPLOAD && flies && latest.version > 0 && self.layers.lease.is_whole();
         MissionSaid {
             holds: latest,
             flies,
@@ -147,22 +144,6 @@ impl Node {
             all.saturating_sub(place)
         }
     }
-
-    /// Returns the number of a hello sent now, for the offer that answers it; 0 if uploads are not accepted.
-    #[cfg(feature = "upload")]
-    pub(super) fn ask_number(&mut self, now: Instant) -> u16 {
-        if takes_uploads(&self.member) {
-            self.layers.update.ask(now, &self.member.settings)
-        } else {
-            0
-        }
-    }
-
-    #[cfg(not(feature = "upload"))]
-    #[expect(clippy::unused_self, reason = "as the other one")]
-    pub(super) const fn ask_number(&mut self, _: Instant) -> u16 {
-        0
-    }
 }
 
 impl Node {
@@ -185,15 +166,11 @@ impl Node {
             self.owe_hello(side, from, false);
         }
         if self.layers.neighbours.at(side).node() == from {
-            #[cfg(feature = "upload")]
-            {
-                self.layers.neighbours.at_mut(side).asked = hello.nonce;
-                self.layers.update.may_answer(side, now);
-                if hello.refused {
-                    self.hear_refused(side, hello.holds);
-                } else {
-                    self.compare(side, from, hello.holds);
-                }
+            self.layers.update.may_answer(side, hello.nonce, now);
+            if hello.refused {
+                self.hear_refused(side, hello.holds);
+            } else {
+                self.compare(side, from, hello.holds);
             }
             self.layers.neighbours.at_mut(side).holds = Some(hello.holds);
             if self.searches() {
@@ -262,12 +239,8 @@ impl Node {
         if neighbour.consider(candidate, now, settings) {
             let tells = neighbour.tells_found();
             neighbour.holds = Some(hello.holds);
-            #[cfg(feature = "upload")]
-            {
-                neighbour.asked = hello.nonce;
-                layers.update.may_answer(side, now);
-                layers.update.begin_offers(side);
-            }
+            layers.update.may_answer(side, hello.nonce, now);
+            layers.update.begin_offers(side);
             self.steering.link(side, Some(from));
             if tells {
                 self.raise_about(About::Back, side, from);

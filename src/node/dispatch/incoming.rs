@@ -1,10 +1,10 @@
 //! Received messages: which are accepted, on which side their sender is, and which layer handles each.
 
-use super::state::Node;
+use super::Node;
 use crate::event::{About, Event};
 use crate::mission::{Heading, Mission};
 use crate::node::context::{Decided, Effects};
-use crate::node::duplicate::Duplicated;
+use crate::node::duplicate::{Duplicated, Sender};
 use crate::node::mission_update::takes_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::settings::{Method, Wiring};
@@ -12,7 +12,8 @@ use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
-use crate::wire::message::Message;
+use crate::wire::message::{Claim, Message};
+use crate::wire::upload::UPLOAD;
 
 impl Node {
     /// Handles an intact message from node `from` at `side`; returns false if that node may not send it. Bounded by 16 reaches.
@@ -30,11 +31,9 @@ impl Node {
         if self.is_passive() {
             return false;
         }
-        #[cfg(feature = "upload")]
         if self.ground_side(from).is_some() {
             return self.on_ground(now, side, from, message);
         }
-        #[cfg(feature = "upload")]
         if let Message::Level { .. } = message {
             // Only the ground station sends levels.
             return false;
@@ -50,7 +49,6 @@ impl Node {
             }
             return true;
         }
-        #[cfg(feature = "upload")]
         if let Message::Offer { upload, answer } = message
             && !taken
             && takes_uploads(&self.member)
@@ -86,8 +84,7 @@ impl Node {
         };
         let (active, latest) = (self.member.active, self.layers.update.latest());
         let proposes = message.is_of_a_proposal();
-        #[cfg(feature = "upload")]
-        if let Message::Fence { .. } = message {
+        if UPLOAD && matches!(message, Message::Fence { .. }) {
             return self.is_of_line(now, side, from, digest);
         }
         if !proposes && !message.is_of_a_view() {
@@ -112,9 +109,8 @@ impl Node {
     }
 
     /// Returns true if positions of `from` are along the same line: both relays fly between the same sites.
-    #[cfg(feature = "upload")]
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
-        let same = digest == self.member.line();
+        let same = digest == self.layers.update.line(&self.member);
         if !same && self.layers.neighbours.at(side).holds.is_some() {
             bump(&mut self.telemetry.stats.stale);
         } else if !same {
@@ -123,6 +119,7 @@ impl Node {
         same
     }
 
+    #[inline(never)] // called from several places
     fn is_of_mission(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.member.digest;
         if !same {
@@ -152,10 +149,8 @@ impl Node {
                 return;
             }
             Message::Fence { fence, .. } => {
-                let effects = self.steering.handle(side, from, fence);
-                return self.apply(now, effects);
+                return self.steering.handle(side, from, fence);
             }
-            #[cfg(feature = "upload")]
             Message::Offer { upload, answer } => {
                 return self.on_offer(now, side, from, upload, *answer);
             }
@@ -206,7 +201,6 @@ impl Node {
     }
 }
 
-#[cfg(feature = "auth")]
 impl Node {
     /// Handles an authentic frame of node `from` at `side`; after the `first` one, messages are sent again.
     pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {
@@ -394,18 +388,148 @@ impl Node {
         self.member.mission = mission;
         self.member.interference = *mission.interference();
         self.member.active = id;
-        #[cfg(feature = "upload")]
-        {
-            if self.member.fly_between(self.layers.update.sites()) {
+        if UPLOAD {
+            if self.layers.update.fly_between() {
                 self.layers.round.discard_place();
                 self.steering.leave_line(now);
             }
-            self.steering.set_box(self.member.geofence());
+            let fence = self.layers.update.geofence(&self.member);
+            self.steering.set_box(fence);
         }
-        #[cfg(not(feature = "upload"))]
-        let _ = now;
         let common = mission.config().common;
         let profile = self.member.settings.profile.unwrap_or(common);
         self.layers.round.load(profile);
+    }
+}
+
+impl Node {
+    pub(crate) fn hear_duplicate(&mut self, now: Instant, sender: Sender) {
+        let settings = self.member.settings;
+        let shown = match sender {
+            Sender::Itself => false,
+            // Without signatures the frame may be this relay's own, which only a claim can tell.
+            Sender::Unknown => settings.auth.is_some(),
+            Sender::Rival(rival) => rival.is_current,
+        };
+        if shown
+            && self
+                .duplicate
+                .should_report(now, Duplicated::Own, &settings)
+        {
+            let node = self.member.node;
+            self.raise_about(About::Index, Side::Upstream, node);
+            if let Sender::Rival(rival) = sender
+                && rival.newer_epoch
+            {
+                // The other node may be this relay itself, before its epoch went back.
+                self.raise_about(About::Epoch, Side::Upstream, node);
+            }
+        }
+        let placed = self.setpoint().is_some();
+        // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
+        let lease = &self.layers.lease;
+        let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
+        let has_lease = placed && leased;
+        if self.duplicate.hear(now, sender, has_lease, &settings) {
+            self.layers.round.discard_place();
+            if placed {
+                self.raise(Event::SetpointChanged);
+            }
+        }
+    }
+
+    /// Repeats a claim to its sender, or compares an echo; returns false if signed frames replace claims.
+    pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
+        if self.member.settings.auth.is_some() {
+            return false;
+        }
+        if claim.echo {
+            let sender = self.duplicate.rival(claim);
+            if sender != Sender::Itself {
+                self.hear_duplicate(now, sender);
+            }
+        } else if !self.is_passive() {
+            let claim = Claim {
+                echo: true,
+                ..claim
+            };
+            self.echo = Some((side, from, claim));
+        }
+        true
+    }
+
+    pub(super) fn next_claim(&mut self) -> Option<(Side, u16, Message)> {
+        if let Some((side, to, claim)) = self.echo.take() {
+            return Some((side, to, Message::Claim(claim)));
+        }
+        let (side, to) = self.poll_claim()?;
+        let claim = Claim {
+            number: self.duplicate.number(),
+            heard: self.duplicate.heard(),
+            passive: self.is_passive(),
+            echo: false,
+        };
+        Some((side, to, Message::Claim(claim)))
+    }
+
+    /// Returns the destination of a due claim, and marks it as sent.
+    ///
+    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
+    pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
+        if !self.duplicate.poll_claim() {
+            return None;
+        }
+        let side = self.claim_side;
+        self.claim_side = side.other();
+        let nodes = [side, side.other()].map(|side| (side, self.layers.neighbours.at(side).node()));
+        let neighbour = nodes.into_iter().find(|(_, node)| *node != 0);
+        neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
+    }
+
+    /// Returns the claim number if all sessions must be started again with it.
+    pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
+        self.duplicate.poll_sessions()
+    }
+
+    pub(crate) const fn claim_number(&self) -> u32 {
+        self.duplicate.number()
+    }
+
+    /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
+    ///
+    /// Another relay with this number then detects this one even if the chain sends nothing else.
+    pub(crate) fn shows_its_nonce(&self, message: &Message) -> bool {
+        let once = match message {
+            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
+            Message::Pulsed(pulsed) => pulsed.done,
+            _ => false,
+        };
+        once && self.member.settings.wiring == Wiring::Shared
+    }
+
+    pub(crate) fn rival(&self, claim: Claim) -> Sender {
+        self.duplicate.rival(claim)
+    }
+
+    /// Returns true while this relay is passive, because another one has its number.
+    pub(crate) const fn is_passive(&self) -> bool {
+        self.duplicate.is_passive()
+    }
+
+    /// Handles the report that the other relay with this number has been removed.
+    pub(crate) fn clear_duplicate(&mut self, now: Instant) {
+        if self.duplicate.clear(now, &self.member.settings) {
+            self.become_active(now);
+        }
+    }
+
+    /// Becomes active as after a restart: view, lease and proposal may be those of the other node by now.
+    pub(super) fn become_active(&mut self, now: Instant) {
+        self.layers.neighbours.leave();
+        self.layers.lease.leave();
+        if !self.layers.round.is_fresh() {
+            self.layers.round.suspend();
+            self.layers.view.leave(now);
+        }
     }
 }

@@ -1,26 +1,393 @@
 //! Dispatch of messages, timers and effects to the layers.
 //!
-//! [`Node`] is one struct; each file has its methods for one purpose.
+//! [`Node`] is one struct; each file has its methods for one purpose, and this one the state, the layers, and how the effects of one layer
+//! reach the others.
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `state` | state of a relay, its layers, effects of one layer on the others, and search without a quorum |
-//! | `incoming` | received messages: checks, choice of the layer, decisions on views, and results of handshakes |
+//! | `incoming` | received messages: checks, choice of the layer, decisions on views, results of handshakes, claims to this node's number |
 //! | `outgoing` | next message, expired timers, and setpoint |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
-//! | `identity` | duplicates of this relay's node number, and claims to it |
+//!
+//! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved parts,
+//! such as 1 - 3 - 5 and 2 - 4, or a part that has not selected the node toward the rest of the chain, would keep their links
+//! forever. A part without a quorum loses nothing by it.
+
+use crate::event::{About, Event, Pending};
+use crate::geodetic::Sites;
+use crate::mission::Mission;
+use crate::node::context::{Context, Effects, Ignored, Member, News, Peer, first_pass};
+use crate::node::duplicate::DuplicateIndex;
+use crate::node::lease::Lease;
+use crate::node::mission_update::MissionUpdate;
+use crate::node::neighbour::Neighbours;
+use crate::node::round::Round;
+use crate::node::round::state::Phase;
+use crate::node::sample::Sample;
+use crate::node::steering::Steering;
+use crate::node::view::change::ViewChange;
+use crate::node::view::record::{RecordError, ViewRecord};
+use crate::settings::{Identity, Method, Settings};
+use crate::side::Side;
+use crate::stats::{Stats, bump};
+use crate::time::{Duration, Instant};
+use crate::wire::message::Claim;
 
 mod hellos;
-mod identity;
 mod incoming;
-#[cfg(feature = "upload")]
 mod offers;
 mod outgoing;
-mod state;
 
 #[cfg(feature = "upload")]
 #[cfg(test)]
 mod tests;
 
-pub(crate) use state::Node;
+/// Claim to repeat: side, destination node and claim.
+pub(crate) type Echo = (Side, u16, Claim);
+
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub(super) member: Member,
+    pub(super) layers: Layers,
+    pub(super) steering: Steering,
+    pub(super) duplicate: DuplicateIndex,
+    pub(super) adrift: Adrift,
+    /// Received claim that is to be repeated to its sender.
+    pub(super) echo: Option<Echo>,
+    /// Side to which the next claim is sent.
+    pub(super) claim_side: Side,
+    /// Acceptor state that the firmware has confirmed as stored.
+    persisted: ViewRecord,
+    pub(super) telemetry: Telemetry,
+}
+
+fn seed_of(identity: Identity, seed: u32) -> u32 {
+    seed.wrapping_add(u32::from(identity.index))
+}
+
+impl Node {
+    /// Creates a relay before [`begin`](Self::begin), with valid `identity` and `settings`.
+    ///
+    /// The value consists of plain numbers only, so that it is written in place.
+    pub(crate) fn new(
+        mission: &Mission,
+        identity: Identity,
+        settings: &Settings,
+        seed: u32,
+        now: Instant,
+    ) -> Self {
+        let leads = identity.index == mission.leader();
+        let profile = settings.profile.unwrap_or(mission.config().common);
+        let seed = seed_of(identity, seed);
+        let [a, b, ..] = seed.wrapping_mul(0x9E37_79B1).to_le_bytes();
+        let number = u16::from_le_bytes([a, b]);
+        let member = Member::new(*mission, *settings, identity.index);
+        let view = ViewChange::new(member.all, mission.leader(), !seed);
+        Self {
+            persisted: view.record(member.digest),
+            layers: Layers {
+                neighbours: Neighbours::NONE,
+                view,
+                lease: Lease::new(!seed.rotate_left(16), now, settings),
+                update: MissionUpdate::new(&member, seed.rotate_left(4), now),
+                round: Round::new(leads, number, profile, settings, seed, now),
+            },
+            steering: Steering::NONE,
+            duplicate: DuplicateIndex::new(seed.rotate_left(24), now, settings),
+            adrift: Adrift::NONE,
+            echo: None,
+            claim_side: Side::Upstream,
+            telemetry: Telemetry::default(),
+            member,
+        }
+    }
+
+    /// Starts the relay at `now`, with the same `seed` as in [`new`](Self::new).
+    #[inline(never)] // as `Steering::begin`
+    pub(crate) fn begin(&mut self, identity: Identity, seed: u32, now: Instant) {
+        let Member {
+            settings,
+            mission,
+            all,
+            ..
+        } = &self.member;
+        let seed = seed_of(identity, seed);
+        let neighbours = &mut self.layers.neighbours;
+        neighbours.begin(identity.index, *all, seed.rotate_left(8), now, settings);
+        self.steering.begin(settings, neighbours.nodes(), seed, now);
+        let leads = identity.index == mission.leader();
+        if leads || settings.method == Method::Joint {
+            self.layers.round.work_soon(now);
+        }
+        if !leads {
+            self.await_first(now);
+        }
+    }
+
+    pub(super) fn raise(&mut self, event: Event) {
+        self.telemetry.events.raise(event);
+    }
+
+    pub(super) fn raise_about(&mut self, about: About, side: Side, node: u16) {
+        self.telemetry.events.raise_about(about, side, node);
+    }
+
+    /// Applies the effects of one layer to the others, and to events and counters.
+    pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
+        let stats = &mut self.telemetry.stats;
+        for (happened, counter) in [
+            (effects.ignored == Some(Ignored::Stale), &mut stats.stale),
+            (
+                effects.ignored == Some(Ignored::Duplicate),
+                &mut stats.repeated,
+            ),
+            (effects.resent, &mut stats.repeats),
+            (effects.began, &mut stats.sweeps),
+        ] {
+            if happened {
+                bump(counter);
+            }
+        }
+        let (back, onward) = (self.back(), self.onward());
+        if let Some(proposer) = effects.proposed_by {
+            self.layers.neighbours.at_mut(back).proposed_by(proposer);
+        }
+        if let Some((peer, at)) = effects.alive {
+            let side = match peer {
+                Peer::Next => onward,
+                Peer::Previous => back,
+            };
+            self.confirm(now, side, at);
+        }
+        if effects.view_proposed {
+            self.layers.round.suspend();
+        }
+        if effects.view_needed {
+            self.layers.view.asking.ask(now);
+        }
+        match effects.news {
+            Some(News::Lapsed) if core::mem::replace(&mut self.telemetry.told_lapsed, true) => {}
+            Some(News::Lapsed) => self.raise(Event::LeaseLapsed),
+            Some(News::Ask) => {
+                let to = self.layers.neighbours.at(back).node();
+                self.owe_hello(back, to, true);
+            }
+            Some(News::Decided(decided)) => {
+                self.decided(now, decided);
+                self.drift(now);
+            }
+            Some(News::Converged) => {
+                self.raise(Event::Converged);
+                let leads = self.layers.context(now, &self.member).leads();
+                self.layers.lease.begin(now, leads);
+            }
+            Some(News::Infeasible) => self.raise(Event::Infeasible),
+            None => {}
+        }
+        let sensed = effects.sensed;
+        if sensed.believes {
+            self.believe();
+        }
+        if sensed.unclear {
+            self.raise(Event::InterfererUnclear);
+        }
+        if let Some(node) = sensed.off {
+            self.raise_about(About::Sensor, onward, node);
+        }
+    }
+
+    /// Bases the active mission on the new interference estimate.
+    fn believe(&mut self) {
+        let told = self.layers.round.sensing().told();
+        let believing = self
+            .member
+            .mission
+            .believing(self.member.interference, &told.belief);
+        if let Ok(mission) = believing {
+            self.member.mission = mission;
+            self.raise(Event::Believed);
+        }
+    }
+
+    pub(crate) fn poll_event(&mut self) -> Option<Event> {
+        self.telemetry.events.take()
+    }
+
+    /// Returns the expiry of the lease; `None` without one.
+    pub(crate) const fn lease(&self) -> Option<Instant> {
+        self.layers.lease.until()
+    }
+
+    pub(crate) fn phase(&self) -> Phase {
+        if self.layers.view.has_no_quorum() {
+            Phase::NoQuorum
+        } else if self.layers.view.awaited().is_some() {
+            Phase::ViewChange
+        } else {
+            self.layers.round.phase()
+        }
+    }
+
+    pub(crate) const fn member(&self) -> &Member {
+        &self.member
+    }
+
+    /// Returns the sites of the active mission, if it has its own.
+    pub(crate) fn sites(&self) -> Option<Sites> {
+        self.layers.update.sites()
+    }
+
+    pub(crate) fn neighbours(&self) -> [Option<u16>; 2] {
+        self.layers.neighbours.nodes()
+    }
+
+    pub(crate) const fn round(&self) -> &Round {
+        &self.layers.round
+    }
+
+    pub(crate) const fn stats(&self) -> &Stats {
+        &self.telemetry.stats
+    }
+
+    pub(crate) const fn stats_mut(&mut self) -> &mut Stats {
+        &mut self.telemetry.stats
+    }
+
+    /// Returns the acceptor state if it differs from the one that is stored.
+    pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
+        let record = self.layers.view.record(self.member.digest);
+        (record != self.persisted).then_some(record)
+    }
+
+    /// Records that `record` is stored.
+    pub(crate) const fn persisted(&mut self, record: &ViewRecord) {
+        self.persisted = *record;
+    }
+
+    /// Restores the stored acceptor state after a start.
+    pub(crate) fn resume_view(
+        &mut self,
+        now: Instant,
+        record: &ViewRecord,
+    ) -> Result<(), RecordError> {
+        let untouched = self.layers.round.is_untouched();
+        self.layers
+            .view
+            .resume(now, &self.member, record, untouched)?;
+        self.persisted = *record;
+        self.layers.lease.resume(&self.member.settings);
+        Ok(())
+    }
+
+    /// Handles a measurement; counts it if it is rejected.
+    pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
+        if !self.layers.round.handle_sample(now, &self.member, sample) {
+            bump(&mut self.telemetry.stats.samples_refused);
+        }
+    }
+
+    /// Starts the search of targets again; no effect except at the leader with a view.
+    pub(crate) fn restart(&mut self, now: Instant) {
+        let leads = self.member.index == self.member.mission.leader();
+        let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
+        if may && self.layers.view.awaited().is_none() {
+            let context = self.layers.context(now, &self.member);
+            let effects = self.layers.round.restart(&context);
+            self.apply(now, effects);
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Layers {
+    pub(super) neighbours: Neighbours,
+    pub(super) view: ViewChange,
+    pub(super) lease: Lease,
+    pub(super) update: MissionUpdate,
+    pub(super) round: Round,
+}
+
+impl Layers {
+    /// Returns the state that a layer receives. It borrows only `member`, so that each layer can be borrowed mutably meanwhile.
+    pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
+        let onward = Side::onward(member.mission.heading());
+        Context {
+            now,
+            member,
+            latest: self.update.latest(),
+            end: self.neighbours.at(onward).has_no_peer(),
+            held: self.lease.held(now),
+        }
+    }
+
+    /// Schedules outstanding messages again: the next relay can be reached again.
+    pub(super) fn resend(&mut self) {
+        self.view.resend();
+        self.round.resend();
+    }
+}
+
+/// Events and counters for the firmware.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Telemetry {
+    pub(super) events: Pending,
+    pub(super) stats: Stats,
+    /// True once a lease expiry, or a missing quorum, has been reported since the last view.
+    pub(super) told_lapsed: bool,
+    pub(super) told_refused: bool,
+}
+
+/// Multiples of `dead_after` for which a part without a quorum keeps its links: first, and later.
+const FIRST: u32 = 3;
+const MOST: u32 = 4;
+
+/// Timer for dropping the links of a part without a quorum.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Adrift {
+    /// Expiry; `None` with a quorum.
+    at: Option<Instant>,
+    again: bool,
+}
+
+impl Adrift {
+    pub(super) const NONE: Self = Self {
+        at: None,
+        again: false,
+    };
+
+    pub(super) const fn next_timeout(&self) -> Option<Instant> {
+        self.at
+    }
+}
+
+impl Node {
+    /// Starts the timer if this part of the chain has no quorum, and stops it otherwise.
+    pub(super) fn drift(&mut self, now: Instant) {
+        if !self.searches() || !self.layers.view.has_no_quorum() {
+            self.adrift = Adrift::NONE;
+        } else if self.adrift.at.is_none() {
+            self.adrift.at = Some(now + self.keeps_links_for());
+        }
+    }
+
+    /// Returns the time for which links are kept without a quorum.
+    fn keeps_links_for(&self) -> Duration {
+        let settings = &self.member.settings;
+        let times = if self.adrift.again { MOST } else { FIRST };
+        let pass = first_pass(settings, self.member.all);
+        settings.dead_after.times(times).max(pass)
+    }
+
+    /// Drops the links to both neighbours if the timer has expired.
+    pub(super) fn search_anew(&mut self, now: Instant) {
+        if self.adrift.at.is_none_or(|at| now < at) {
+            return;
+        }
+        self.adrift.again = true;
+        self.adrift.at = Some(now + self.keeps_links_for());
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).give_up(now);
+        }
+    }
+}

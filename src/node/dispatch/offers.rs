@@ -1,6 +1,6 @@
 //! Newer missions in flight, exchanged with neighbours and the ground, and measurements from the ground.
 
-use super::state::Node;
+use super::Node;
 use crate::event::Event;
 use crate::node::mission_update::{Offered, takes_uploads};
 use crate::node::sample::Sample;
@@ -31,15 +31,12 @@ impl Node {
                 if self.is_asked(now, *answer) {
                     self.hold(now, upload);
                 }
-                self.layers.neighbours.at_mut(side).ground = true;
+                self.layers.update.answer_ground(side, true, None);
             }
             Message::Hello(hello) => {
                 let is_older = hello.holds < self.layers.update.latest();
-                let neighbour = self.layers.neighbours.at_mut(side);
-                neighbour.ground |= hello.ask;
-                if is_older {
-                    neighbour.ground_asks = hello.nonce;
-                }
+                let asks = is_older.then_some(hello.nonce);
+                self.layers.update.answer_ground(side, hello.ask, asks);
             }
             Message::Level { power_w, .. } => self.handle_sample(
                 now,
@@ -59,12 +56,11 @@ impl Node {
             Side::Upstream => 0,
             Side::Downstream => self.member.all.saturating_add(1),
         };
-        if !core::mem::take(&mut self.layers.neighbours.at_mut(side).ground) {
-            let answer = core::mem::take(&mut self.layers.neighbours.at_mut(side).ground_asks);
-            let upload = *self.layers.update.upload().filter(|_| answer != 0)?;
+        if !self.layers.update.take_report(side) {
+            let (upload, answer) = self.layers.update.take_requested(side)?;
             return Some((to, Message::Offer { upload, answer }));
         }
-        let nonce = self.ask_number(now);
+        let nonce = self.layers.update.ask(now, &self.member);
         let hello = Hello {
             neighbour: 0,
             form: false,
@@ -75,7 +71,7 @@ impl Node {
 
     /// Returns true if `answer` is the number of a recent hello; otherwise it counts the offer as stale.
     fn is_asked(&mut self, now: Instant, answer: u16) -> bool {
-        let asked = self.layers.update.asked(answer, now, &self.member.settings);
+        let asked = self.layers.update.asked(answer, now, &self.member);
         if !asked {
             bump(&mut self.telemetry.stats.stale);
         }
@@ -131,7 +127,7 @@ impl Node {
         self.raise(Event::Uploaded);
         // The leader needs the mission to propose it, and the other relays before the proposal reaches them.
         for side in [Side::Upstream, Side::Downstream] {
-            self.layers.neighbours.at_mut(side).offer = true;
+            self.layers.update.offer(side);
             self.layers.update.begin_offers(side);
         }
         self.layers.view.asking.ask(now);
@@ -187,7 +183,7 @@ impl Node {
         if holds > latest {
             self.owe_hello(side, from, false);
         } else if holds < latest {
-            self.layers.neighbours.at_mut(side).offer = true;
+            self.layers.update.offer(side);
         } else if self.layers.neighbours.at(side).holds != Some(latest)
             && side == self.onward()
             && self
@@ -203,30 +199,16 @@ impl Node {
 
     /// Returns the pending offer to the neighbour at `side`; without a recent hello to answer, a hello that requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
-        let neighbour = self.layers.neighbours.at_mut(side);
-        let due = core::mem::take(&mut neighbour.offer);
-        let (to, holds, answer) = (neighbour.node(), neighbour.holds, neighbour.asked);
-        let upload = self.layers.update.offer_to(holds)?;
-        if !due || to == 0 {
-            return None;
-        }
-        let settings = &self.member.settings;
-        self.layers.update.offered(side, now, settings);
-        let message = if self.layers.update.has_asked(side, now, settings) {
+        let neighbour = self.layers.neighbours.at(side);
+        let (to, holds) = (neighbour.node(), neighbour.holds);
+        let update = &mut self.layers.update;
+        let (upload, answer) = update.take_offer((side, to), holds, now, &self.member)?;
+        let message = if let Some(answer) = answer {
             Message::Offer { upload, answer }
         } else {
-            let nonce = self.ask_number(now);
+            let nonce = update.ask(now, &self.member);
             Message::Hello(self.hello(now, side, true, nonce))
         };
         Some((side, to, message))
-    }
-
-    /// Schedules an offer again to a neighbour that has not reported the mission in time.
-    pub(super) fn offer_again(&mut self, now: Instant) {
-        for side in [Side::Upstream, Side::Downstream] {
-            if self.layers.update.offers_again(side, now) {
-                self.layers.neighbours.at_mut(side).offer = true;
-            }
-        }
     }
 }

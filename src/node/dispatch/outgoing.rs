@@ -1,11 +1,11 @@
 //! Output of a relay: the next message in order of urgency, expired timers, and the setpoint.
 
-use super::state::Node;
+use super::Node;
 use crate::event::{About, Event};
 use crate::guard::HoldReason;
 use crate::node::context::Member;
+use crate::node::context::first_pass;
 use crate::node::neighbour::liveness::patient_tick;
-use crate::node::timing::first_pass;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -38,7 +38,6 @@ impl Node {
         if let Some((side, to, hello)) = self.next_hello(now) {
             return Some((side, to, Message::Hello(hello)));
         }
-        #[cfg(feature = "upload")]
         for side in [Side::Upstream, Side::Downstream] {
             if let Some(offer) = self.next_offer(now, side) {
                 return Some(offer);
@@ -48,7 +47,7 @@ impl Node {
             }
         }
         let (side, to, fence) = self.steering.poll_transmit()?;
-        let mission = self.member.line();
+        let mission = self.layers.update.line(&self.member);
         Some((side, to, Message::Fence { mission, fence }))
     }
 
@@ -68,14 +67,11 @@ impl Node {
         if let Some((to, _)) = next
             && let Some(message) = layers.view.take_onward(&context, to)
         {
-            #[cfg(feature = "upload")]
-            {
-                let holds = layers.neighbours.at(onward).holds;
-                if layers.update.offer_to(holds).is_some() {
-                    layers.neighbours.at_mut(onward).offer = true;
-                    layers.update.begin_offers(onward);
-                    return self.next_offer(now, onward);
-                }
+            let holds = layers.neighbours.at(onward).holds;
+            if layers.update.offer_to(holds).is_some() {
+                layers.update.offer(onward);
+                layers.update.begin_offers(onward);
+                return self.next_offer(now, onward);
             }
             return Some((onward, to, message));
         }
@@ -207,8 +203,7 @@ impl Node {
             let effects = self.layers.view.handle_timeout(&context, leads, fresh);
             self.apply(now, effects);
         }
-        #[cfg(feature = "upload")]
-        self.offer_again(now);
+        self.layers.update.handle_timeout(now);
         self.steering.handle_timeout(now);
         self.steer(now);
     }
@@ -225,7 +220,6 @@ impl Node {
             self.layers.round.next_timeout(),
             self.steering.next_timeout(),
             self.adrift.next_timeout(),
-            #[cfg(feature = "upload")]
             self.layers.update.next_timeout(),
         ]
         .into_iter()

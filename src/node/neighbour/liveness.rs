@@ -14,7 +14,7 @@
 //! choose their positions jointly compute at the same time and send nothing meanwhile. The silence of a neighbour in the same
 //! view therefore counts from the end of this relay's own computation.
 
-use crate::node::timing::longest_lease;
+use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 

@@ -12,7 +12,7 @@ pub(crate) mod hearing;
 pub(crate) mod liveness;
 pub(crate) mod state;
 
-use super::timing::earliest;
+use super::context::earliest;
 use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::Instant;

@@ -28,7 +28,7 @@ use super::hearing::Hellos;
 use super::hearing::{CANDIDATES, Hearing, InRow, ToldOf, mask};
 use super::liveness::{Liveness, patience, tick};
 use crate::node::context::Proposer;
-use crate::node::timing::{first_pass, longest_lease};
+use crate::node::context::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant, Jitter};
 use crate::wire::digest::MissionId;
@@ -79,7 +79,6 @@ pub(crate) struct Neighbour {
     /// Nodes of another mission.
     pub(super) strangers: ToldOf,
     /// Consecutive handshakes with each node's index that were signed with another key.
-    #[cfg(feature = "auth")]
     pub(super) forged: InRow,
     /// Interval between questions.
     tick: Duration,
@@ -89,18 +88,6 @@ pub(crate) struct Neighbour {
     pub(super) signs: Signs,
     /// Newest mission of the selected node, as far as it has reported.
     pub(crate) holds: Option<MissionId>,
-    /// Number of its last hello, which an offer of a mission answers; 0 before any.
-    #[cfg(feature = "upload")]
-    pub(crate) asked: u16,
-    /// True if a newer mission is to be offered to it.
-    #[cfg(feature = "upload")]
-    pub(crate) offer: bool,
-    /// True if a hello to the ground station on this side is pending.
-    #[cfg(feature = "upload")]
-    pub(crate) ground: bool,
-    /// Number of the ground station's hello that requests the upload held here; 0 for none.
-    #[cfg(feature = "upload")]
-    pub(crate) ground_asks: u16,
     /// Time of the next check for a sign of life.
     look_at: Option<Instant>,
     pub(super) hellos: Hellos,
@@ -125,21 +112,12 @@ impl Neighbour {
         unheard: InRow::NONE,
         found: 0,
         strangers: ToldOf::NONE,
-        #[cfg(feature = "auth")]
         forged: InRow::NONE,
         tick: Duration::from_micros(0),
         patience: Duration::from_micros(0),
         jitter: Jitter::NONE,
         signs: Signs::NONE,
         holds: None,
-        #[cfg(feature = "upload")]
-        asked: 0,
-        #[cfg(feature = "upload")]
-        offer: false,
-        #[cfg(feature = "upload")]
-        ground: false,
-        #[cfg(feature = "upload")]
-        ground_asks: 0,
         look_at: None,
         hellos: Hellos::NONE,
     };
@@ -578,7 +556,6 @@ impl Signs {
 const UNHEARD: u8 = 8;
 
 /// Consecutive handshakes with a node's index that are signed with another key.
-#[cfg(feature = "auth")]
 const FORGED: u8 = 3;
 
 impl Neighbour {
@@ -648,13 +625,11 @@ impl Neighbour {
     }
 
     /// Counts a handshake that was signed with another key; returns true at the last of [`FORGED`] in a row.
-    #[cfg(feature = "auth")]
     pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
 
     /// Resets the count: the node `distance` places away has the key.
-    #[cfg(feature = "auth")]
     pub(crate) fn is_signed_right(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }

@@ -55,7 +55,8 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    pub(super) sweeps: u32,
+    /// True once a pass has started here, until that is reported.
+    pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
     /// Profiles of the relays of this view.
@@ -89,7 +90,7 @@ impl Computation {
             state: RoundState::new(if leader { Phase::Planning } else { Phase::Idle }, number),
             pass: PassKind::Sweep(Sweeping::new(Ladder::single(1.0))),
             task: LeaderTask::No,
-            sweeps: 0,
+            began: false,
             profile,
             seats: Seats::UNKNOWN,
             chosen: None,
@@ -541,6 +542,6 @@ impl Computation {
 
     pub(super) fn begin(&mut self) {
         self.state.begin();
-        self.sweeps = self.sweeps.saturating_add(1);
+        self.began = true;
     }
 }

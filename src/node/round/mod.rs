@@ -24,9 +24,9 @@ mod tests;
 mod turn;
 
 use super::circulation::{Circulation, Path, Reply};
-use super::context::{Context, Effects, Member};
+use super::context::{Context, Effects, Member, News, Peer};
+use super::context::{PAUSE, earliest};
 use super::sample::{Meter, Sample};
-use super::timing::{PAUSE, earliest};
 use crate::mission::Profile;
 use crate::place::Placement;
 use crate::settings::Settings;
@@ -89,9 +89,15 @@ impl Round {
             _ => return Effects::NONE,
         };
         let state = computation.state;
+        let alive = if state.answers(before) {
+            forwarded_at.map(|at| (Peer::Next, at))
+        } else {
+            replied_at
+                .filter(|_| state.follows(before))
+                .map(|at| (Peer::Previous, at))
+        };
         Effects {
-            heard_onward: forwarded_at.filter(|_| state.answers(before)),
-            heard_back: replied_at.filter(|_| state.follows(before)),
+            alive,
             ..self.proceed_with(context, next, found)
         }
     }
@@ -100,34 +106,25 @@ impl Round {
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
-        if SENSING
+        let found = self.computation.sensing.found();
+        let next = if SENSING
             && self.computation.sensing.take_due(context.now)
             && self.computation.may_sense(context)
         {
-            let found = self.computation.sensing.found();
-            let next = self.computation.begin_sense(context);
-            return Effects {
-                resent,
-                began: true,
-                ..self.proceed_with(context, next, found)
-            };
-        }
-        if self.work_at.is_none_or(|at| at > context.now) {
+            self.computation.begin_sense(context)
+        } else if self.work_at.is_some_and(|at| at <= context.now) {
+            self.work_at = None;
+            self.computation.work(context)
+        } else {
             return Effects {
                 resent,
                 ..Effects::NONE
             };
-        }
-        self.work_at = None;
-        let sweeps = self.computation.sweeps;
-        let found = self.computation.sensing.found();
-        let next = self.computation.work(context);
-        let began = self.computation.sweeps != sweeps;
-        let effects = self.proceed_with(context, next, found);
+        };
         Effects {
             resent,
-            began,
-            ..effects
+            began: core::mem::take(&mut self.computation.began),
+            ..self.proceed_with(context, next, found)
         }
     }
 
@@ -140,9 +137,7 @@ impl Round {
         self.computation.plan_to_sense(context);
         let found = self.computation.sensing.found();
         Effects {
-            believes: found.told != before.told,
-            unclear: found.unfit.is_some() && found.unfit != before.unfit,
-            off: found.newly_off(&before, context.member.node, context.member.all),
+            sensed: found.since(&before, context.member),
             ..effects
         }
     }
@@ -169,7 +164,7 @@ impl Round {
             Action::Repeat => {
                 let path = context.path_to_leader();
                 self.circulation.on_duplicate(context.now, path);
-                Effects::REPEATED
+                Effects::DUPLICATE
             }
             Action::Answer { agreed } => {
                 let path = context.path_to_leader();
@@ -179,9 +174,10 @@ impl Round {
                 if self.computation.is_solving(context) {
                     self.work_soon(context.now);
                 }
-                Effects {
-                    converged: agreed,
-                    ..Effects::NONE
+                if agreed {
+                    Effects::of(News::Converged)
+                } else {
+                    Effects::NONE
                 }
             }
             Action::Settled => {
@@ -190,10 +186,7 @@ impl Round {
             }
             Action::Infeasible => {
                 self.circulation.close();
-                Effects {
-                    infeasible: true,
-                    ..Effects::NONE
-                }
+                Effects::of(News::Infeasible)
             }
         }
     }

@@ -14,14 +14,14 @@
 
 use super::computation::{Computation, PassKind};
 use super::state::{Action, Phase};
-use crate::node::context::{Context, Member};
+use crate::node::context::PAUSE;
+use crate::node::context::{Context, Member, Sensed};
 use crate::node::sample::Sample;
-use crate::node::timing::PAUSE;
 use crate::place::Placement;
 use crate::sensing::belief::{Belief, Knowledge, Spread, Told, review};
 use crate::sensing::doubt::{Next, Trial, is_absurd, is_deaf, is_off};
 use crate::sensing::fit::{Unfit, expected_at};
-use crate::sensing::listener::{Average, Listener, left};
+use crate::sensing::sums::{Average, Listener, left};
 use crate::sensing::sums::{EndsOff, Level, Levels, Sums, UNIT_W, is_level, terms};
 use crate::settings::Listen;
 use crate::side::Side;
@@ -539,18 +539,22 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Returns the node found faulty since `before`; 0 is the transmitter, `all` + 1 the receiver.
-    pub(super) fn newly_off(&self, before: &Self, own: u16, all: u16) -> Option<u16> {
-        if self.off != before.off && self.off != 0 {
-            return Some(self.off);
+    /// Returns what has changed since `before`. Of the faulty nodes, 0 is the transmitter and `all` + 1 the receiver.
+    pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
+        let off = if self.off != before.off && self.off != 0 {
+            Some(self.off)
+        } else if self.deaf && !before.deaf {
+            Some(member.node)
+        } else if self.ends.receiver && !before.ends.receiver {
+            Some(member.all.saturating_add(1))
+        } else {
+            (self.ends.transmitter && !before.ends.transmitter).then_some(0)
+        };
+        Sensed {
+            believes: self.told != before.told,
+            unclear: self.unfit.is_some() && self.unfit != before.unfit,
+            off,
         }
-        if self.deaf && !before.deaf {
-            return Some(own);
-        }
-        if self.ends.receiver && !before.ends.receiver {
-            return Some(all.saturating_add(1));
-        }
-        (self.ends.transmitter && !before.ends.transmitter).then_some(0)
     }
 }
 

@@ -16,7 +16,7 @@
 //! agreement it has work to do. A pass with a number just below the current one is stale in every phase. Only an agreement or a
 //! turn of Algorithm 2 changes the setpoint. In `Holding` and `Infeasible` the leader may still start a sensing pass.
 
-use crate::node::numbering::Stragglers;
+use crate::node::circulation::Stragglers;
 
 /// State of a relay in the protocol.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -233,7 +233,7 @@ impl RoundState {
 #[cfg(test)]
 mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
-    use crate::node::numbering::SUSPICIOUS;
+    use crate::node::circulation::SUSPICIOUS;
 
     /// Returns a state after pass 200.
     fn begun() -> RoundState {

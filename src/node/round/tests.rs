@@ -8,7 +8,7 @@ use super::computation::PassKind;
 use super::state::Phase;
 use crate::mission::Mission;
 use crate::mission::tests::paper;
-use crate::node::context::{Context, Effects, Member};
+use crate::node::context::{Context, Effects, Member, Peer};
 use crate::node::view::electorate::Held;
 use crate::optimiser::search::Schedule;
 use crate::settings::{Adjust, Listen, Method, Settings};
@@ -145,7 +145,10 @@ fn a_relay_that_still_searches_hands_on_no_token() {
 }
 
 fn heard(effects: Effects) -> [Option<Instant>; 2] {
-    [effects.heard_onward, effects.heard_back]
+    [Peer::Next, Peer::Previous].map(|of| {
+        let alive = effects.alive.filter(|(peer, _)| *peer == of);
+        alive.map(|(_, at)| at)
+    })
 }
 
 #[test]
@@ -178,7 +181,7 @@ fn an_answer_counts_from_when_what_it_answers_was_said_and_nothing_that_comes_ag
         handed_back = Some(line.now);
         assert_eq!(heard(line.hear(1, &verdict)), [None; 2]);
         let answer = line.back(1);
-        assert!(line.hear(0, &answer).heard_onward.is_some());
+        assert!(line.hear(0, &answer).alive.is_some());
         (old_sweep, old_verdict) = (Some(pass), Some(verdict));
     }
 }

@@ -12,16 +12,16 @@
 //! again after `probe_after` or later ([`Asking`]), and a leader without neighbours only if its own vote would suffice. A
 //! proposal is bound to the node that it was forwarded to: if that neighbour is lost or replaced, this relay requests a later
 //! view.
+//!
+//! A view is requested at once at first, then less and less often.
 
-use super::asking::Asking;
-use super::electorate;
-use super::electorate::{Electorate, Outcome};
-use super::record::{RecordError, ViewRecord};
-use crate::node::circulation::{Circulation, Reply};
-use crate::node::context::{Context, Decided, Effects, Member, Proposer};
-use crate::node::numbering::Stragglers;
-use crate::node::timing::earliest;
-use crate::time::Instant;
+use crate::node::circulation::{Circulation, Reply, Stragglers};
+use crate::node::context::{Context, Decided, Effects, Member, News, PAUSE, Proposer, earliest};
+use crate::node::view::electorate;
+use crate::node::view::electorate::{Electorate, Outcome};
+use crate::node::view::record::{RecordError, ViewRecord};
+use crate::settings::Settings;
+use crate::time::{Duration, Instant, Jitter};
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
@@ -179,17 +179,10 @@ impl ViewChange {
                 && known.mission_id == proposal.mission_id
                 && known.place == proposal.place.saturating_add(1)
         });
-        let from = Effects {
-            proposed_by: Some(Proposer::Neighbour),
-            ..Effects::NONE
-        };
         if again {
             let path = context.path(proposal.place);
             self.circulation.on_duplicate(context.now, path);
-            return Effects {
-                repeated: true,
-                ..from
-            };
+            return Effects::DUPLICATE.by(Proposer::Neighbour);
         }
         let told = Some(proposal.poll);
         let effects = self.propose(
@@ -200,10 +193,7 @@ impl ViewChange {
             told,
         );
         if let Some(effects) = effects {
-            return Effects {
-                proposed_by: from.proposed_by,
-                ..effects
-            };
+            return effects.by(Proposer::Neighbour);
         }
         // The proposal is late, or its leader has missed a later one.
         if self.stragglers.one_more() {
@@ -211,15 +201,9 @@ impl ViewChange {
             if let Some(later) = self.newest.next_by(context.member.node) {
                 self.heard_of(later);
             }
-            return Effects {
-                proposed_by: from.proposed_by,
-                ..Effects::FOREIGN
-            };
+            return Effects::FOREIGN.by(Proposer::Neighbour);
         }
-        Effects {
-            stale: true,
-            ..from
-        }
+        Effects::STALE.by(Proposer::Neighbour)
     }
 
     /// Votes on a proposal that `place` relays have forwarded; `None` if this relay has promised a later one.
@@ -369,18 +353,14 @@ impl ViewChange {
                 self.wait_after_refusal(context);
             }
         }
-        let came = match decided {
+        Effects::of(News::Decided(match decided {
             Some(view) if view.id == proposal => Decided::Granted {
                 relays: view.relays,
                 lease_left,
             },
             Some(_) => Decided::Earlier,
             None => Decided::Refused,
-        };
-        Effects {
-            decided: Some(came),
-            ..Effects::NONE
-        }
+        }))
     }
 }
 
@@ -469,10 +449,7 @@ impl ViewChange {
             return Effects::NONE;
         }
         if !leads {
-            return Effects {
-                ask: true,
-                ..Effects::NONE
-            };
+            return Effects::of(News::Ask);
         }
         let under_way = self.awaited().is_some_and(|proposed| {
             proposed.view >= self.newest && proposed.mission_id == context.latest
@@ -499,8 +476,7 @@ impl ViewChange {
         };
         Effects {
             began: true,
-            proposed_by: Some(Proposer::Itself),
-            ..effects
+            ..effects.by(Proposer::Itself)
         }
     }
 
@@ -537,4 +513,127 @@ pub(super) struct Conclusion {
     pub(super) base: View,
     pub(super) view: Option<View>,
     pub(super) lease_left: u16,
+}
+
+/// State of this relay's view request, and the time of the next one.
+#[derive(Clone, Debug)]
+pub(crate) struct Asking {
+    asks: bool,
+    /// Number of requests so far.
+    tries: u8,
+    at: Option<Instant>,
+    /// Consecutive refusals, and the earliest time of the next request if anything changes.
+    refusals: u8,
+    soon: Option<Instant>,
+    jitter: Jitter,
+}
+
+/// Maximum doublings of the wait after consecutive refusals.
+const DOUBLINGS: u8 = 3;
+
+impl Asking {
+    pub(super) const fn new(seed: u32) -> Self {
+        Self {
+            asks: false,
+            tries: 0,
+            at: None,
+            refusals: 0,
+            soon: None,
+            jitter: Jitter::new(seed),
+        }
+    }
+
+    pub(crate) const fn asks(&self) -> bool {
+        self.asks
+    }
+
+    /// Requests a view until it comes. After a refusal, a change shortens the wait.
+    pub(crate) fn ask(&mut self, now: Instant) {
+        if !self.asks {
+            self.ask_anew(now);
+        } else if let Some(soon) = self.soon.take() {
+            self.refusals = 0;
+            let soon = soon.max(now + PAUSE);
+            self.at = Some(self.at.map_or(soon, |at| at.min(soon)));
+        }
+    }
+
+    /// Requests a view at once and resets all waits, because new information is available.
+    #[inline(never)] // called from many places
+    pub(crate) fn ask_anew(&mut self, now: Instant) {
+        self.asks = true;
+        self.tries = 0;
+        self.refusals = 0;
+        self.soon = None;
+        self.at = Some(now + PAUSE);
+    }
+
+    /// Repeats a pending request at once, because the neighbours are now certain.
+    pub(crate) fn hasten(&mut self, now: Instant) {
+        if self.asks {
+            self.ask_anew(now);
+        }
+    }
+
+    /// Requests a view after about `wait`, doubled up to three times by consecutive refusals; after `wait` if anything changes.
+    pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
+        self.asks = true;
+        let wait = self.jitter.spread(wait);
+        self.soon = Some(now + wait);
+        self.at = Some(now + wait.times(1 << self.refusals.min(DOUBLINGS)));
+        self.refusals = self.refusals.saturating_add(1);
+    }
+
+    /// Ends the request: a view has come.
+    pub(super) const fn stop(&mut self) {
+        self.asks = false;
+        self.at = None;
+        self.soon = None;
+    }
+
+    /// Expects the first pass by `at`; without it, a view is requested.
+    pub(crate) const fn await_first(&mut self, at: Instant) {
+        self.at = Some(at);
+    }
+
+    /// Returns true if the request timer has expired.
+    pub(crate) fn is_due(&self, now: Instant) -> bool {
+        self.at.is_some_and(|at| at <= now)
+    }
+
+    /// Handles the expired timer; returns true if a request is due. `fresh`: nothing was received since start-up, so one is due.
+    pub(super) fn take_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
+        self.at = None;
+        if !self.asks {
+            if !fresh {
+                return false;
+            }
+            self.asks = true;
+            self.tries = 0;
+        }
+        self.soon = None;
+        self.at = Some(now + self.patience(settings));
+        true
+    }
+
+    /// Returns the wait until the next request, doubled each time, up to `probe_after`.
+    fn patience(&mut self, settings: &Settings) -> Duration {
+        let wait = settings.hop_time.times(8 << self.tries.min(12));
+        self.tries = self.tries.saturating_add(1);
+        wait.min(settings.probe_after)
+    }
+
+    pub(super) const fn next_timeout(&self) -> Option<Instant> {
+        self.at
+    }
+
+    /// Creates a pending request that is due at `at`.
+    #[cfg(test)]
+    pub(super) const fn due(at: Instant) -> Self {
+        Self {
+            asks: true,
+            at: Some(at),
+            ..Self::new(1)
+        }
+    }
 }

@@ -38,7 +38,7 @@
 //! view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it decides beside
 //! the two that remember. A relay that loses its record during a proposal may also forward the proposal on a second route.
 
-use crate::node::timing::tenths;
+use crate::node::context::tenths;
 use crate::time::Duration;
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};

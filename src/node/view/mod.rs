@@ -24,13 +24,11 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | [`change`] | states of a proposal and its decision, their messages and timers |
-//! | [`asking`] | timing of view requests |
+//! | [`change`] | states of a proposal and its decision, their messages and timers, and the timing of view requests |
 //! | [`electorate`] | rules of voting and acceptor state |
 //! | [`record`] | persistent acceptor state |
 //! | `model` | test: exhaustive search of the events in a chain of three or four |
 
-pub(crate) mod asking;
 pub(crate) mod change;
 pub(crate) mod electorate;
 #[cfg(test)]

@@ -15,17 +15,6 @@
 //! optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise but
 //! [`without_interferer::best_in_noise`], which has its own.
 
-#![cfg_attr(
-    not(feature = "internals"),
-    allow(
-        dead_code,
-        unused_imports,
-        clippy::trivially_copy_pass_by_ref,
-        unreachable_pub,
-        reason = "the tests of this workspace use these items through the feature `internals`"
-    )
-)]
-
 pub mod aside;
 mod edge;
 pub mod theorems;

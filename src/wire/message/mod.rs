@@ -1,37 +1,26 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
-//! Each kind of message has one file with its type, its encoder and its decoder, which checks all ranges: a decoded message has
-//! no invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
+//! Each kind of message has its type, its encoder and its decoder beside each other: in `round` those of passes, in `view` those of view
+//! changes and leases, in `link` those between two neighbours, in `offer` uploads. A decoder checks all ranges: a decoded message has no
+//! invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
 //! shared parts.
 
-mod claim;
-mod fence;
-mod hearing;
-mod hello;
-#[cfg(feature = "upload")]
-mod level;
+mod link;
 #[cfg(feature = "upload")]
 mod offer;
 mod parts;
-mod pulse;
-mod roster;
-mod sweep;
-mod turn;
+mod round;
 mod view;
 
-pub use self::claim::Claim;
-pub use self::hearing::Heard;
-pub use self::hello::Hello;
+pub use self::link::{Claim, Hello};
 pub use self::parts::MessageError;
-pub use self::pulse::{Pulse, Pulsed};
-pub use self::roster::{MOST_NAMED, OwnSeat, OwnSeats, Roster};
-pub use self::sweep::{Answer, Sweep};
-pub use self::turn::{AdjustStep, Moved, Token};
-pub use self::view::{Decision, Poll, Proposal, Successor};
+pub use self::round::{
+    AdjustStep, Answer, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, Token,
+};
+pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
 
 use self::parts::{Word, read, tag, write};
-#[cfg(feature = "upload")]
-use super::upload::Upload;
+use super::upload::{UPLOAD as UPLOADS, Upload};
 use crate::guard::Fence;
 
 /// Maximum body of a sweep: sixteen targets with a measured field or with a lateral offset.
@@ -39,7 +28,7 @@ const SWEEP: usize = 88;
 
 /// Maximum body except for an offer: measurements, or without the feature `sensing` a sweep.
 const LONG: usize = if cfg!(feature = "sensing") {
-    hearing::LENGTH
+    round::HEARD
 } else {
     SWEEP
 };
@@ -48,14 +37,13 @@ const LONG: usize = if cfg!(feature = "sensing") {
 #[cfg(feature = "upload")]
 pub use self::offer::UPLOAD;
 
-/// Maximum body: an offer.
+/// Maximum body: an offer, measurements, or without those features a sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
     offer::LENGTH
 } else {
     LONG
 };
-/// Maximum body: measurements, or without the feature `sensing` a sweep.
 #[cfg(not(feature = "upload"))]
 pub const MAX_BODY: usize = LONG;
 
@@ -110,7 +98,6 @@ pub enum Message {
         fence: Fence,
     },
     /// Either direction, also from the ground: a mission that is newer than the destination's.
-    #[cfg(feature = "upload")]
     Offer {
         /// Uploaded mission.
         upload: Upload,
@@ -118,7 +105,6 @@ pub enum Message {
         answer: u16,
     },
     /// Ground to relay: interference level at that end of the chain.
-    #[cfg(feature = "upload")]
     Level {
         /// Digest of the mission loaded before flight.
         mission: u16,
@@ -136,7 +122,9 @@ impl Message {
             Self::Sweep(sweep) => Some(sweep.mission),
             Self::Verdict(answer) => Some(answer.mission),
             Self::Busy { .. } | Self::Claim(_) => None,
-            Self::Heartbeat { mission, .. } | Self::Fence { mission, .. } => Some(*mission),
+            Self::Heartbeat { mission, .. }
+            | Self::Fence { mission, .. }
+            | Self::Level { mission, .. } => Some(*mission),
             Self::Pulse(pulse) => Some(pulse.mission),
             Self::Pulsed(pulsed) => Some(pulsed.mission),
             Self::Gather(roster) | Self::Gathered(roster) => Some(roster.mission),
@@ -146,10 +134,7 @@ impl Message {
             Self::Hello(hello) => Some(hello.mission),
             Self::Proposal(proposal) => Some(proposal.mission_id.digest),
             Self::Decision(count) => Some(count.mission_id.digest),
-            #[cfg(feature = "upload")]
             Self::Offer { upload, .. } => Some(upload.base()),
-            #[cfg(feature = "upload")]
-            Self::Level { mission, .. } => Some(*mission),
         }
     }
 
@@ -198,8 +183,7 @@ impl Message {
             // Messages of a missing feature are never sent.
             Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
             Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
-            #[cfg(feature = "upload")]
-            Self::Level { .. } if !cfg!(feature = "sensing") => None,
+            Self::Level { .. } if !(cfg!(feature = "sensing") && UPLOADS) => None,
             Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
@@ -224,11 +208,12 @@ impl Message {
             Self::Hello(hello) => hello.encode(buffer),
             Self::Proposal(proposal) => proposal.encode(buffer),
             Self::Decision(decision) => decision.encode(buffer),
-            Self::Fence { mission, fence } => fence::encode(*mission, fence, buffer),
+            Self::Fence { mission, fence } => link::encode_fence(*mission, fence, buffer),
             #[cfg(feature = "upload")]
             Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
-            #[cfg(feature = "upload")]
-            Self::Level { mission, power_w } => level::encode(*mission, *power_w, buffer),
+            #[cfg(not(feature = "upload"))]
+            Self::Offer { upload, .. } => match *upload {},
+            Self::Level { mission, power_w } => round::encode_level(*mission, *power_w, buffer),
             Self::Claim(claim) => claim.encode(buffer),
         }
     }
@@ -247,8 +232,7 @@ impl Message {
                 Err(MessageError::Value)
             }
             tag::SENSE | tag::SENSED if !cfg!(feature = "sensing") => Err(MessageError::Value),
-            #[cfg(feature = "upload")]
-            tag::LEVEL if !cfg!(feature = "sensing") => Err(MessageError::Value),
+            tag::LEVEL if UPLOADS && !cfg!(feature = "sensing") => Err(MessageError::Value),
             tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
             tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
@@ -278,7 +262,7 @@ impl Message {
             tag::PROPOSAL => Proposal::decode(body).map(Self::Proposal),
             tag::DECISION => Decision::decode(body).map(Self::Decision),
             tag::FENCE => {
-                let (mission, fence) = fence::decode(body)?;
+                let (mission, fence) = link::decode_fence(body)?;
                 Ok(Self::Fence { mission, fence })
             }
             #[cfg(feature = "upload")]
@@ -286,9 +270,8 @@ impl Message {
                 let (upload, answer) = offer::decode(body)?;
                 Ok(Self::Offer { upload, answer })
             }
-            #[cfg(feature = "upload")]
-            tag::LEVEL => {
-                let (mission, power_w) = level::decode(body)?;
+            tag::LEVEL if UPLOADS => {
+                let (mission, power_w) = round::decode_level(body)?;
                 Ok(Self::Level { mission, power_w })
             }
             tag::CLAIM => Claim::decode(body).map(Self::Claim),

@@ -24,13 +24,11 @@ pub(super) mod tag {
     pub(crate) const PROPOSAL: u8 = 11;
     pub(crate) const DECISION: u8 = 12;
     pub(crate) const FENCE: u8 = 13;
-    #[cfg(feature = "upload")]
     pub(crate) const OFFER: u8 = 14;
     pub(crate) const PULSE: u8 = 15;
     pub(crate) const PULSED: u8 = 16;
     pub(crate) const SENSE: u8 = 17;
     pub(crate) const SENSED: u8 = 18;
-    #[cfg(feature = "upload")]
     pub(crate) const LEVEL: u8 = 19;
     pub(crate) const CLAIM: u8 = 20;
 }

@@ -1,11 +1,11 @@
-//! Proposal of a new view of the chain, and its decision, which travels back.
+//! Messages of a view: its proposal and decision, and the renewals of its lease.
 
 use serde::{Deserialize, Serialize};
 
-use super::parts::{MessageError, Word, read, tag, write};
 use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
+use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
 /// Proposal of a new view; sent onward from relay to relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -249,6 +249,66 @@ impl Decision {
             base,
             view,
             lease_left,
+        })
+    }
+}
+
+/// Lease renewal by the view's leader; sent onward.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pulse {
+    /// Number of the renewal, wrapping: all members have taken part in the one before.
+    pub number: u16,
+    /// Digest of the mission and the view.
+    pub mission: u16,
+    /// Duration of the lease after a member has taken part in a renewal, in tenths of a second: 1 to 65535.
+    pub lease: u16,
+}
+
+/// Acknowledgement of a lease renewal; sent back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pulsed {
+    /// Number of the renewal.
+    pub number: u16,
+    /// Digest of the mission and the view.
+    pub mission: u16,
+    /// True if the renewal has reached the last relay and has been acknowledged by it.
+    pub done: bool,
+}
+
+impl Pulse {
+    pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        write(&(tag::PULSE, pass, Word::new(self.lease)), buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, lease): (PassId, Word) = read(body)?;
+        let lease = lease.number();
+        if lease == 0 {
+            return Err(MessageError::Value);
+        }
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            lease,
+        })
+    }
+}
+
+impl Pulsed {
+    pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        write(&(tag::PULSED, pass, self.done), buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, done): (PassId, bool) = read(body)?;
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            done,
         })
     }
 }

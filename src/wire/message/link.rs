@@ -1,9 +1,11 @@
-//! Hello: a node's state of the chain.
+//! Messages outside of views: hello, claim to a node number, and fence between two neighbours.
 
-use super::parts::{MessageError, Word, read, tag, write};
+use crate::guard::Fence;
 use crate::mission::MAX_RELAYS;
+use crate::place::CrossSection;
 use crate::view::ViewId;
 use crate::wire::digest::MissionId;
+use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
 /// State of the chain as seen by one node, for another node.
 #[expect(
@@ -109,5 +111,71 @@ impl Hello {
                 digest: digest.number(),
             },
         })
+    }
+}
+
+/// Claim of the sender to its node number since its start, or the repetition of such a claim; sent in both directions.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Claim {
+    /// Claim number of the node: drawn at its start, raised at most once while it is active.
+    pub number: u32,
+    /// Last claim number received under the node's own number from another node; 0 for none.
+    pub heard: u32,
+    /// True if the node is passive because another node uses its number.
+    pub passive: bool,
+    /// True if the sender repeats what it received under the destination's number.
+    pub echo: bool,
+}
+
+impl Claim {
+    /// Encodes the claim; flags from bit 0: passive, echo.
+    pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
+        let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
+        let numbers = [self.number, self.heard].map(u32::to_le_bytes);
+        write(&(tag::CLAIM, numbers, flags), buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let ([number, heard], flags): ([[u8; 4]; 2], u8) = read(body)?;
+        if flags > 3 {
+            return Err(MessageError::Value);
+        }
+        Ok(Self {
+            number: u32::from_le_bytes(number),
+            heard: u32::from_le_bytes(heard),
+            passive: flags & 1 != 0,
+            echo: flags & 2 != 0,
+        })
+    }
+}
+
+/// Encodes a fence; the number in the pass id is that of the association.
+pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
+    let pass = PassId::new(fence.association, mission);
+    let numbers = [fence.echo, fence.number].map(Word::new);
+    let CrossSection { y_m, altitude_m } = fence.across;
+    let places = [fence.x_m, fence.target_m, y_m, altitude_m, fence.apart_m];
+    write(&(tag::FENCE, pass, numbers, places, fence.flags), buffer)
+}
+
+pub(super) fn decode_fence(body: &[u8]) -> Result<(u16, Fence), MessageError> {
+    type FenceBody = (PassId, [Word; 2], [f32; 5], u8);
+    let (pass, [echo, number], places, flags): FenceBody = read(body)?;
+    let [x_m, target_m, y_m, altitude_m, apart_m] = places;
+    let fence = Fence {
+        association: pass.number(),
+        echo: echo.number(),
+        number: number.number(),
+        x_m,
+        target_m,
+        across: CrossSection { y_m, altitude_m },
+        apart_m,
+        flags,
+    };
+    if fence.is_valid() {
+        Ok((pass.mission(), fence))
+    } else {
+        Err(MessageError::Value)
     }
 }

@@ -1,16 +1,102 @@
-//! Tests of offers and proposals.
+//! Tests of one relay: received messages, and its replies and events.
 
-use super::fixture::{NOW, base, hello, relay, relay_of, said, upload, upload_to};
+use crate::event::Event;
 use crate::mission::tests::paper;
-use crate::mission::{Mission, MissionConfig};
+use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::node::Node;
-use crate::settings::Settings;
+use crate::settings::{Identity, Settings, Wiring};
 use crate::side::Side;
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::view::{View, ViewId};
+use crate::wire::auth::{Auth, Key};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Hello, Message, Poll, Proposal};
 use crate::wire::upload::Upload;
+
+pub(super) const NOW: Instant = Instant::from_millis(10_000);
+
+pub(super) fn base() -> Mission {
+    Mission::try_new(paper(3)).unwrap()
+}
+
+pub(super) fn upload(version: u16) -> Upload {
+    upload_to(&base(), version)
+}
+
+pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
+    let interference = Interference::Source(Interferer {
+        power_w: 80.0,
+        x_m: 700.0,
+        y_m: 100.0,
+    });
+    let config = MissionConfig {
+        interference,
+        ..*base.config()
+    };
+    Upload::new(base, version, config).unwrap()
+}
+
+/// Returns relay 2 of 3, with a key if it `signs`.
+pub(super) fn relay(signs: bool) -> Node {
+    relay_of(base(), 2, signs)
+}
+
+pub(super) fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
+    let settings = Settings {
+        wiring: Wiring::Shared,
+        auth: signs.then_some(Auth {
+            key: Key::new([1; 32]),
+            epoch: 1,
+        }),
+        ..Settings::default()
+    };
+    let identity = Identity { network: 1, index };
+    let mut node = Node::new(&mission, identity, &settings, 1, Instant::ZERO);
+    node.begin(identity, 1, Instant::ZERO);
+    // Discards the first messages, which the relay sends by itself.
+    node.handle_timeout(NOW);
+    said(&mut node);
+    node
+}
+
+pub(super) fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
+    let mut said = heapless::Vec::new();
+    while let Some((_, to, message)) = node.poll_message(NOW) {
+        if let Message::Claim(_) = message {
+            continue;
+        }
+        let known = matches!(
+            message,
+            Message::Hello(_)
+                | Message::Proposal(_)
+                | Message::Offer { .. }
+                | Message::Heartbeat { .. }
+        );
+        assert!(known, "{message:?}");
+        said.push((to, message)).unwrap();
+    }
+    said
+}
+
+/// Returns a hello of a neighbour that has selected relay 2.
+pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
+    Message::Hello(Hello {
+        mission: node.member.digest,
+        newest: ViewId::LOADED,
+        neighbour: 2,
+        ask: false,
+        form: false,
+        fresh: false,
+        ready: true,
+        behind: 1,
+        hears: 0x0F,
+        holds,
+        flies: true,
+        whole: false,
+        refused: false,
+        nonce: 9,
+    })
+}
 
 const LENGTH: usize = Upload::LENGTH;
 
@@ -35,7 +121,7 @@ fn proposal(mission_id: MissionId) -> Message {
 
 /// Returns an offer that answers a hello sent at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
-    let answer = node.ask_number(NOW);
+    let answer = node.layers.update.ask(NOW, &node.member);
     Message::Offer { upload, answer }
 }
 
@@ -119,10 +205,9 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     let mut at: heapless::Vec<u64, 40> = heapless::Vec::new();
     for ms in 1..4_000 {
         let now = NOW + Duration::from_millis(ms);
+        node.layers.update.handle_timeout(now);
         for side in [Side::Upstream, Side::Downstream] {
-            if node.layers.update.offers_again(side, now) {
-                node.layers.neighbours.at_mut(side).offer = true;
-                assert!(node.next_offer(now, side).is_some());
+            if node.next_offer(now, side).is_some() {
                 at.push(ms).unwrap();
             }
         }
@@ -221,9 +306,9 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             if hellos {
                 // The relay continues to send hellos, whose number has changed by then.
                 let step = Settings::default().dead_after;
-                node.ask_number(NOW + step);
-                node.ask_number(NOW + step.times(2));
-                node.ask_number(now);
+                node.layers.update.ask(NOW + step, &node.member);
+                node.layers.update.ask(NOW + step.times(2), &node.member);
+                node.layers.update.ask(now, &node.member);
             }
             let from = u16::from(!ground);
             assert!(node.handle_message(now, Side::Upstream, from, &withheld));
@@ -261,4 +346,72 @@ fn what_is_stored_of_an_upload_does_not_depend_on_what_it_answers() {
     );
     assert_eq!(Upload::decode(&stored), Some(upload(3)));
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
+}
+
+/// Returns a hello of node 1, which receives the nodes in `hears`.
+fn hello_of(node: &Node, hears: u8) -> Message {
+    let Message::Hello(hello) = hello(node, node.layers.update.latest()) else {
+        unreachable!();
+    };
+    Message::Hello(Hello {
+        ask: true,
+        hears,
+        ..hello
+    })
+}
+
+fn events(node: &mut Node) -> heapless::Vec<Event, 16> {
+    core::iter::from_fn(|| node.poll_event()).collect()
+}
+
+#[test]
+fn a_node_that_does_not_hear_this_relay_is_told_of_once_until_it_does() {
+    let mut node = relay(false);
+    events(&mut node);
+    let deaf = hello_of(&node, 0);
+    for round in 1..=2 {
+        for times in 1..=30 {
+            node.handle_message(NOW, Side::Upstream, 1, &deaf);
+            let told = events(&mut node).contains(&Event::NotHeard { node: 1 });
+            assert_eq!(told, times == 8, "{round} {times}");
+        }
+        let hears = hello_of(&node, 1);
+        node.handle_message(NOW, Side::Upstream, 1, &hears);
+    }
+}
+
+#[test]
+fn a_loss_and_a_mission_that_differs_are_told_with_the_node() {
+    let mut node = relay(false);
+    let lost = events(&mut node);
+    let Message::Hello(hello) = hello_of(&node, 1) else {
+        unreachable!();
+    };
+    let other = Message::Hello(Hello {
+        mission: hello.mission ^ 1,
+        ..hello
+    });
+    node.handle_message(NOW, Side::Upstream, 1, &other);
+    assert_eq!(
+        events(&mut node)[..],
+        [Event::MissionMismatch { node: 1 }],
+        "{lost:?}"
+    );
+    let mut told = heapless::Vec::<Event, 16>::new();
+    for seconds in 10..200 {
+        node.handle_timeout(Instant::from_millis(1_000 * seconds));
+        while node
+            .poll_message(Instant::from_millis(1_000 * seconds))
+            .is_some()
+        {}
+        told.extend(events(&mut node));
+    }
+    for (side, other) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
+        let lost = Event::NeighbourLost { side, node: other };
+        assert_eq!(
+            told.iter().filter(|event| **event == lost).count(),
+            1,
+            "{told:?}"
+        );
+    }
 }

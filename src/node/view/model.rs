@@ -1,0 +1,776 @@
+//! Model check of the view change: the code of the firmware in short chains, under every order of events.
+//!
+//! | event | model |
+//! | --- | --- |
+//! | frame | remains in the air once sent: received at any later time, in any order, any number of times, or never |
+//! | links cut or restored | the chain changes to another set partition; neighbours are the nearest relays of the same part |
+//! | relay silent | a part of its own |
+//! | proposal timed out | a relay without a predecessor proposes anew, with a larger number than any in its part |
+//! | no successor | the relay decides, or abandons the proposal |
+//! | pass | a relay that knows its view to be agreed on informs the next relay, if that is in the same view |
+//! | reboot | the relay keeps only its acceptor state, or loses that, too |
+//!
+//! The numbers of cuts, proposals and reboots are bounded, nothing else is. Time is not modelled. The lease adds that positions
+//! of a view are not used before members of the previous view have released theirs.
+//!
+//! A view is *in force* from the time its leader knows that all members have accepted it until a successor is in force. Views
+//! that follow each other one by one are never in force together. The check is therefore that all agreed views form one sequence,
+//! starting with the initial view.
+
+#![allow(clippy::cast_possible_truncation, reason = "chains of a few relays")]
+
+extern crate std;
+
+use stateright::{Checker, HasDiscoveries, Model, Property};
+use std::string::String;
+use std::vec::Vec;
+use std::{format, println, vec};
+
+use crate::mission::Mission;
+use crate::mission::tests::paper;
+use crate::node::circulation::{Circulation, Stage, Stragglers};
+use crate::node::context::{Context, Decided, Effects, Member, News};
+use crate::node::view::change::{Asking, ViewChange};
+use crate::node::view::electorate::Held;
+use crate::settings::Settings;
+use crate::time::Instant;
+use crate::view::{View, ViewId};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
+
+/// Checks chains of `relays` relays with so many cuts, proposals and reboots; `heals`: every state is healed.
+fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
+    Check {
+        cuts,
+        proposals,
+        reboots,
+        heals,
+        ..Check::of(relays)
+    }
+    .holds();
+}
+
+#[test]
+fn chains_of_three_and_four_have_one_view_after_the_other_and_settle_once_healed() {
+    all_holds(3, (2, 3, 1), true);
+    all_holds(4, (2, 2, 1), true);
+    all_holds(4, (2, 3, 0), false);
+}
+
+/// Searches larger bounds; takes some minutes.
+#[test]
+#[ignore = "minutes"]
+fn chains_of_three_and_four_hold_through_more() {
+    all_holds(3, (3, 3, 1), true);
+    all_holds(3, (3, 4, 1), false);
+    all_holds(4, (2, 3, 0), true);
+    all_holds(4, (3, 3, 0), false);
+    all_holds(4, (2, 3, 1), false);
+}
+
+/// Shows that the check finds faults: with every present relay voting, two views are in force together.
+#[test]
+fn a_rule_that_counts_everybody_is_found_to_break() {
+    for relays in [3, 4] {
+        let check = Check {
+            rule: Rule::Everybody,
+            ..Check::of(relays)
+        };
+        let found = check.search().unwrap();
+        assert_eq!(found.what, ONE_CHAIN, "{}", found.how);
+    }
+}
+
+/// Shows that the requirement is needed: without its record a relay breaks its promises.
+#[test]
+fn one_that_forgets_what_it_has_said_is_found_to_break_it() {
+    let check = Check {
+        losses: 1,
+        ..Check::of(3)
+    };
+    assert!(check.search().is_some());
+}
+
+/// View and its size, as a sortable pair.
+pub(super) type Sized = (ViewId, u16);
+
+/// Content of a frame.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(super) enum Body {
+    Proposal {
+        view: ViewId,
+        place: u16,
+        agreed: Sized,
+        votes: u16,
+        proposer: bool,
+        successor: Option<(ViewId, Sized)>,
+    },
+    Decision {
+        proposal: ViewId,
+        place: u16,
+        there: u16,
+        base: Sized,
+        view: Option<Sized>,
+    },
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(super) struct Frame {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    pub(super) body: Body,
+}
+
+/// State of one relay.
+#[derive(Clone, Debug)]
+pub(super) struct Unit {
+    pub(super) change: ViewChange,
+    /// Last accepted view, this relay's place in it, and its size.
+    pub(super) flies: (ViewId, u16, u16),
+}
+
+impl Unit {
+    fn key(&self) -> impl Eq + core::hash::Hash + use<> {
+        let change = &self.change;
+        (
+            change.circulation.stage(),
+            change.proposed,
+            change.electorate,
+            self.flies,
+        )
+    }
+}
+
+impl PartialEq for Unit {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Unit {}
+
+impl core::hash::Hash for Unit {
+    fn hash<H: core::hash::Hasher>(&self, hasher: &mut H) {
+        self.key().hash(hasher);
+    }
+}
+
+/// New view that was decided on: its size and the view that it follows.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(super) struct Decree {
+    pub(super) view: Sized,
+    pub(super) follows: ViewId,
+    /// Relays that voted on the proposal, bit 0 for the first relay.
+    pub(super) members: u8,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(super) struct Chain {
+    pub(super) units: Vec<Unit>,
+    /// Partition number of each relay.
+    pub(super) parts: Vec<u8>,
+    /// Frames in the air, sorted and without duplicates.
+    pub(super) air: Vec<Frame>,
+    /// Lists of all views that were ever decided on, and of all that were ever agreed on.
+    pub(super) decrees: Vec<Decree>,
+    pub(super) agreed: Vec<Sized>,
+    pub(super) cuts: u8,
+    pub(super) proposals: u8,
+    pub(super) reboots: u8,
+    pub(super) losses: u8,
+}
+
+/// Event of the model.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Happens {
+    Part(usize),
+    Arrives(Frame),
+    Proposes(usize),
+    EndsAt(usize),
+    Repeats(usize),
+    Passes(usize),
+    Reboots(usize),
+    Forgets(usize),
+}
+
+/// Inserts `one` into a sorted list, unless it is already there.
+pub(super) fn put<T: Ord>(all: &mut Vec<T>, one: T) {
+    if let Err(at) = all.binary_search(&one) {
+        all.insert(at, one);
+    }
+}
+
+impl Chain {
+    pub(super) fn before(&self, at: usize) -> Option<usize> {
+        (0..at)
+            .rev()
+            .find(|&other| self.parts[other] == self.parts[at])
+    }
+
+    pub(super) fn after(&self, at: usize) -> Option<usize> {
+        (at + 1..self.parts.len()).find(|&other| self.parts[other] == self.parts[at])
+    }
+}
+
+impl Body {
+    pub(super) fn message(self, mission_id: MissionId) -> Message {
+        let view = |(id, relays)| View { id, relays };
+        match self {
+            Self::Proposal {
+                view: id,
+                place,
+                agreed,
+                votes,
+                proposer,
+                successor,
+            } => Message::Proposal(Proposal {
+                mission_id,
+                view: id,
+                place,
+                poll: Poll {
+                    agreed: view(agreed),
+                    votes,
+                    proposer,
+                    lease_left: 0,
+                    rest: 0,
+                    successor: successor.map(|(proposal, of)| Successor {
+                        proposal,
+                        view: view(of),
+                    }),
+                },
+            }),
+            Self::Decision {
+                proposal,
+                place,
+                there,
+                base,
+                view: of,
+            } => Message::Decision(Decision {
+                mission_id,
+                proposal,
+                place,
+                there,
+                base: view(base),
+                view: of.map(view),
+                lease_left: 0,
+            }),
+        }
+    }
+
+    pub(super) fn of(message: &Message) -> Option<Self> {
+        let sized = |view: View| (view.id, view.relays);
+        match message {
+            Message::Proposal(proposal) => Some(Self::Proposal {
+                view: proposal.view,
+                place: proposal.place,
+                agreed: sized(proposal.poll.agreed),
+                votes: proposal.poll.votes,
+                proposer: proposal.poll.proposer,
+                successor: proposal
+                    .poll
+                    .successor
+                    .map(|successor| (successor.proposal, sized(successor.view))),
+            }),
+            Message::Decision(decision) => Some(Self::Decision {
+                proposal: decision.proposal,
+                place: decision.place,
+                there: decision.there,
+                base: sized(decision.base),
+                view: decision.view.map(sized),
+            }),
+            _ => None,
+        }
+    }
+}
+
+/// Rule of voting.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Rule {
+    /// Rule of the firmware: only members vote.
+    Members,
+    /// Every present relay votes, and the quorum is half of the newest view known to any of them.
+    Everybody,
+}
+
+/// Configuration of a check: rule and bounds on the events.
+#[derive(Clone, Debug)]
+pub(super) struct Check {
+    pub(super) rule: Rule,
+    pub(super) members: Vec<Member>,
+    pub(super) partitions: Vec<Vec<u8>>,
+    pub(super) cuts: u8,
+    pub(super) proposals: u8,
+    pub(super) reboots: u8,
+    pub(super) losses: u8,
+    /// True to check in every state that a healed chain settles.
+    pub(super) heals: bool,
+}
+
+/// Returns all set partitions of `relays` relays.
+pub(super) fn partitions(relays: usize) -> Vec<Vec<u8>> {
+    let mut all = vec![vec![]];
+    for _ in 0..relays {
+        all = all
+            .iter()
+            .flat_map(|parts: &Vec<u8>| {
+                let next = parts.iter().max().map_or(0, |most| most + 1);
+                (0..=next).map(move |part| {
+                    let mut parts = parts.clone();
+                    parts.push(part);
+                    parts
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+impl Check {
+    pub(super) fn of(relays: u16) -> Self {
+        let mission = Mission::try_new(paper(relays)).unwrap();
+        Self {
+            rule: Rule::Members,
+            members: (1..=relays)
+                .map(|node| Member::new(mission, Settings::default(), node))
+                .collect(),
+            partitions: partitions(usize::from(relays)),
+            cuts: 2,
+            proposals: 2,
+            reboots: 0,
+            losses: 0,
+            heals: false,
+        }
+    }
+
+    pub(super) fn unit(&self) -> Unit {
+        let relays = self.members.len() as u16;
+        Unit {
+            change: ViewChange::new(relays, 1, 1),
+            flies: (ViewId::LOADED, 0, relays),
+        }
+    }
+
+    pub(super) fn context(&self, chain: &Chain, at: usize) -> Context<'_> {
+        let member = &self.members[at];
+        Context {
+            now: Instant::ZERO,
+            member,
+            latest: member.active,
+            end: chain.after(at).is_none(),
+            held: Held::NONE,
+        }
+    }
+
+    /// Returns the relays that have voted on `proposal`, as a bit mask.
+    pub(super) fn asked(chain: &Chain, proposal: ViewId) -> u8 {
+        let voters = chain.units.iter().zip(0..);
+        let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
+        let known = voters.fold(0, |members, (_, at)| members | 1 << at);
+        let handed = chain
+            .air
+            .iter()
+            .filter(|frame| matches!(frame.body, Body::Proposal { view, .. } if view == proposal));
+        handed.fold(known, |members, frame| members | 1 << frame.from)
+    }
+
+    /// Sends the pending messages of relay `at`, and records the decision in `effects`.
+    pub(super) fn settle(&self, chain: &mut Chain, at: usize, effects: Effects) {
+        let (before, after) = (chain.before(at), chain.after(at));
+        let context = self.context(chain, at);
+        let decides = chain.units[at].change.proposed;
+        let members = decides.map_or(0, |proposed| Self::asked(chain, proposed.view));
+        let Chain {
+            units,
+            air,
+            decrees,
+            agreed,
+            ..
+        } = chain;
+        let unit = &mut units[at];
+        let mut send = |to: usize, message: &Message| {
+            if let Some(body) = Body::of(message) {
+                let from = at;
+                put(air, Frame { from, to, body });
+            }
+        };
+        if let Some(to) = after
+            && let Some(message) = unit.change.take_onward(&context, to as u16 + 1)
+        {
+            send(to, &message);
+        }
+        if let Some(to) = before {
+            while let Some(message) = unit.change.take_back() {
+                send(to, &message);
+            }
+        }
+        if let Some(proposed) = unit.change.proposed
+            && let Some(News::Decided(decided)) = effects.news
+        {
+            if let Decided::Granted { relays, .. } = decided {
+                unit.flies = (proposed.view, proposed.place, relays);
+            }
+            if let Some(view) = proposed.decided {
+                if view.id == proposed.view && view.relays == proposed.place {
+                    put(
+                        decrees,
+                        Decree {
+                            view: (view.id, view.relays),
+                            follows: proposed.poll.agreed.id,
+                            members,
+                        },
+                    );
+                }
+                if proposed.place == 1 {
+                    put(agreed, (view.id, view.relays));
+                }
+            }
+        }
+        let change = &mut unit.change;
+        if self.rule == Rule::Everybody {
+            change.electorate.count_everybody();
+        }
+        // Resets timers and everything that only repairs late messages, to reduce the number of states.
+        change.newest = ViewId::LOADED;
+        change.asking = Asking::new(1);
+        change.refused = false;
+        change.stragglers = Stragglers::NONE;
+        change.circulation = Circulation::at_stage(change.circulation.stage());
+    }
+
+    pub(super) fn propose(&self, chain: &mut Chain, at: usize) {
+        let newest = (0..chain.units.len())
+            .filter(|&other| chain.parts[other] == chain.parts[at])
+            .map(|other| chain.units[other].change.electorate.promised())
+            .max()
+            .unwrap();
+        let context = self.context(chain, at);
+        let change = &mut chain.units[at].change;
+        change.heard_of(newest);
+        if change.awaited().is_some() {
+            change.heard_of(newest.next_by(self.members[at].node).unwrap());
+        }
+        change.asking = Asking::due(Instant::ZERO);
+        let effects = change.handle_timeout(&context, true, false);
+        self.settle(chain, at, effects);
+    }
+
+    pub(super) fn arrive(&self, chain: &mut Chain, frame: &Frame) {
+        let at = frame.to;
+        let neighbour = match frame.body {
+            Body::Proposal { .. } => chain.before(at),
+            Body::Decision { .. } => chain.after(at),
+        };
+        if neighbour != Some(frame.from) {
+            return;
+        }
+        let context = self.context(chain, at);
+        let message = frame.body.message(self.members[0].active);
+        let effects = chain.units[at].change.handle(&context, &message);
+        self.settle(chain, at, effects);
+    }
+
+    pub(super) fn end(&self, chain: &mut Chain, at: usize) {
+        if chain.after(at).is_none() {
+            let context = self.context(chain, at);
+            let effects = chain.units[at].change.decide(&context);
+            self.settle(chain, at, effects);
+        }
+    }
+
+    pub(super) fn repeat(&self, chain: &mut Chain, at: usize) {
+        chain.units[at].change.resend();
+        self.settle(chain, at, Effects::NONE);
+    }
+
+    pub(super) fn pass(chain: &mut Chain, at: usize) {
+        let Some(to) = chain.after(at) else {
+            return;
+        };
+        let Unit { change, flies } = &chain.units[at];
+        let (view, place, _) = *flies;
+        let knows = change.electorate.agreed().id == view && change.awaited().is_none();
+        let next = &mut chain.units[to];
+        if knows
+            && next.change.awaited().is_none()
+            && next.flies.0 == view
+            && next.flies.1 == place + 1
+        {
+            next.change.commit(view);
+        }
+    }
+
+    pub(super) fn reboot(&self, chain: &mut Chain, at: usize, remembers: bool) {
+        let electorate = chain.units[at].change.electorate;
+        chain.units[at] = self.unit();
+        if remembers {
+            chain.units[at].change.electorate = electorate;
+        }
+        self.settle(chain, at, Effects::NONE);
+    }
+}
+
+impl Check {
+    /// Returns true if every agreed view follows an agreed view, and no two follow the same one.
+    pub(super) fn is_one_chain(chain: &Chain) -> bool {
+        let follows = |(id, _): &Sized| {
+            let decree = chain.decrees.iter().find(|decree| decree.view.0 == *id);
+            decree.map(|decree| decree.follows)
+        };
+        let mut before: Vec<_> = chain.agreed.iter().map(follows).collect();
+        let known = before.iter().all(|view| {
+            view.is_some_and(|view| {
+                view == ViewId::LOADED || chain.agreed.iter().any(|(id, _)| *id == view)
+            })
+        });
+        before.sort();
+        let count = before.len();
+        before.dedup();
+        known && before.len() == count
+    }
+
+    pub(super) fn has_one_size(chain: &Chain) -> bool {
+        let twice = |all: &[ViewId]| all.windows(2).any(|pair| pair[0] == pair[1]);
+        let decrees: Vec<_> = chain.decrees.iter().map(|decree| decree.view.0).collect();
+        let agreed: Vec<_> = chain.agreed.iter().map(|view| view.0).collect();
+        !twice(&decrees) && !twice(&agreed)
+    }
+
+    /// Returns true if each relay's agreed view was agreed on and has at most as many members as its size.
+    pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
+        self.rule == Rule::Everybody
+            || chain.units.iter().all(|unit| {
+                let view = unit.change.electorate.agreed();
+                let members = chain.units.iter().filter(|unit| {
+                    let electorate = unit.change.electorate;
+                    electorate.agreed() == view && electorate.member
+                });
+                let known =
+                    view.id == ViewId::LOADED || chain.agreed.contains(&(view.id, view.relays));
+                known && members.count() <= usize::from(view.relays)
+            })
+    }
+}
+
+/// Maximum number of proposals that a healed chain needs.
+pub(super) const MOST: u8 = 3;
+
+impl Check {
+    /// Delivers all frames to the relays of `there` until nothing changes any more.
+    pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
+        loop {
+            let before = chain.clone();
+            for at in (0..chain.units.len()).filter(|at| there >> at & 1 == 1) {
+                self.end(chain, at);
+                self.repeat(chain, at);
+                Self::pass(chain, at);
+            }
+            for frame in before.air.clone() {
+                self.arrive(chain, &frame);
+            }
+            if *chain == before {
+                return;
+            }
+        }
+    }
+
+    /// Returns true if the relays of `there` are a quorum of the newest view that they know, and of all views decided on since.
+    pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
+        let known = |at: &usize| there >> at & 1 == 1;
+        let agreed = (0..chain.units.len()).filter(known);
+        let agreed = agreed.map(|at| chain.units[at].change.electorate.agreed().id);
+        let newest = agreed.max().unwrap_or(ViewId::LOADED);
+        let has_most = |members: u8, proposer: u16| {
+            let has_proposer = there & members & 1 << (proposer - 1) != 0;
+            2 * (there & members).count_ones() + u32::from(has_proposer) > members.count_ones()
+        };
+        let all = ((1_u16 << chain.units.len()) - 1) as u8;
+        (newest > ViewId::LOADED || has_most(all, 1))
+            && chain.decrees.iter().all(|decree| {
+                decree.view.0 < newest || has_most(decree.members, decree.view.0.proposer())
+            })
+    }
+
+    /// Returns the number of proposals until all relays of `there` are in one view of them all and know it to be agreed on. Links
+    /// between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if [`MOST`] are not
+    /// enough.
+    pub(super) fn settles(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
+        let mut chain = chain.clone();
+        for (part, at) in chain.parts.iter_mut().zip(0..) {
+            *part = if there >> at & 1 == 1 { 0 } else { at + 1 };
+        }
+        if !keeps_air {
+            chain.air.clear();
+        }
+        let first = there.trailing_zeros() as usize;
+        self.drain(&mut chain, there);
+        if !Self::is_quorum(&chain, there) {
+            return Some(0);
+        }
+        for proposals in 0..=MOST {
+            let agreed = chain.units[first].change.electorate.agreed();
+            let settled = (0..chain.units.len())
+                .filter(|at| there >> at & 1 == 1)
+                .all(|at| {
+                    let Unit { change, flies } = &chain.units[at];
+                    let knows = change.electorate.agreed() == agreed && change.electorate.member;
+                    knows
+                        && change.circulation.stage() != Stage::Outstanding
+                        && flies.0 == agreed.id
+                });
+            if settled && u32::from(agreed.relays) == there.count_ones() {
+                return Some(proposals);
+            }
+            chain.air.clear();
+            self.propose(&mut chain, first);
+            self.drain(&mut chain, there);
+        }
+        None
+    }
+
+    /// Returns true if every set of relays that is a quorum settles.
+    pub(super) fn is_alive(&self, chain: &Chain) -> bool {
+        let all = ((1_u16 << chain.units.len()) - 1) as u8;
+        (1..=all).all(|there| {
+            [true, false]
+                .iter()
+                .all(|keeps_air| self.settles(chain, there, *keeps_air).is_some())
+        })
+    }
+}
+
+/// Property of all agreed views.
+pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
+
+impl Model for Check {
+    type State = Chain;
+    type Action = Happens;
+
+    fn init_states(&self) -> Vec<Chain> {
+        let relays = self.members.len();
+        let mut chain = Chain {
+            units: vec![self.unit(); relays],
+            parts: vec![0; relays],
+            air: vec![],
+            decrees: vec![],
+            agreed: vec![],
+            cuts: self.cuts,
+            proposals: self.proposals,
+            reboots: self.reboots,
+            losses: self.losses,
+        };
+        for at in 0..relays {
+            self.settle(&mut chain, at, Effects::NONE);
+        }
+        vec![chain]
+    }
+
+    fn actions(&self, chain: &Chain, actions: &mut Vec<Happens>) {
+        actions.extend(chain.air.iter().copied().map(Happens::Arrives));
+        let relays = 0..chain.units.len();
+        for at in relays {
+            if chain.proposals > 0 && chain.before(at).is_none() {
+                actions.push(Happens::Proposes(at));
+            }
+            actions.extend([
+                Happens::EndsAt(at),
+                Happens::Repeats(at),
+                Happens::Passes(at),
+            ]);
+            if chain.reboots > 0 {
+                actions.push(Happens::Reboots(at));
+            }
+            if chain.losses > 0 {
+                actions.push(Happens::Forgets(at));
+            }
+        }
+        if chain.cuts > 0 {
+            actions.extend((0..self.partitions.len()).map(Happens::Part));
+        }
+    }
+
+    fn next_state(&self, before: &Chain, action: Happens) -> Option<Chain> {
+        let mut chain = before.clone();
+        match action {
+            Happens::Part(number) => chain.parts.clone_from(&self.partitions[number]),
+            Happens::Arrives(frame) => self.arrive(&mut chain, &frame),
+            Happens::Proposes(at) => self.propose(&mut chain, at),
+            Happens::EndsAt(at) => self.end(&mut chain, at),
+            Happens::Repeats(at) => self.repeat(&mut chain, at),
+            Happens::Passes(at) => Self::pass(&mut chain, at),
+            Happens::Reboots(at) => self.reboot(&mut chain, at, true),
+            Happens::Forgets(at) => self.reboot(&mut chain, at, false),
+        }
+        if chain == *before {
+            return None;
+        }
+        match action {
+            Happens::Part(_) => chain.cuts -= 1,
+            Happens::Proposes(_) => chain.proposals -= 1,
+            Happens::Reboots(_) => chain.reboots -= 1,
+            Happens::Forgets(_) => chain.losses -= 1,
+            _ => {}
+        }
+        Some(chain)
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always(ONE_CHAIN, |_, chain| Self::is_one_chain(chain)),
+            Property::always("a view has one size", |_, chain| Self::has_one_size(chain)),
+            Property::always(
+                "what is known is so, and members are counted once",
+                |check: &Self, chain| check.is_known_and_counted(chain),
+            ),
+            Property::always("once healed it settles", |check: &Self, chain| {
+                !check.heals || check.is_alive(chain)
+            }),
+        ]
+    }
+}
+
+/// Violated property and the events that lead to it.
+pub(super) struct Counterexample {
+    pub(super) what: &'static str,
+    pub(super) how: String,
+}
+
+impl Check {
+    /// Searches all states with two threads and prints their number.
+    pub(super) fn search(&self) -> Option<Counterexample> {
+        let began = std::time::Instant::now();
+        let checker = self.clone().checker().threads(2);
+        let checker = checker.finish_when(HasDiscoveries::Any).spawn_bfs().join();
+        let Self {
+            rule,
+            cuts,
+            proposals,
+            reboots,
+            losses,
+            heals,
+            ..
+        } = self;
+        println!(
+            "{} relays, {rule:?}: {cuts} cuts, {proposals} proposals, {reboots} reboots, {losses} without memory, heals: {heals}: \
+             {} states, depth {}, {:.1} s",
+            self.members.len(),
+            checker.unique_state_count(),
+            checker.max_depth(),
+            began.elapsed().as_secs_f32(),
+        );
+        let (what, path) = checker.discoveries().into_iter().next()?;
+        let steps = path.into_vec().into_iter();
+        let steps: Vec<String> = steps
+            .map(|(chain, happens)| {
+                let Chain { parts, agreed, .. } = chain;
+                format!("{parts:?} agreed: {agreed:?}\n  {happens:?}\n")
+            })
+            .collect();
+        let how = steps.concat();
+        println!("it does not hold that {what}:\n{how}");
+        Some(Counterexample { what, how })
+    }
+
+    pub(super) fn holds(&self) {
+        assert!(self.search().is_none());
+    }
+}

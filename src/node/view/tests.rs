@@ -1,0 +1,527 @@
+//! Tests of the view change at one relay.
+
+use crate::mission::Mission;
+use crate::mission::tests::paper;
+use crate::node::circulation::{SUSPICIOUS, Stage};
+use crate::node::context::{Context, Decided, Effects, Member, News, Proposer};
+use crate::node::view::change::{Proposed, ViewChange};
+use crate::node::view::electorate::{Electorate, Held};
+use crate::settings::Settings;
+use crate::time::Instant;
+use crate::view::{View, ViewId};
+use crate::wire::digest::MissionId;
+use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
+
+pub(super) fn id(number: u32, node: u32) -> ViewId {
+    ViewId::from_bits(number << 10 | node)
+}
+
+/// Relay in a chain of four that holds mission 4 and flies the loaded one.
+pub(super) struct Relay {
+    pub(super) member: Member,
+    pub(super) latest: MissionId,
+    pub(super) end: bool,
+    pub(super) now: Instant,
+    pub(super) view: ViewChange,
+}
+
+impl Relay {
+    pub(super) fn new(node: u16) -> Self {
+        let mission = Mission::try_new(paper(4)).unwrap();
+        Self {
+            member: Member::new(mission, Settings::default(), node),
+            latest: MissionId {
+                version: 4,
+                digest: 0x1234,
+            },
+            end: node == 4,
+            now: Instant::ZERO,
+            view: ViewChange::new(4, 1, 1),
+        }
+    }
+
+    pub(super) fn second() -> Self {
+        Self::new(2)
+    }
+
+    pub(super) fn handle(&mut self, message: &Message) -> Effects {
+        let Self {
+            ref member,
+            latest,
+            end,
+            now,
+            ref mut view,
+        } = *self;
+        let context = context(member, latest, end, now);
+        view.handle(&context, message)
+    }
+
+    /// Removes the next relay.
+    pub(super) fn ends(&mut self) -> Effects {
+        self.end = true;
+        let context = context(&self.member, self.latest, true, self.now);
+        self.view.decide(&context)
+    }
+
+    /// Lets the relay lead: no relay precedes it, and its request timer expires.
+    pub(super) fn leads(&mut self) -> Effects {
+        self.view.asking.ask(self.now);
+        self.now = self.view.asking.next_timeout().unwrap();
+        let context = context(&self.member, self.latest, self.end, self.now);
+        self.view.handle_timeout(&context, true, false)
+    }
+
+    pub(super) fn onward(&mut self, to: u16) -> Option<Message> {
+        let context = context(&self.member, self.latest, self.end, self.now);
+        self.view.take_onward(&context, to)
+    }
+
+    /// Returns a proposal of relay 1.
+    pub(super) fn proposal(&self, view: ViewId) -> Message {
+        Message::Proposal(Proposal {
+            mission_id: self.latest,
+            view,
+            place: 1,
+            poll: Poll {
+                votes: 1,
+                proposer: true,
+                ..Poll::of(View {
+                    id: ViewId::LOADED,
+                    relays: 4,
+                })
+            },
+        })
+    }
+
+    /// Returns a decision sent by the next relay.
+    pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
+        Message::Decision(Decision {
+            mission_id: self.latest,
+            proposal,
+            place: self.member.node + 1,
+            there: 4,
+            base: View {
+                id: ViewId::LOADED,
+                relays: 4,
+            },
+            view,
+            lease_left: 0,
+        })
+    }
+}
+
+pub(super) fn context(member: &Member, latest: MissionId, end: bool, now: Instant) -> Context<'_> {
+    Context {
+        now,
+        member,
+        latest,
+        end,
+        held: Held::NONE,
+    }
+}
+
+pub(super) const fn all(id: ViewId) -> View {
+    View { id, relays: 4 }
+}
+
+pub(super) const fn came(decided: Decided) -> Effects {
+    Effects::of(News::Decided(decided))
+}
+
+pub(super) const PROPOSED: Effects = Effects {
+    view_proposed: true,
+    ..Effects::NONE.by(Proposer::Neighbour)
+};
+
+pub(super) const REPEATED: Effects = Effects::DUPLICATE.by(Proposer::Neighbour);
+
+pub(super) const LATE: Effects = Effects::STALE.by(Proposer::Neighbour);
+
+#[test]
+fn a_proposal_is_handed_on_with_one_voice_more() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    assert_eq!(relay.handle(&proposal), PROPOSED);
+    let Some(Message::Proposal(handed)) = relay.onward(3) else {
+        panic!("nothing is handed on")
+    };
+    assert_eq!((handed.view, handed.place), (id(1, 1), 2));
+    assert_eq!((handed.poll.votes, handed.poll.proposer), (2, true));
+    assert_eq!(relay.onward(3), None, "once");
+    assert_eq!(relay.view.take_back(), None);
+}
+
+#[test]
+fn the_same_again_is_answered_by_what_is_known_of_it() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    relay.handle(&proposal);
+    assert_eq!(relay.handle(&proposal), REPEATED);
+    let busy = Message::Busy {
+        sweep: id(1, 1).mark(),
+    };
+    assert_eq!(relay.view.take_back(), Some(busy));
+    let decision = relay.decision(id(1, 1), Some(all(id(1, 1))));
+    let granted = came(Decided::Granted {
+        relays: 4,
+        lease_left: 0,
+    });
+    assert_eq!(relay.handle(&decision), granted);
+    for again in [false, true] {
+        if again {
+            assert_eq!(relay.handle(&proposal), REPEATED);
+        }
+        let Some(Message::Decision(back)) = relay.view.take_back() else {
+            panic!("nothing is handed back")
+        };
+        assert_eq!((back.place, back.view), (2, Some(all(id(1, 1)))));
+    }
+    assert_eq!(relay.handle(&decision), Effects::STALE);
+}
+
+#[test]
+fn a_newer_one_takes_the_place_of_one_that_is_not_decided() {
+    let mut relay = Relay::second();
+    for view in [id(1, 1), id(1, 3), id(2, 1)] {
+        let proposal = relay.proposal(view);
+        assert_eq!(relay.handle(&proposal), PROPOSED);
+    }
+    let old = relay.proposal(id(1, 3));
+    assert_eq!(relay.handle(&old), LATE);
+}
+
+/// The leader has restarted during a proposal and has received another mission.
+#[test]
+fn a_proposal_of_the_same_view_with_another_mission_is_another() {
+    let mut relay = Relay::second();
+    let first = relay.proposal(id(1, 1));
+    assert_eq!(relay.handle(&first), PROPOSED);
+    assert_eq!(relay.handle(&first), REPEATED);
+    relay.latest.version = 5;
+    let again = relay.proposal(id(1, 1));
+    assert_eq!(relay.handle(&again), LATE);
+}
+
+#[test]
+fn what_is_promised_keeps_an_earlier_decision_from_being_accepted() {
+    let mut relay = Relay::second();
+    for view in [id(1, 1), id(2, 1)] {
+        let proposal = relay.proposal(view);
+        relay.handle(&proposal);
+    }
+    let early = relay.decision(id(1, 1), Some(all(id(1, 1))));
+    assert_eq!(relay.handle(&early), Effects::STALE);
+    assert!(!relay.view.electorate.awaits(id(1, 1)));
+    assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
+}
+
+#[test]
+fn a_decision_is_of_the_relay_that_the_proposal_went_on_to() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    relay.handle(&proposal);
+    let Message::Decision(decision) = relay.decision(id(1, 1), Some(all(id(1, 1)))) else {
+        return;
+    };
+    let small = View {
+        id: id(1, 1),
+        relays: 2,
+    };
+    let strays = [
+        Decision {
+            place: 2,
+            ..decision
+        },
+        Decision {
+            place: 4,
+            ..decision
+        },
+        Decision {
+            proposal: id(1, 3),
+            ..decision
+        },
+        Decision {
+            view: Some(small),
+            ..decision
+        },
+    ];
+    for stray in strays {
+        let stray = Message::Decision(stray);
+        assert_eq!(relay.handle(&stray), Effects::STALE, "{stray:?}");
+    }
+    assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
+}
+
+#[test]
+fn the_last_one_decides() {
+    let mut relay = Relay::new(4);
+    let Message::Proposal(mut proposal) = relay.proposal(id(1, 1)) else {
+        return;
+    };
+    proposal.place = 3;
+    proposal.poll.votes = 3;
+    let granted = Effects {
+        news: Some(News::Decided(Decided::Granted {
+            relays: 4,
+            lease_left: 0,
+        })),
+        ..PROPOSED
+    };
+    assert_eq!(relay.handle(&Message::Proposal(proposal)), granted);
+    assert!(relay.view.electorate.awaits(id(1, 1)));
+    // The first pass shows that all relays have accepted it.
+    relay.view.commit(id(1, 1));
+    assert_eq!(relay.view.electorate.agreed(), all(id(1, 1)));
+    relay.view.commit(id(1, 1));
+    assert_eq!(relay.view.electorate.agreed(), all(id(1, 1)));
+}
+
+#[test]
+fn an_earlier_view_is_accepted_and_the_leader_proposes_anew_from_there() {
+    let mut relay = Relay::new(1);
+    relay.leads();
+    relay.onward(2).unwrap();
+    let earlier = View {
+        id: id(1, 1),
+        relays: 3,
+    };
+    // This relay has proposed the view itself and has not received the decision.
+    let first = relay.view.electorate.promised();
+    assert_eq!(first, earlier.id);
+    relay.view.heard_of(id(2, 3));
+    relay.now = relay.view.asking.next_timeout().unwrap();
+    assert!(relay.leads().began);
+    let second = relay.view.electorate.promised();
+    assert!(second > id(2, 3));
+    let decision = relay.decision(second, Some(earlier));
+    assert_eq!(relay.handle(&decision), came(Decided::Earlier));
+    assert_eq!(relay.view.electorate.agreed(), earlier);
+    assert!(relay.view.electorate.member);
+    assert_eq!(relay.view.take_back(), None, "nobody is before it");
+    assert!(relay.leads().began);
+}
+
+/// Regression test: relays near the leader that did not know the newest view were refused for good.
+#[test]
+fn a_refusal_says_which_view_was_agreed_on() {
+    let view = View {
+        id: id(1, 1),
+        relays: 3,
+    };
+    let voted = |mut electorate: Electorate, node| {
+        electorate.vote(node, view.id, None, Held::NONE).unwrap();
+        let base = electorate.agreed();
+        assert!(electorate.accept(view.id, base, Some(view)));
+        electorate
+    };
+    let [mut second, mut third] = [2, 3].map(Relay::new);
+    second.view.electorate = voted(second.view.electorate, 2);
+    third.view.electorate = voted(third.view.electorate, 3);
+    third.view.commit(view.id);
+    third.end = true;
+    second.view.heard_of(view.id);
+    let mut refused = 0;
+    for round in 0..2 {
+        assert!(second.leads().began);
+        let proposal = second.onward(3).unwrap();
+        let effects = third.handle(&proposal);
+        let Some(Message::Decision(back)) = third.view.take_back() else {
+            panic!("nothing is handed back")
+        };
+        if effects.news == Some(News::Decided(Decided::Refused)) {
+            refused += 1;
+            assert_eq!((back.base, back.view), (view, None));
+        }
+        let decided = second.handle(&Message::Decision(back)).news;
+        if round == 0 {
+            assert_eq!(decided, Some(News::Decided(Decided::Refused)));
+            assert_eq!(second.view.electorate.agreed(), view);
+        } else {
+            // Two of its three members are polled, now that both know the view.
+            assert!(matches!(
+                decided,
+                Some(News::Decided(Decided::Granted { relays: 2, .. }))
+            ));
+        }
+    }
+    assert_eq!(refused, 1);
+}
+
+#[test]
+fn a_decision_is_of_the_mission_that_was_proposed() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    relay.handle(&proposal);
+    let decision = relay.decision(id(1, 1), Some(all(id(1, 1))));
+    let Message::Decision(mut other) = decision.clone() else {
+        return;
+    };
+    other.mission_id.version = 5;
+    assert_eq!(relay.handle(&Message::Decision(other)), Effects::STALE);
+    let granted = came(Decided::Granted {
+        relays: 4,
+        lease_left: 0,
+    });
+    assert_eq!(relay.handle(&decision), granted);
+}
+
+/// A newer mission has replaced the proposed one, which can not be flown any more.
+#[test]
+fn who_has_lost_the_mission_has_no_part_in_its_view() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    relay.handle(&proposal);
+    let decision = relay.decision(id(1, 1), Some(all(id(1, 1))));
+    relay.latest.version = 5;
+    assert_eq!(relay.handle(&decision), Effects::FOREIGN);
+    assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
+    assert!(matches!(
+        relay.view.proposed,
+        Some(Proposed { decided: None, .. })
+    ));
+    assert!(!relay.view.electorate.awaits(id(1, 1)));
+}
+
+#[test]
+fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
+    let mut relay = Relay::new(4);
+    let first = all(id(1, 1));
+    relay
+        .view
+        .electorate
+        .vote(4, first.id, None, Held::NONE)
+        .unwrap();
+    let base = relay.view.electorate.agreed();
+    assert!(relay.view.electorate.accept(first.id, base, Some(first)));
+    let Message::Proposal(mut proposal) = relay.proposal(id(2, 1)) else {
+        return;
+    };
+    proposal.place = 2;
+    proposal.poll.votes = 2;
+    let decided = relay.handle(&Message::Proposal(proposal)).news;
+    assert_eq!(decided, Some(News::Decided(Decided::Earlier)));
+    let poll = relay.view.proposed.unwrap().poll;
+    assert_eq!(
+        poll.successor,
+        Some(Successor {
+            proposal: first.id,
+            view: first,
+        })
+    );
+    assert!(relay.view.electorate.awaits(first.id));
+}
+
+#[test]
+fn who_has_lost_the_one_after_it_decides_what_nobody_was_handed() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    relay.handle(&proposal);
+    let granted = came(Decided::Granted {
+        relays: 2,
+        lease_left: 0,
+    });
+    assert_eq!(relay.ends(), granted);
+    assert_eq!(relay.ends(), Effects::NONE, "once");
+}
+
+#[test]
+fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(1, 1));
+    relay.handle(&proposal);
+    relay.onward(3).unwrap();
+    for _ in 0..3 {
+        assert_eq!(relay.ends(), Effects::NONE);
+        assert!(relay.view.asking.asks());
+        assert_eq!(relay.view.newest(), id(2, 2), "one number more, once");
+    }
+    // A later proposal may end here.
+    let later = relay.proposal(id(3, 1));
+    assert!(relay.handle(&later).news.is_some());
+}
+
+/// Regression test: two views had one identifier, relays 1 to 3, and 1 and 4, when only relay 1 had lost relay 2.
+#[test]
+fn a_proposal_is_handed_to_one_node_alone() {
+    let mut relay = Relay::new(1);
+    let began = relay.leads();
+    assert!(began.began && began.view_proposed);
+    relay.onward(2).unwrap();
+    relay.view.resend();
+    assert_eq!(relay.onward(4), None);
+    assert!(relay.view.asking.asks());
+    relay.view.resend();
+    assert!(relay.onward(2).is_some(), "it may be back");
+    // A later proposal may be forwarded to the other node.
+    let mut later = relay.leads();
+    for _ in 0..4 {
+        if later.began {
+            break;
+        }
+        later = relay.leads();
+    }
+    assert!(later.began);
+    assert!(
+        matches!(relay.onward(4), Some(Message::Proposal(Proposal { view, .. })) if view > id(1, 1))
+    );
+}
+
+#[test]
+fn a_leader_that_is_refused_stays_and_asks_again_later() {
+    let mut relay = Relay::second();
+    relay.end = true;
+    assert_eq!(relay.leads().news, came(Decided::Refused).news);
+    assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
+    assert!(!relay.view.electorate.has_voted(relay.view.newest()));
+    let again = relay.view.asking.next_timeout().unwrap();
+    assert!(again >= relay.now + relay.member.settings.probe_after);
+}
+
+#[test]
+fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
+    let mut relay = Relay::new(1);
+    relay.view.heard_of(id(7, 3));
+    assert!(relay.leads().began);
+    assert_eq!(relay.view.newest(), id(8, 1));
+    assert!(!relay.leads().began, "it is under way");
+    relay.view.heard_of(id(8, 2));
+    assert!(relay.leads().began);
+    assert_eq!(relay.view.newest(), id(9, 1));
+    // A view far ahead is approached in steps.
+    for number in [265, 521, 777, 1000, 1000] {
+        relay.view.heard_of(id(1000, 3));
+        assert_eq!(relay.view.newest(), id(number, 3));
+    }
+}
+
+/// Checks that a relay alone for hours uses one view number, not one every five seconds.
+#[test]
+fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
+    let mut relay = Relay::second();
+    relay.end = true;
+    assert_eq!(relay.leads().news, came(Decided::Refused).news);
+    let newest = relay.view.newest();
+    for _ in 0..1_000 {
+        assert_eq!(relay.leads(), Effects::NONE);
+        assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
+    }
+    assert_eq!(relay.view.newest(), newest);
+    // With a successor the poll may have another result.
+    relay.end = false;
+    let began = (0..8).any(|_| relay.leads().began);
+    assert!(began && relay.view.newest() > newest);
+}
+
+#[test]
+fn who_has_missed_something_is_told_after_some_late_proposals() {
+    let mut relay = Relay::second();
+    let proposal = relay.proposal(id(3, 1));
+    relay.handle(&proposal);
+    let late = relay.proposal(id(2, 1));
+    for _ in 1..SUSPICIOUS {
+        assert_eq!(relay.handle(&late), LATE);
+    }
+    let foreign = Effects::FOREIGN.by(Proposer::Neighbour);
+    assert_eq!(relay.handle(&late), foreign);
+    assert_eq!(relay.view.newest(), id(4, 2));
+}

@@ -1,0 +1,546 @@
+//! Messages of a round: sweep and verdict, profiles of the joint method, token of Algorithm 2, interference measurements.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+use crate::field::is_upsilon;
+use crate::mission::{Interferer, MAX_RELAYS};
+use crate::optimiser::PerTarget;
+use crate::optimiser::ladder::{Ladder, TARGETS};
+use crate::optimiser::local::Local;
+use crate::optimiser::pass::Verdict;
+use crate::place::{CrossSection, Placement, Station};
+use crate::sensing::belief::{Belief, Spread, Told};
+use crate::sensing::sums::{Level, SUMS, Sums, is_level, is_power};
+use crate::wire::MAX_NODE;
+use crate::wire::message::parts::{
+    FARTHEST_M, MessageError, PassId, PlaceBody, Word, in_range, is_beside, profile, read, tag,
+    take, take_targets, write,
+};
+
+/// Sweep of targets along the chain, from one relay to the next.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Sweep {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Targets.
+    pub ladder: Ladder,
+    /// Cross-section and power of the sender.
+    pub relay: Station,
+    /// True if relays use the joint method's cross-sections instead of their configured ones.
+    pub chosen: bool,
+    /// Upsilon measured by the sender at its position, 1/W, in a closed loop.
+    pub measured_per_w: Option<f32>,
+    /// Reach of the sender for each target, m along x; shorter than the ladder if the upper targets cannot be met.
+    pub reaches: PerTarget,
+}
+
+/// Common start of all kinds of sweeps; the reaches come last.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct SweepHead {
+    pass: PassId,
+    /// Anchor of the ladder; negative for a plain pass.
+    anchor: f32,
+    gap: u8,
+    growth: u8,
+    altitude_m: f32,
+    power_w: f32,
+}
+
+impl SweepHead {
+    fn of(sweep: &Sweep) -> Self {
+        let (anchor, gap, growth) = sweep.ladder.parts();
+        Self {
+            pass: PassId::new(sweep.number, sweep.mission),
+            anchor: if sweep.ladder.is_plain() {
+                -anchor
+            } else {
+                anchor
+            },
+            gap,
+            growth,
+            altitude_m: sweep.relay.at.altitude_m,
+            power_w: sweep.relay.power_w,
+        }
+    }
+}
+
+impl Sweep {
+    /// Encodes the sweep; Upsilon or the lateral offset comes between head and reaches.
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let (head, reaches) = (SweepHead::of(self), &self.reaches);
+        match self.measured_per_w {
+            _ if self.chosen => write(&(tag::ASIDE, head, self.relay.at.y_m, reaches), buffer),
+            None => write(&(tag::SWEEP, head, reaches), buffer),
+            Some(upsilon_per_w) => write(&(tag::MEASURED, head, upsilon_per_w, reaches), buffer),
+        }
+    }
+
+    pub(super) fn decode(tag: u8, body: &[u8]) -> Result<Self, MessageError> {
+        let (head, rest): (SweepHead, _) = take(body)?;
+        let (between, rest) = match tag {
+            tag::SWEEP => (0.0, rest),
+            _ => take(rest)?,
+        };
+        let (reaches, []) = take_targets(rest)? else {
+            return Err(MessageError::Encoding);
+        };
+        let measured_per_w = (tag == tag::MEASURED).then_some(between);
+        let y_m = (tag == tag::ASIDE).then_some(between);
+        checked(head, y_m, measured_per_w, reaches).ok_or(MessageError::Value)
+    }
+}
+
+/// Checks the ranges of a sweep; with a `y_m` it is one at the joint method's cross-section.
+fn checked(
+    head: SweepHead,
+    y_m: Option<f32>,
+    measured_per_w: Option<f32>,
+    reaches: PerTarget,
+) -> Option<Sweep> {
+    let ladder =
+        Ladder::from_parts(head.anchor.abs(), head.gap, head.growth)?.plainly(head.anchor < 0.0);
+    let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
+    let measured = measured_per_w.is_none_or(is_upsilon);
+    let beside = y_m.is_none_or(is_beside);
+    let own = profile(head.altitude_m, head.power_w)?;
+    (fits && measured && beside).then_some(Sweep {
+        number: head.pass.number(),
+        mission: head.pass.mission(),
+        ladder,
+        relay: Station {
+            at: CrossSection {
+                y_m: y_m.unwrap_or(0.0),
+                altitude_m: own.altitude_m,
+            },
+            power_w: own.power_w,
+        },
+        chosen: y_m.is_some(),
+        measured_per_w,
+        reaches,
+    })
+}
+
+/// Verdict on a sweep; sent back.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Answer {
+    /// Number of the sweep.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Results of the targets.
+    pub verdict: Verdict,
+    /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
+    pub stand: Option<f32>,
+    /// True if the sender or a relay after it has a profile of its own.
+    pub own: bool,
+}
+
+impl Answer {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let Verdict { commit, slacks } = &self.verdict;
+        let body = (tag::VERDICT, pass, self.own, commit, slacks, self.stand);
+        write(&body, buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let ((pass, own, commit), rest): ((PassId, bool, Option<u8>), _) = take(body)?;
+        let (slacks, rest) = take_targets(rest)?;
+        let stand: Option<f32> = read(rest)?;
+        let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
+        let placed = stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
+        if !(in_range(&slacks, -FARTHEST_M) && known && placed) {
+            return Err(MessageError::Value);
+        }
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            verdict: Verdict { commit, slacks },
+            own,
+            stand,
+        })
+    }
+}
+
+/// Maximum number of relays in one roster.
+pub const MOST_NAMED: usize = 8;
+
+/// Profile of a relay that differs from the mission's common one.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct OwnSeat {
+    /// Index of the relay in the view, from 1 next to Tx.
+    pub index: u16,
+    /// Fixed altitude, m; 0 if the relay chooses.
+    pub held_m: f32,
+    /// Transmit power, W.
+    pub power_w: f32,
+}
+
+/// Profiles of some relays, in the order of their indices.
+pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
+
+/// Profiles: onward of the relays up to the sender, back of the whole chain.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Roster {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Index of the last relay in earlier passes; 0 in the first pass.
+    pub after: u16,
+    /// Profiles of the relays after that one. If the roster is full, the next pass collects the rest.
+    pub seats: OwnSeats,
+}
+
+/// Index, altitude or 0, and power of each relay.
+type SeatsBody = Vec<(Word, f32, f32), MOST_NAMED>;
+
+impl Roster {
+    pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let mut parts = SeatsBody::new();
+        for seat in &self.seats {
+            _ = parts.push((Word::new(seat.index), seat.held_m, seat.power_w));
+        }
+        write(&(tag, pass, Word::new(self.after), parts), buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, after, parts): (PassId, Word, SeatsBody) = read(body)?;
+        // The count has no empty varint bytes: see `take_targets`.
+        if body.len() != 7 + 10 * parts.len() {
+            return Err(MessageError::Encoding);
+        }
+        let mut roster = Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            after: after.number(),
+            seats: OwnSeats::new(),
+        };
+        let mut last = roster.after;
+        // By reference, because the code that drops the rest of a by-value iterator could panic.
+        for &(index, held_m, power_w) in &parts {
+            let index = index.number();
+            let chooses = held_m.to_bits() == 0;
+            let sound = profile(if chooses { 1.0 } else { held_m }, power_w).is_some();
+            if !(sound && index > last && index <= MAX_RELAYS) {
+                return Err(MessageError::Value);
+            }
+            _ = roster.seats.push(OwnSeat {
+                index,
+                held_m,
+                power_w,
+            });
+            last = index;
+        }
+        Ok(roster)
+    }
+}
+
+/// Token of Algorithm 2.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Token {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Current position of the sender.
+    pub place: Placement,
+    /// Transmit power of the sender, W.
+    pub power_w: f32,
+    /// Action of this pass.
+    pub turn: AdjustStep,
+    /// SIR of the chain before this pass, linear; 0 if unknown.
+    pub sir: f32,
+}
+
+impl Token {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let at = PlaceBody::of(self.place);
+        let turn = StepBody::of(self.turn);
+        write(
+            &(tag::TOKEN, pass, at, self.power_w, turn, self.sir),
+            buffer,
+        )
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, at, power_w, turn, sir) = read(body)?;
+        Self::checked(pass, at, power_w, turn, sir).ok_or(MessageError::Value)
+    }
+
+    fn checked(
+        pass: PassId,
+        at: PlaceBody,
+        power_w: f32,
+        turn: StepBody,
+        sir: f32,
+    ) -> Option<Self> {
+        let place = at.checked()?;
+        Some(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            place,
+            power_w: profile(place.altitude_m, power_w)?.power_w,
+            turn: turn.checked()?,
+            sir: sir_in_range(sir)?,
+        })
+    }
+}
+
+/// Action of a relay that receives the token.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AdjustStep {
+    /// Stay, and learn the neighbours' positions.
+    Look,
+    /// Move if another position is better.
+    Move {
+        /// Maximum change of altitude, m: the paper's `epsilon_h`.
+        explore_m: f32,
+        /// Local search.
+        local: Local,
+    },
+    /// Stay for good.
+    Stop,
+}
+
+/// Action as one byte and three numbers, which are 0 if unused.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct StepBody {
+    kind: u8,
+    explore_m: f32,
+    columns: u8,
+    rows: u8,
+}
+
+impl StepBody {
+    const fn of(turn: AdjustStep) -> Self {
+        let (kind, explore_m, columns, rows) = match turn {
+            AdjustStep::Look => (0, 0.0, 0, 0),
+            AdjustStep::Stop => (1, 0.0, 0, 0),
+            AdjustStep::Move {
+                explore_m,
+                local: Local::Fine,
+            } => (2, explore_m, 0, 0),
+            AdjustStep::Move {
+                explore_m,
+                local: Local::Grid { columns, rows },
+            } => (2, explore_m, columns, rows),
+        };
+        Self {
+            kind,
+            explore_m,
+            columns,
+            rows,
+        }
+    }
+
+    /// Decodes the action; `None` if it is out of range or not the only encoding.
+    fn checked(self) -> Option<AdjustStep> {
+        let Self {
+            kind,
+            explore_m,
+            columns,
+            rows,
+        } = self;
+        let rest = explore_m.to_bits() == 0 && columns == 0 && rows == 0;
+        match kind {
+            0 if rest => Some(AdjustStep::Look),
+            1 if rest => Some(AdjustStep::Stop),
+            2 if (0.0..=1e5).contains(&explore_m) => {
+                let local = match (columns, rows) {
+                    (0, 0) => Local::Fine,
+                    (2.., 2..) => Local::Grid { columns, rows },
+                    _ => return None,
+                };
+                Some(AdjustStep::Move { explore_m, local })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Result of a token; sent back.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Moved {
+    /// Number of the pass.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// Current position of the sender.
+    pub place: Placement,
+    /// True if the sender or any relay after it has moved.
+    pub any: bool,
+    /// SIR of the worst hop after the sender, linear.
+    pub worst: f32,
+}
+
+impl Moved {
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let at = PlaceBody::of(self.place);
+        write(&(tag::MOVED, pass, at, self.any, self.worst), buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, at, any, worst): (PassId, PlaceBody, bool, f32) = read(body)?;
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            place: at.checked().ok_or(MessageError::Value)?,
+            any,
+            worst: sir_in_range(worst).ok_or(MessageError::Value)?,
+        })
+    }
+}
+
+fn sir_in_range(sir: f32) -> Option<f32> {
+    (0.0..=f32::MAX).contains(&sir).then_some(sir)
+}
+
+/// Length of the body: tag, pass id, estimate, sums, receiver's level and the excluded node.
+pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
+
+/// Interference estimate, and measurements: onward of the relays up to the sender, back of those from the sender on.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Heard {
+    /// Number of the pass, wrapping.
+    pub number: u16,
+    /// [`digest`](crate::wire::digest::digest) of the sender.
+    pub mission: u16,
+    /// New estimate for all relays.
+    pub told: Told,
+    /// Sums of the measurements.
+    pub sums: Sums,
+    /// Level at the receiver.
+    pub receiver: Level,
+    /// Node number of a relay that does not fit the others and is not included in `sums`; 0 for none. Used on the way back.
+    pub off: u16,
+}
+
+/// Estimate as one byte and four numbers, which are 0 if unused.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct BeliefBody {
+    number: Word,
+    kind: u8,
+    source: [f32; 3],
+    receiver_w: f32,
+}
+
+const MISSION: u8 = 0;
+const EVEN: u8 = 1;
+const TOWARD_TX: u8 = 2;
+const TOWARD_RX: u8 = 3;
+const SOURCE: u8 = 4;
+
+impl BeliefBody {
+    const fn of(told: Told) -> Self {
+        let (kind, source, receiver_w) = match told.belief {
+            Belief::Mission => (MISSION, [0.0; 3], 0.0),
+            Belief::Unknown(Spread::Even) => (EVEN, [0.0; 3], 0.0),
+            Belief::Unknown(Spread::TowardTx) => (TOWARD_TX, [0.0; 3], 0.0),
+            Belief::Unknown(Spread::TowardRx) => (TOWARD_RX, [0.0; 3], 0.0),
+            Belief::Source { source, receiver_w } => {
+                (SOURCE, [source.power_w, source.x_m, source.y_m], receiver_w)
+            }
+        };
+        Self {
+            number: Word::new(told.number),
+            kind,
+            source,
+            receiver_w,
+        }
+    }
+
+    fn checked(self) -> Option<Told> {
+        let [power_w, x_m, y_m] = self.source;
+        let bare = self.source.map(f32::to_bits) == [0; 3] && self.receiver_w.to_bits() == 0;
+        let belief = match self.kind {
+            MISSION if bare => Belief::Mission,
+            EVEN if bare => Belief::Unknown(Spread::Even),
+            TOWARD_TX if bare => Belief::Unknown(Spread::TowardTx),
+            TOWARD_RX if bare => Belief::Unknown(Spread::TowardRx),
+            SOURCE => {
+                let source = Interferer { power_w, x_m, y_m };
+                (source.is_valid() && is_power(self.receiver_w)).then_some(Belief::Source {
+                    source,
+                    receiver_w: self.receiver_w,
+                })?
+            }
+            _ => return None,
+        };
+        Some(Told {
+            number: self.number.number(),
+            belief,
+        })
+    }
+}
+
+/// Sums in two parts, since serde has no longer tuples.
+type SumsBody = ([f32; 9], [f32; SUMS - 9]);
+
+impl Heard {
+    pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
+        let pass = PassId::new(self.number, self.mission);
+        let [a, b, c, d, e, f, g, h, i, rest @ ..] = self.sums.numbers;
+        let sums: SumsBody = ([a, b, c, d, e, f, g, h, i], rest);
+        let told = BeliefBody::of(self.told);
+        write(
+            &(
+                tag,
+                pass,
+                told,
+                sums,
+                [self.receiver.power_w, self.receiver.count],
+                Word::new(self.off),
+            ),
+            buffer,
+        )
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let (pass, told, (head, rest), [power_w, count], off): (
+            PassId,
+            BeliefBody,
+            SumsBody,
+            [f32; 2],
+            Word,
+        ) = read(body)?;
+        let [a, b, c, d, e, f, g, h, i] = head;
+        let [j, k, l, m, n, o, p, q, r] = rest;
+        let sums = Sums {
+            numbers: [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r],
+        };
+        let told = told.checked().ok_or(MessageError::Value)?;
+        let off = off.number();
+        let receiver = Level { power_w, count };
+        if !(sums.is_sound() && receiver.is_sound() && off <= MAX_NODE) {
+            return Err(MessageError::Value);
+        }
+        Ok(Self {
+            number: pass.number(),
+            mission: pass.mission(),
+            told,
+            sums,
+            receiver,
+            off,
+        })
+    }
+}
+
+pub(super) fn encode_level(mission: u16, power_w: f32, buffer: &mut [u8]) -> Option<usize> {
+    write(&(tag::LEVEL, Word::new(mission), power_w), buffer)
+}
+
+pub(super) fn decode_level(body: &[u8]) -> Result<(u16, f32), MessageError> {
+    let (mission, power_w): (Word, f32) = read(body)?;
+    if !is_level(power_w) {
+        return Err(MessageError::Value);
+    }
+    Ok((mission.number(), power_w))
+}
