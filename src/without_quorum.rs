@@ -11,7 +11,7 @@ pub enum WithoutQuorum {
     /// Hold the agreed position.
     #[default]
     Hold,
-    /// Leave the line from the agreed position, along y and upward; with a guard, only within its geofence
+    /// Leave the line from the agreed position, along y and upward. With a guard, only within its geofence
     /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
         /// Lateral offset, m: -1e4 to 1e4.

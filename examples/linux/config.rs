@@ -1,4 +1,4 @@
-//! The `--config` file of all tools, translated to command-line options and inserted before those of the command line.
+//! Reader of the `--config` file of all tools. Its keys become options before those of the command line.
 //!
 //! Every number therefore has one name and one check, and the command line overrides the file.
 
@@ -217,7 +217,7 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Returns the words of the `--config` file and the command line, and the settings that only a file can give.
+/// Returns the words of the `--config` file and the command line. The settings that only a file can give come with them.
 ///
 /// `section` adds the program's own section of the file.
 ///

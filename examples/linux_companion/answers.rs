@@ -1,4 +1,4 @@
-//! Reports an autopilot that does not answer after a start, once for each kind of fault: no bytes, no MAVLink, no autopilot.
+//! Reports an autopilot that does not answer after a start, once for each kind of fault. No bytes, no MAVLink, no autopilot.
 
 use uav_relay::{Duration, Instant};
 

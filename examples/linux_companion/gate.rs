@@ -1,4 +1,4 @@
-//! Send gate of the neighbour ports, closed while the state that frames would report is being written to disk.
+//! Send gate of the neighbour ports. It is closed while the state that frames would report is being written to disk.
 
 use std::cell::Cell;
 use std::rc::Rc;

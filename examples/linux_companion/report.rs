@@ -289,7 +289,7 @@ impl Report {
         self.identity.index
     }
 
-    /// Returns the name of a node by its initial number, with 0 for the transmitter and N + 1 for the receiver.
+    /// Returns the name of a node by its initial number. 0 is the transmitter, N + 1 the receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),

@@ -1,6 +1,6 @@
 //! Interference reports of a ground station to the relays nearby.
 
-/// Number of reports between handshakes: a relay that has restarted can read reports after the next handshake.
+/// Number of reports between handshakes. A relay that has restarted can read reports after the next handshake.
 const LEVELS_A_GREETING: u8 = 16;
 
 /// Last measurement, and the relays that have not received it.
@@ -21,7 +21,7 @@ impl Levels {
         measured: 0,
     };
 
-    /// Records a measurement, W, for the relays at distances 1 to `within`; returns true if a handshake to them is due first.
+    /// Records a measurement, W, for the relays at distances 1 to `within`. Returns true if a handshake to them is due first.
     pub(super) fn measured(&mut self, power_w: f32, within: u16) -> bool {
         self.power_w = power_w;
         self.untold = (1..=within).fold(0, |all, distance| all | bit(distance));

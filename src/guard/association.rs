@@ -12,7 +12,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of messages of another association in a row that show a new one, not late messages of an old one.
+/// Number of messages of another association in a row that show a new one. Fewer may be late messages of an old one.
 const STRAYS: u8 = 3;
 
 /// Reminders, one per second, after which a halt request that is not repeated expires.
@@ -53,7 +53,7 @@ pub(super) struct Association {
     halt_left: u8,
     /// True while a halt request is sent to the neighbour.
     told_halt: bool,
-    /// Number of the association that the neighbour has left, 0 for none: the neighbour is absent, that is not flown.
+    /// Number of the association that the neighbour has left, 0 for none. The neighbour is absent, that is not flown.
     absent: u16,
     /// Pending notice of the association that this relay has left.
     parting: Option<Parting>,
@@ -93,7 +93,7 @@ impl Association {
         (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m, or NaN.
+    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m. NaN if unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -143,7 +143,7 @@ impl Association {
         fence.says(Fence::RELEASED) && fence.echo == self.own
     }
 
-    /// Returns the next association after this relay has left this one, with a notice if the neighbour relies on this one.
+    /// Returns the next association after this relay has left this one. It has a notice if the neighbour relies on this one.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = Parting {
             own: self.own,
@@ -273,7 +273,7 @@ impl Association {
         self.seen_left = self.seen_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay without an association, not flown or just started: its position, and a halt request to
+    /// Returns the message of a relay without an association, not flown or just started. Its position, and a halt request to
     /// forward.
     pub(super) fn tell_alone(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.parting.is_none();
@@ -294,12 +294,12 @@ impl Association {
     }
 }
 
-/// Limit of this relay's x because of a lost relay that may still hover, and an obstacle that is not flown.
+/// Limit of this relay's x. Its cause is a lost relay that may still hover, or an obstacle that is not flown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Nearest lost node, and the limit, m.
     lost: Option<(u16, f32)>,
-    /// x from which on a relay that was lost nearby is at least the separation away, m; until then only its position across the
+    /// x from which on a relay that was lost nearby is at least the separation away, m. Until then only its position across the
     /// line may separate the two. NaN if there is none.
     near_m: f32,
     /// True if a lost relay was out of order with this one at its last message.
@@ -360,7 +360,7 @@ impl KeepOut {
         self.unflown = None;
     }
 
-    /// Returns the keep-out for another line, along which the position of a drone that is not flown is unknown.
+    /// Returns the keep-out for another line. Along it the position of a drone that is not flown is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
@@ -381,9 +381,9 @@ impl KeepOut {
         ways.is_some_and(|(from, to)| self.way(from, to, &own.config) != to)
     }
 
-    /// Returns the part of the path from `from` to `to` that keeps the separation from a drone that is not flown. If `from` is
-    /// closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the separation
-    /// apart across the line. Within the separation along x only moves across the line away from the drone remain.
+    /// Returns the part of the path from `from` to `to` that keeps clear of a drone that is not flown. It keeps the separation. If
+    /// `from` is closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the
+    /// separation apart across the line. Within the separation along x only moves across the line away from the drone remain.
     pub(super) fn way(&self, from: Placement, to: Placement, config: &GuardConfig) -> Placement {
         let Some((_, drone)) = self.unflown else {
             return to;
@@ -407,7 +407,7 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits relays lost before the first setpoint `x_m`: never heard, they may hover anywhere beyond, at the separation from
+    /// Limits relays lost before the first setpoint `x_m`. Never heard, they may hover anywhere beyond, at the separation from
     /// `near_m` on.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
@@ -431,7 +431,7 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends that state if this relay is beyond `near_m` by `is_beyond`; it then stays at least that far away.
+    /// Ends that state if this relay is beyond `near_m` by `is_beyond`. It then stays at least that far away.
     pub(super) fn part(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -449,7 +449,7 @@ impl KeepOut {
         self.disordered = true;
     }
 
-    /// Returns true while a lost relay may be on the wrong side, so that no path along x leads away from it.
+    /// Returns true while a lost relay may be on the wrong side. No path along x then leads away from it.
     pub(super) const fn is_disordered(&self) -> bool {
         self.disordered
     }
@@ -458,7 +458,7 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Keeps clear of relays at `side` that were never heard and may hover anywhere beyond `limit_m`, until any of them has sent
+    /// Keeps clear of relays at `side` that were never heard. They may hover anywhere beyond `limit_m`, until any of them has sent
     /// a message.
     pub(super) fn expect(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {

@@ -35,15 +35,15 @@ impl Fence {
     pub const STILL: u8 = 1;
     /// Flag of the follower: it agrees to `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
-    /// Flag: the sender, or a relay beyond it, has to move across the line, and needs the separation along x for that.
+    /// Flag: the sender, or a relay beyond it, has to move across the line. It needs the separation along x for that.
     pub const OPENS: u8 = 4;
     /// Flag: echo of the last [`OPENS`](Self::OPENS) received from the destination.
     pub const ECHO_OPENS: u8 = 8;
-    /// Flag: the sender has left this association, because it does not fly to its setpoints, or did not for a time. Positions and
-    /// the number of the fence are not valid.
+    /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
+    /// number of the fence are not valid.
     pub const RELEASED: u8 = 16;
-    /// Flag: the sender, or a relay beyond it, is not in order with its neighbours, so all relays hold their positions. It is
-    /// repeated every second, and valid in any association.
+    /// Flag: the sender, or a relay beyond it, is not in order with its neighbours. All relays hold their positions. It is repeated
+    /// every second, and valid in any association.
     pub const HALTS: u8 = 32;
     /// Flag: the position shows the order only, and grants nothing. Of the follower: it is not in order with its neighbour
     /// downstream. With [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is its last reported x.
@@ -83,7 +83,7 @@ impl Fence {
 pub enum HoldReason {
     /// The neighbour has not agreed to a fence yet.
     Unheard,
-    /// The neighbour is on the wrong side of this relay along the line, or too close along it for certainty: neither moves.
+    /// The neighbour is on the wrong side of this relay along the line, or too close for certainty. Neither moves.
     Order,
     /// The agreed distance along x is less than allowed, given the current positions across the line.
     Close,

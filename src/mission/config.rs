@@ -7,7 +7,7 @@ use crate::place::{CrossSection, Station};
 /// Value of [`Mission::MAX_RELAYS`](crate::Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Two f32 steps just below the distance, as a fraction of it: positions this far apart near Rx remain distinct.
+/// Two f32 steps just below the distance, as a fraction of it. Positions this far apart near Rx remain distinct.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step between two positions, as a fraction of the distance.
@@ -38,7 +38,7 @@ pub struct MissionConfig {
     pub channel: Channel,
     /// Interference on the hops.
     pub interference: Interference,
-    /// Noise power at the input of every receiver, W: 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
+    /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
@@ -70,7 +70,7 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays with `min_separation_m` (plus a rounding of 5e-7 `distance_m`) between them need more than `distance_m`.
+    /// The relays need more than `distance_m` with `min_separation_m` between them. A rounding of 5e-7 `distance_m` is included.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -190,7 +190,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Lateral range 0: relays stay in the vertical plane through transmitter and receiver, as in the paper.
+    /// Lateral range 0, as in the paper. Relays stay in the vertical plane through transmitter and receiver.
     pub const NONE: Self = Self::at(0.0);
 
     /// Returns the band of a single value.

@@ -17,17 +17,17 @@ use crate::wire::digest::digest;
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
+    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W. eta / (`mu_los` `p_MSI`), in a field m^2/W:
     /// `Upsilon_max` / `mu_los`.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of a relay on the last hop per watt, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) /
-    /// eta. With noise, of the interference plus noise at Rx.
+    /// Gain of a relay on the last hop per watt, m^2/W. (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta.
+    /// With noise, of the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m; 0 without noise and in a field.
+    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m. 0 without noise and in a field.
     pub(super) noise_at_a_metre: f32,
 }
 
-/// Maximum noise relative to the interferer's power received at 1 m: above it the interferer would be lost in f32 rounding.
+/// Maximum noise relative to the interferer's power received at 1 m. Above it the interferer would be lost in f32 rounding.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
@@ -326,21 +326,20 @@ impl Mission {
 }
 
 impl Mission {
-    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR: `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
+    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR. `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
     /// eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` /
-    /// `mu_los`.
+    /// Gain of a hop from a relay of `power_w` watts. (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` / `mu_los`.
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// K of the last hop, m^2: the SIR at the receiver is K / squared distance to the relay of `power_w` watts.
+    /// K of the last hop, m^2. The SIR at the receiver is K / squared distance to the relay of `power_w` watts.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -367,7 +366,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x that keeps the separation of neighbours `across_squared` m^2 apart across the line.
+    /// Returns the minimum step in x that keeps the separation of two neighbours. `across_squared`, m^2, is their squared distance
+    /// across the line.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -492,7 +492,7 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Gains for an unknown interferer with relays of `power_w`: SIR = (D / d)^2 on every hop, so equal hops are best.
+/// Gains for an unknown interferer with relays of `power_w`. SIR = (D / d)^2 on every hop, so equal hops are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

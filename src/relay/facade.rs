@@ -1,4 +1,4 @@
-//! Facade of a relay: bytes and time in, frames and events out, and records that a firmware keeps across a reboot.
+//! Facade of a relay: bytes and time in, frames and events out. It also has the records that a firmware keeps across a reboot.
 
 use super::frames;
 use super::port::{Port, Transmit};
@@ -276,7 +276,7 @@ impl Relay {
         self.node.poll_event()
     }
 
-    /// Returns the latest time of the next [`Relay::handle_timeout`] call; after that call it is `None` or later than `now`.
+    /// Returns the latest time of the next [`Relay::handle_timeout`] call. After that call it is `None` or later than `now`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -293,7 +293,7 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the acceptor state, to be persisted after every change and *before* [`poll_transmit`](Self::poll_transmit).
+    /// Returns the acceptor state. Persist it after every change and *before* [`poll_transmit`](Self::poll_transmit).
     ///
     /// Without it a restarted relay breaks its promises, and the chain can split. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
@@ -314,7 +314,8 @@ impl Relay {
 
 #[cfg(feature = "upload")]
 impl Relay {
-    /// Restores `upload`, the newest one stored on [`Event::Uploaded`](crate::Event::Uploaded) before the relay was switched off.
+    /// Restores `upload`, the newest one stored before the relay was switched off. It was stored on
+    /// [`Event::Uploaded`](crate::Event::Uploaded).
     ///
     /// Call it right after the relay was created, before any other input. [`Relay::new`] still takes the mission that was loaded
     /// before flight. Takes constant time.
@@ -326,7 +327,7 @@ impl Relay {
         self.node.resume(upload)
     }
 
-    /// Accepts a new mission that was not received over the link; the chain adopts it like any other upload. Constant time.
+    /// Accepts a new mission that was not received over the link. The chain adopts it like any other upload. Constant time.
     ///
     /// # Errors
     /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays,

@@ -1,4 +1,4 @@
-//! Measurements of one relay: the average at its current position, and faded sums of the earlier positions.
+//! Measurements of one relay. The average at its current position, and faded sums of the earlier positions.
 
 use super::sums::{Sums, Terms, terms};
 use crate::place::Placement;

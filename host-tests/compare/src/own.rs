@@ -1,4 +1,4 @@
-//! This crate's chains and their times on this machine.
+//! Chains of this crate, and their times on this machine.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -58,7 +58,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     Ok(runs)
 }
 
-/// Solves the chain from the mission, as the leader does: at most about fifty passes of N hops, and N^2 / 2 hops for positions.
+/// Solves the chain from the mission, as the leader does. At most about fifty passes of N hops, and N^2 / 2 hops for positions.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target can be met".to_owned();
     let common = |_| mission.config().common;

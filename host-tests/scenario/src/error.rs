@@ -14,7 +14,7 @@ const QUOTED: usize = 60;
 pub struct ScenarioError {
     /// File name as given by the user.
     pub file: String,
-    /// Location: a key such as `relay[1].index`, or a line and column; `None` if the whole file is at fault.
+    /// Location: a key such as `relay[1].index`, or a line and column. `None` if the whole file is at fault.
     pub key: Option<String>,
     /// Offending value as TOML, cut if long; `None` if there is none.
     pub value: Option<String>,

@@ -130,7 +130,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     }
 }
 
-/// Checks a full disk at a ground station, which reports the end of its capture and still answers relays.
+/// Checks a full disk at a ground station. It reports the end of its capture and still answers relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     let files = Files::new();

@@ -1,4 +1,4 @@
-//! Guarded drones with realistic dynamics; `COUNT` and `SEED` select other faults, a failure names its seed.
+//! Guarded drones with realistic dynamics. `COUNT` and `SEED` select other faults, a failure names its seed.
 
 mod anywhere;
 mod between;

@@ -1,4 +1,4 @@
-//! Emulated drones with an autopilot at USART1: they fly to the agreed position while the pilot permits it.
+//! Emulated drones with an autopilot at USART1. They fly to the agreed position while the pilot permits it.
 
 use std::io::{ErrorKind, Read as _};
 

@@ -1,4 +1,4 @@
-//! Stability: no activity in a static world, equal estimates at all relays, and no use of a broken sensor.
+//! Stability. No activity in a static world, equal estimates at all relays, and no use of a broken sensor.
 
 use rayon::prelude::*;
 use uav_relay::{Duration, Instant, Interference};

@@ -40,7 +40,7 @@ use vector::{LONGEST_M, SHORTEST_M};
 #[doc(hidden)]
 pub use vector::{LONGEST_M, SHORTEST_M};
 
-/// Allowed difference between the mission's distance and that of the sites, m, for the rounding of the sites and of f32.
+/// Allowed difference between the mission's distance and that of the sites, m. It covers the rounding of the sites and of f32.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why a pair of sites is rejected.
@@ -217,7 +217,7 @@ impl Axis {
         is_near.then_some(place)
     }
 
-    /// Returns the distance along the ground from a point to the nearest point of the line, m; `None` for an invalid point.
+    /// Returns the distance along the ground from a point to the nearest point of the line, m. `None` for an invalid point.
     ///
     /// It is defined everywhere on earth, also where [`place`](Self::place) is `None`. Constant work.
     ///
@@ -365,7 +365,7 @@ fn chord(arc: f64, radius: f64) -> f64 {
     arc * (1.0 - q * q / 6.0)
 }
 
-/// Special cases of the line: its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
+/// Special cases of the line. Its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

@@ -1,4 +1,4 @@
-//! Vectors in earth-centred coordinates, the ellipsoid, angles in 1e-7 degrees, and the allowed lengths of a line.
+//! Vectors in earth-centred coordinates and the ellipsoid. Angles are in 1e-7 degrees; lines have a minimum and a maximum length.
 
 use crate::geodetic::Geodetic;
 
@@ -56,7 +56,7 @@ impl Vector {
         .unit()
     }
 
-    /// Returns latitude and longitude of a point near the ellipsoid, by one step of Bowring's method; radians.
+    /// Returns latitude and longitude of a point near the ellipsoid, by one step of Bowring's method. Radians.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
         // b / a. The tangent of the parametric latitude is z / (p b / a).
@@ -112,7 +112,7 @@ impl Vector {
     }
 }
 
-/// Returns the ellipsoid's radius of curvature where its normal is `normal`, in the direction `along`, m.
+/// Returns the ellipsoid's radius of curvature, m. It is taken where the normal is `normal`, in the direction `along`.
 pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
     let cos2 = 1.0 - sin2;

@@ -142,7 +142,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of a hello sent now, for the offer that answers it; 0 if uploads are not accepted.
+    /// Returns the number of a hello sent now, for the offer that answers it. 0 if uploads are not accepted.
     #[cfg(feature = "upload")]
     pub(super) fn ask_number(&mut self, now: Instant) -> u16 {
         if takes_uploads(&self.member) {

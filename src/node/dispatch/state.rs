@@ -1,4 +1,4 @@
-//! State of a relay: its five layers, events and counters, and how the effects of one layer reach the others.
+//! State of a relay: its five layers, its events and counters. Effects of one layer are passed to the others.
 //!
 //! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved parts,
 //! such as 1 - 3 - 5 and 2 - 4, or a part that has not selected the node toward the rest of the chain, would keep their links

@@ -101,7 +101,7 @@ pub(super) struct NoisyHop {
 }
 
 impl NoisyHop {
-    /// Returns the maximum distance at which the signal exceeds the noise as required, m, at most 1e9; `None` if there is none.
+    /// Returns the maximum distance at which the signal exceeds the noise as required, m, at most 1e9. `None` if there is none.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -134,7 +134,7 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer at which g's curvature changes sign, m; `None` if g is concave.
+    /// Returns the distance from the interferer at which g's curvature changes sign, m. `None` if g is concave.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {

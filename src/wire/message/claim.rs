@@ -2,7 +2,7 @@
 
 use super::parts::{MessageError, read, tag, write};
 
-/// Claim of the sender to its node number since its start, or the repetition of such a claim; sent in both directions.
+/// Claim of the sender to its node number since its start, or the repetition of such a claim. Sent in both directions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {

@@ -11,7 +11,7 @@ use crate::wire::MAX_NODE;
 /// Length of the body: tag, pass id, estimate, sums, receiver's level and the excluded node.
 pub(super) const LENGTH: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Interference estimate, and measurements: onward of the relays up to the sender, back of those from the sender on.
+/// Interference estimate, and measurements. Onward of the relays up to the sender, back of those from the sender on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass, wrapping.

@@ -27,7 +27,7 @@ pub struct Sweep {
     pub chosen: bool,
     /// Upsilon measured by the sender at its position, 1/W, in a closed loop.
     pub measured_per_w: Option<f32>,
-    /// Reach of the sender for each target, m along x; shorter than the ladder if the upper targets cannot be met.
+    /// Reach of the sender for each target, m along x. Shorter than the ladder if the upper targets cannot be met.
     pub reaches: PerTarget,
 }
 

@@ -120,7 +120,7 @@ struct Group {
 /// Longest time between entries of one group, s: neighbours may detect a failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
-/// Groups the log entries; sorted by a group's last time if all relays have to agree, else by its first.
+/// Groups the log entries. Sorted by a group's last time if all relays have to agree, else by its first.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {

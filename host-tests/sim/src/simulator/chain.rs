@@ -78,7 +78,7 @@ impl Chain {
         false
     }
 
-    /// Feeds `samples` interference samples to every living relay that has a setpoint; `draw` returns one, W, for a position.
+    /// Feeds `samples` interference samples to every living relay that has a setpoint. `draw` returns one, W, for a position.
     pub fn measure(
         &mut self,
         samples: u32,

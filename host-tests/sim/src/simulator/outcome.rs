@@ -61,7 +61,7 @@ pub enum Turning {
     Deaf,
     /// The relay receives the other node again.
     Hears,
-    /// A ground station offers a mission of this version; Tx counts as relay 0, Rx as the relay after the last.
+    /// A ground station offers a mission of this version. Tx counts as relay 0, Rx as the relay after the last.
     Offered(u16),
     /// The relay stored an uploaded mission of this version.
     Uploaded(u16),
@@ -153,7 +153,7 @@ pub struct RelayEnd {
 pub struct Watched {
     /// Time of the first agreement: all relays of a view hold their positions.
     pub first_agreement: Option<Instant>,
-    /// Share of the time since then in which a longest possible chain held its optimum; 0 without an agreement.
+    /// Share of the time since then in which a longest possible chain held its optimum. 0 without an agreement.
     pub availability: Option<f64>,
     /// Longest continuous time since then without that.
     pub longest_wrong: Option<Duration>,

@@ -11,7 +11,7 @@ use super::*;
 const ALL_S: u64 = 400;
 const STILL_S: u64 = 120;
 
-/// Returns all one-way links in chains of 4 and 8 relays, with and without tags, from 0 s and from 20 s.
+/// Returns all one-way links in chains of 4 and 8 relays. They have tags or not, and begin at 0 s or at 20 s.
 fn cases(seed: u64) -> Vec<Setup> {
     let mut all = Vec::new();
     for relays in [4, 8] {

@@ -52,7 +52,7 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     );
 }
 
-/// Relay 3 does not receive relay 2; relay 2 receives relay 3 and must be told why they are no neighbours.
+/// Relay 3 does not receive relay 2. Relay 2 receives relay 3 and must be told why they are no neighbours.
 #[test]
 fn a_relay_that_is_not_heard_is_told_by_whom() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));

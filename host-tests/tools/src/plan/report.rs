@@ -22,11 +22,11 @@ pub struct HypotheticalReport {
     pub x_m: f64,
     /// Lateral position, m; positive to the right of the line.
     pub y_m: f64,
-    /// Mean absolute error of its interference against the true sum, over the positions that relays may take, W.
+    /// Mean absolute error of its interference against the true sum, W. The mean is over the positions that relays may take.
     pub mean_abs_error_w: f64,
     /// Mean absolute error divided by the mean interference.
     pub relative_error: f64,
-    /// SIR (linear) against all interferers of the positions that are best against it; absent if there are none.
+    /// SIR (linear) against all interferers of the positions that are best against it. Absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// True if these positions are the plan's. Otherwise the plan's are the best found against all interferers.

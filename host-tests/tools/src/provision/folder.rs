@@ -69,7 +69,7 @@ fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     Ok(file)
 }
 
-/// Returns the files in the folder that belong to a flight: blocks of any relay, and the names in `files`.
+/// Returns the files in the folder that belong to a flight. Blocks of any relay, and the names in `files`.
 fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String> {
     if !dir.exists() {
         return Ok(Vec::new());

@@ -23,7 +23,7 @@ pub struct Heading {
     pub signed: bool,
 }
 
-/// Returns the text of `summary.txt`; `places` are the expected positions of the relays, empty if unknown.
+/// Returns the text of `summary.txt`. `places` are the expected positions of the relays, empty if unknown.
 pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<&Line>) -> String {
     let Heading {
         scenario,

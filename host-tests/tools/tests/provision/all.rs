@@ -1,4 +1,4 @@
-//! From a plan to the blocks of all drones, without entering a number twice.
+//! Steps from a plan to the blocks of all drones, without entering a number twice.
 
 use std::collections::BTreeSet;
 use std::path::Path;

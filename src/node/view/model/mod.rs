@@ -1,4 +1,4 @@
-//! Model check of the view change: the code of the firmware in short chains, under every order of events.
+//! Model check of the view change. The code of the firmware in short chains, under every order of events.
 //!
 //! | event | model |
 //! | --- | --- |
@@ -35,7 +35,7 @@ mod search;
 use check::{Check, Rule};
 use search::ONE_CHAIN;
 
-/// Checks chains of `relays` relays with so many cuts, proposals and reboots; `heals`: every state is healed.
+/// Checks chains of `relays` relays with so many cuts, proposals and reboots. `heals`: every state is healed.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,

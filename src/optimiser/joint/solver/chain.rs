@@ -1,4 +1,4 @@
-//! Chain as seen by the passes: senders, fixed altitudes, and the ceilings of the first and the last hop.
+//! Chain as seen by the passes. Senders, fixed altitudes, and the ceilings of the first and the last hop.
 //!
 //! Powers and rooms of the relays are given as [`Seat`]. A chain is stored in segments, with the value function at the end of
 //! each, and the policies of one.
@@ -98,7 +98,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, in ln gamma, above which no hop leaps over the interferer: the largest gain of any hop.
+    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. The largest gain of any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);

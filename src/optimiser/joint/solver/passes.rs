@@ -189,7 +189,7 @@ const PLAIN: u16 = 20;
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Continues a plain pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
+    /// Continues a plain pass for `sigma`. Ready with the slack at its end, `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -309,7 +309,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index` of a solved chain that leaves the relays after it their separation, m.
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation. The chain is solved.
     ///
     /// It equals the limit in the passes with the sweep's rules, to the bit.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {

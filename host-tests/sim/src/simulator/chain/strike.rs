@@ -89,7 +89,7 @@ impl Chain {
         }
     }
 
-    /// Returns the index (from 0) of relay `to` (from 1), or of a random living relay if that one is not alive.
+    /// Returns the index (from 0) of relay `to` (from 1). If that one is not alive, it is a random living relay.
     fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
         let living = |member: &Member| member.killed.is_none();
         let meant = to.and_then(|to| usize::from(to).checked_sub(1));

@@ -265,7 +265,7 @@ impl Medium {
 }
 
 impl OnAir {
-    /// Returns true if `node` is in range and the frame has not ended; a frame ending now does not interfere.
+    /// Returns true if `node` is in range and the frame has not ended. A frame ending now does not interfere.
     fn is_heard(&self, node: usize, now: Instant) -> bool {
         self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
     }

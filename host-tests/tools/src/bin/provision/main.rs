@@ -215,7 +215,7 @@ impl<'a> Asked<'a> {
             .asking_after(self.probe_after_ms))
     }
 
-    /// Returns the positions that the relays settle on, if needed; rejects a hypothetical interferer that loses too much.
+    /// Returns the positions that the relays settle on, if needed. Rejects a hypothetical interferer that loses too much.
     fn flown(&self) -> Result<Option<Flown>, String> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);

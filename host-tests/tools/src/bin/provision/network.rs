@@ -8,7 +8,7 @@ use uav_relay_sim::command;
 
 use super::options::{Method, Options};
 
-/// Reports options that override the section, so that nobody relies on a value in the file that is not used.
+/// Reports options that override the section. Nobody then relies on a value in the file that is not used.
 pub(super) fn overridden(
     options: &Options,
     section: &Network,
