@@ -40,7 +40,7 @@ impl Beyond {
         let is_passed_over = |one: &&Override| one.is("--altitude") || one.is("--uav-power");
         self.overrides.iter().find(is_passed_over).map_or(Ok(()), |one| {
             Err(format!(
-                "{}: relay {index} has what is its own by a [[relay]] of --config; say it there",
+                "{}: relay {index} has values of its own in a [[relay]] of --config; state it there",
                 one.option
             ))
         })
@@ -77,7 +77,7 @@ pub fn tell(overrides: &[Override], log: &Log) {
             Instant::ZERO,
             "override",
             json!({ "option": option, "instead_of": instead, "file": file }),
-            format_args!("{option} counts, and not {instead} of {file}"),
+            format_args!("{option} replaces {instead} of {file}"),
         );
     }
 }

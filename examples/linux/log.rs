@@ -203,7 +203,7 @@ impl Writer {
         if dropped > self.told {
             let more = dropped - self.told;
             let fields = json!({ "dropped": dropped });
-            let said = format!("{more} lines dropped, nobody took them");
+            let said = format!("{more} lines dropped: the output was full or closed");
             text += &self.format.line(now, "log", fields, &said);
         }
         text += line;

@@ -305,7 +305,7 @@ fn ttys(options: &Options) -> Result<Ttys, String> {
         Some(tty) if neither => return Ok(Ttys::Shared(tty.clone())),
         Some(tty) => {
             return Err(format!(
-                "--shared {}: is the only tty, without --upstream and --downstream",
+                "--shared {}: cannot be combined with --upstream and --downstream",
                 tty.display()
             ));
         }

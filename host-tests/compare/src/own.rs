@@ -60,7 +60,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
 
 /// Solves the chain from the mission, as the leader does. At most about fifty passes of N hops, and N^2 / 2 hops for positions.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
-    let none = || "no target can be met".to_owned();
+    let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;
     let agreed = solve(black_box(mission), Schedule::Bracketed, common).map_err(|_| none())?;
     (1..=mission.relays())
@@ -72,7 +72,7 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));
-    places.ok_or_else(|| "no target can be met".to_owned())
+    places.ok_or_else(|| "no target SIR can be met".to_owned())
 }
 
 fn flown(setup: Setup) -> Result<Vec<Placement>, String> {

@@ -221,14 +221,14 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
         assert_eq!((rig.targets, rig.real.resumed), (before, 0), "{kind:?}");
         assert_eq!(rig.link.state(), State::Standby);
         let reason = if kind == Kind::Px4 {
-            "relay: waits, the autopilot is in a failsafe"
+            "relay: waits, autopilot in failsafe"
         } else {
-            "relay: waits, take another mode first"
+            "relay: waits, change the mode first"
         };
         assert_eq!(rig.says(reason), 1, "{kind:?}: {:?}", rig.texts);
         assert!(rig.choose(Mode::Hold));
         rig.run(8_000);
-        assert_eq!(rig.says("relay: ready, its mode may be chosen"), 2);
+        assert_eq!(rig.says("relay: ready, choose the mode"), 2);
         assert!(rig.choose(Mode::Companion));
         rig.run(2_000);
         assert_eq!(rig.link.state(), State::Engaged);

@@ -122,7 +122,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: method unknown, or not for a field",
         "configuration refused: byte 15 is neither 0 nor 1",
         "configuration refused: rounds or altitudes of adjust",
-        "configuration refused: samples or most interference",
+        "configuration refused: samples or i_max_w",
         "configuration refused: too many points of the field",
         "configuration refused: bytes behind the last point are not 0",
         "configuration refused: interferer and field at once",

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use uav_relay::{Instant, Interference, Wiring};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Outcome, Turning};
+use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::sky::{Broken, Says};
 
@@ -41,7 +41,10 @@ fn share(wild: &Wild, outcome: &Outcome) -> f64 {
 
 /// Returns the nodes reported as wrong, each once.
 fn named(outcome: &Outcome) -> Vec<u16> {
-    let off = outcome.moments.iter().filter(|it| it.what == Turning::Off);
+    let off = outcome
+        .moments
+        .iter()
+        .filter(|it| it.what == TimelineEvent::SensorOff);
     let mut named: Vec<u16> = off.filter_map(|it| it.other).collect();
     named.sort_unstable();
     named.dedup();

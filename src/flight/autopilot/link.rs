@@ -171,7 +171,7 @@ impl Autopilot {
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if self.vehicle.is_breached && !was_breached {
                     self.events.breached = true;
-                    let text = ["relay: the autopilot's fence is breached", ""];
+                    let text = ["relay: autopilot fence breached", ""];
                     self.report.tell(Line::warning(Topic::Fence, text));
                 }
                 if heard != VehicleUpdate::Nothing {
@@ -201,7 +201,7 @@ impl Autopilot {
             .command(received.from, parameters, is_repeated);
         let line = match event {
             Some(AutopilotEvent::LostCleared { .. }) => {
-                Line::info(Topic::Clearance, "relay: lost relays are cleared")
+                Line::info(Topic::Clearance, "relay: lost relays cleared")
             }
             Some(_) => {
                 let text = ["relay: denied, name all lost relays of one side", ""];
@@ -356,7 +356,7 @@ impl Autopilot {
             Event::Converged => {
                 let is_new = core::mem::take(&mut self.is_new_view);
                 if is_new && self.state == State::Engaged && self.hold == [None; 2] {
-                    let line = Line::info(Topic::Relay, "relay: flies to a new place");
+                    let line = Line::info(Topic::Relay, "relay: flies to new position");
                     self.report.tell(line);
                 }
             }
@@ -396,17 +396,17 @@ impl Autopilot {
         };
         self.stop = None;
         let line = match (before, self.state) {
-            (State::Blind, State::Engaged) => "relay: position is back",
+            (State::Blind, State::Engaged) => "relay: position restored",
             (_, State::Engaged) => {
                 self.streams.renew();
-                "relay: flies to its place"
+                "relay: engaged, flies to position"
             }
             (_, State::Blind) => {
                 self.blind_at = Some(now);
                 if self.vehicle.echo.is_late(now) {
-                    "relay: link is late, keeps its last target"
+                    "relay: link delayed, keeps last target"
                 } else {
-                    "relay: no position, keeps its last target"
+                    "relay: no position, keeps last target"
                 }
             }
             (State::Engaged | State::Blind, State::Standby) => {
@@ -518,7 +518,7 @@ impl Autopilot {
             ),
             None => (
                 AutopilotEvent::Ready,
-                Line::info(Topic::Wait, "relay: ready, its mode may be chosen"),
+                Line::info(Topic::Wait, "relay: ready, choose the mode"),
             ),
         };
         self.events.waits = Some(event);

@@ -78,8 +78,8 @@ impl Release {
     pub(super) const fn text(self) -> [&'static str; 2] {
         let mode = match self.mode {
             FlightMode::Companion => "relay: released",
-            FlightMode::Sticks => "relay: released to the sticks",
-            FlightMode::Hold => "relay: released, holds its place",
+            FlightMode::Sticks => "relay: released, manual mode",
+            FlightMode::Hold => "relay: released, holds position",
             FlightMode::Brake => "relay: released, BRAKE",
             FlightMode::Return => "relay: released, returns (RTL)",
             FlightMode::Land => "relay: released, lands",
@@ -118,12 +118,12 @@ impl WaitReason {
     /// Returns the line for the operator.
     pub(super) const fn text(self) -> &'static str {
         match self {
-            Self::Failsafe => "relay: waits, the autopilot is in a failsafe",
-            Self::Link => "relay: waits, the autopilot's link is late",
-            Self::Found => "relay: waits, take another mode first",
-            Self::Unseen => "relay: waits, no mode was chosen yet",
+            Self::Failsafe => "relay: waits, autopilot in failsafe",
+            Self::Link => "relay: waits, autopilot link delayed",
+            Self::Found => "relay: waits, change the mode first",
+            Self::Unseen => "relay: waits, no mode change seen",
             Self::Position => "relay: waits, no position near the line",
-            Self::NotReady => "relay: waits, not in order with its neighbours",
+            Self::NotReady => "relay: waits, out of order",
         }
     }
 }

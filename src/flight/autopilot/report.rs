@@ -78,17 +78,17 @@ impl Line {
     /// Returns the line for a new reason of the guard to hold the relay back on that side.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
-            Side::Upstream => (Topic::Upstream, " the drone before"),
+            Side::Upstream => (Topic::Upstream, " the previous drone"),
             Side::Downstream => (Topic::Downstream, " the next drone"),
         };
         let what = match reason {
-            Some(HoldReason::Unheard) => "relay: waits, has not heard",
+            Some(HoldReason::Unheard) => "relay: waits, no position from",
             Some(HoldReason::Order) => "relay: waits, wrong order with",
-            Some(HoldReason::Close) => "relay: waits, may not yet near",
-            Some(HoldReason::Lost) => "relay: waits, has lost",
-            Some(HoldReason::NotFlown) => "relay: waits for engagement of",
-            Some(HoldReason::Pending) => "relay: waits, no room yet from",
-            Some(HoldReason::Halted) => "relay: halts, wrong order beyond",
+            Some(HoldReason::Close) => "relay: waits, too close to",
+            Some(HoldReason::Lost) => "relay: waits, lost relay near",
+            Some(HoldReason::NotFlown) => "relay: waits, not engaged:",
+            Some(HoldReason::Pending) => "relay: waits for room from",
+            Some(HoldReason::Halted) => "relay: halts, wrong order past",
             None => "relay: no longer waits for",
         };
         Self::warning(topic, [what, whom])
@@ -97,13 +97,13 @@ impl Line {
     /// Returns the line for an event of the relay; `None` for events that operators do not read.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
-            Event::Infeasible => "relay: no places meet any target",
-            Event::NeighbourLost { .. } => "relay: a neighbour is lost",
-            Event::NoQuorum => "relay: too few others, holds its place",
-            Event::LeaseLapsed => "relay: not certain of the others, holds",
-            Event::Adopted => "relay: a new mission was adopted",
-            Event::UploadRefused { .. } => "relay: refused a mission: line or geofence",
-            Event::IndexTaken { .. } => "relay: its number is used twice",
+            Event::Infeasible => "relay: no target SIR can be met",
+            Event::NeighbourLost { .. } => "relay: neighbour lost",
+            Event::NoQuorum => "relay: no quorum, holds position",
+            Event::LeaseLapsed => "relay: lease expired, holds position",
+            Event::Adopted => "relay: new mission adopted",
+            Event::UploadRefused { .. } => "relay: mission rejected: line or geofence",
+            Event::IndexTaken { .. } => "relay: duplicate relay number",
             _ => return None,
         };
         Some(Self::info(Topic::Relay, text))

@@ -34,7 +34,7 @@ use start::{Start, switched_on};
 use super::fleet::Vehicle;
 use super::flying::Seen;
 use super::medium::AirCounts;
-use super::outcome::{Outcome, RelayEnd, Turning};
+use super::outcome::{Outcome, RelayEnd, TimelineEvent};
 use super::queue::Happening;
 use super::setup::Setup;
 
@@ -218,7 +218,7 @@ impl Chain {
                 if let Some(vehicle) = self.fleet.get_mut(index) {
                     vehicle.boot(now);
                 }
-                self.tell(index, Turning::Booted, None);
+                self.tell(index, TimelineEvent::Booted, None);
             }
             _ if member.killed.is_some() => return,
             Happening::Kill => {
@@ -226,7 +226,7 @@ impl Chain {
                 if let Some(medium) = &mut self.medium {
                     medium.switch_off(index);
                 }
-                self.tell(index, Turning::Silent, None);
+                self.tell(index, TimelineEvent::Silent, None);
                 self.film(index);
                 return;
             }

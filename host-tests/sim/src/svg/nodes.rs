@@ -42,7 +42,7 @@ pub(super) fn relays(
         let (class, note) = if picture.lost.contains(&number) {
             ("relay lost", ", silent")
         } else if lost {
-            ("relay lost", ", not in the chain any more")
+            ("relay lost", ", no longer in the chain")
         } else {
             ("relay", "")
         };

@@ -64,8 +64,8 @@ impl Others {
     /// Returns the tooltip of the marker.
     pub(super) const fn tip(self) -> &'static str {
         match self {
-            Self::Before => "interferer of the mission before",
-            Self::Believed => "interferer that the relays believe in",
+            Self::Before => "interferer of the previous mission",
+            Self::Believed => "estimated interferer",
         }
     }
 }

@@ -3,7 +3,7 @@
 use uav_relay::Phase;
 use uav_relay_sim::simulator::deaf::Deaf;
 use uav_relay_sim::simulator::flying::groups;
-use uav_relay_sim::simulator::outcome::Turning;
+use uav_relay_sim::simulator::outcome::TimelineEvent;
 
 use super::*;
 
@@ -54,7 +54,7 @@ fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let last = outcome.moments.iter().rfind(|moment| {
         let changes = matches!(
             moment.what,
-            Turning::Reformed { .. } | Turning::Converged | Turning::Cut
+            TimelineEvent::Reformed { .. } | TimelineEvent::Converged | TimelineEvent::NoQuorum
         );
         changes && nodes.contains(&moment.relay)
     });

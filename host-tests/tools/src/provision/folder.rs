@@ -24,7 +24,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
         && !force
     {
         return Err(format!(
-            "--out-dir {}: {} is there already; --force writes over it, and removes blocks of other relays",
+            "--out-dir {}: {} exists already; --force overwrites it, and removes blocks of other relays",
             dir.display(),
             first.file_name().unwrap_or_default().to_string_lossy()
         ));

@@ -113,8 +113,8 @@ impl Chain {
         let name = fate(&before, member.relay.stats());
         *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
         let note = match kind {
-            Strike::Forge => "the attacker's own",
-            Strike::Replay => "the attacker's, sent again",
+            Strike::Forge => "forged by the attacker",
+            Strike::Replay => "replayed by the attacker",
         };
         self.keep_frame(self.now, link(index, port), bytes, note.to_owned());
         self.drain(index);
