@@ -18,7 +18,7 @@ pub struct Fence {
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
-    /// Position of the sender across the line, or the one it flies to, m: both -1e7 to 1e7.
+    /// Position of the sender across the line, or its target there, m. Both coordinates are -1e7 to 1e7.
     pub across: CrossSection,
     /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
     /// must not move across the line.

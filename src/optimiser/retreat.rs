@@ -63,7 +63,8 @@ impl Retreat {
         }
     }
 
-    /// Returns the same hop if not relay `index` but those before it hold back to leave themselves room.
+    /// Returns the same hop with a receiver that may go to the end of its range. The relays before `index` then hold back to leave
+    /// themselves room.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),

@@ -264,7 +264,7 @@ pub struct SerialStats {
     pub framing: u32,
     /// Bytes with the wrong parity.
     pub parity: u32,
-    /// Bytes from a noisy line.
+    /// Number of bytes received with noise on the line.
     pub noise: u32,
     /// Reads that failed for another reason.
     pub other: u32,

@@ -29,7 +29,7 @@ pub struct Scenario {
     pub lateral_max_m: f64,
     /// Least distance between two relays, m, 0 (its default) to 1e5.
     pub min_separation_m: f64,
-    /// EIRP of Tx (power and antenna gain), W, 1e-6 to 1e6.
+    /// EIRP of the transmitter (power and antenna gain), W, 1e-6 to 1e6.
     pub tx_w: f64,
     /// EIRP of relays without a power of their own, W, 1e-6 to 1e6.
     pub uav_w: f64,

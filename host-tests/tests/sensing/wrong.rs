@@ -12,7 +12,7 @@ use uav_relay_tools::listening::wild::Wild;
 
 use crate::count;
 
-/// Faults of a sensor. Constant values are those of a 10 W interferer at 500 m, a receiver's noise, and zero.
+/// Simulated sensor faults. Constant values are those of a 10 W interferer at 500 m, a receiver's noise, and zero.
 const KINDS: [(&str, Says); 7] = [
     ("0.1 times", Says::Times(0.1)),
     ("0.5 times", Says::Times(0.5)),

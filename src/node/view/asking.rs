@@ -64,7 +64,7 @@ impl Asking {
         }
     }
 
-    /// Requests a view after about `wait`, doubled up to three times by consecutive refusals. After `wait` if anything changes.
+    /// Requests a view after about `wait`, which consecutive refusals double up to three times. A change ends the doubling.
     pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
         self.asks = true;
         let wait = self.jitter.spread(wait);

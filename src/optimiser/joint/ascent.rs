@@ -120,7 +120,7 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the limit of the slack that counts, m.
+    /// Returns the maximum slack that is counted, m: more slack has no additional value.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }

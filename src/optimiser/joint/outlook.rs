@@ -136,7 +136,7 @@ fn add(a: Triple, b: Triple, f: f32) -> Triple {
     sum
 }
 
-/// a + (b f + c g)
+/// Returns a + (b f + c g), for each coordinate.
 fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     let mut sum = a;
     for ((cell, b), c) in sum.iter_mut().zip(b).zip(c) {

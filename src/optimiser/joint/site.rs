@@ -16,7 +16,7 @@ use crate::sir::{Sender, in_noise, square};
 /// Maximum fraction of the squared reach that is used.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation, so that a small violation remains above the required one.
+/// Factor on the minimum separation. With a small violation the required separation is still kept.
 pub(super) const MARGIN: f32 = 1.0005;
 
 /// Iterations of the tangent for a hop with noise.

@@ -90,7 +90,7 @@ pub(super) struct NoisyHop {
     pub(super) excess: f32,
     /// u, m.
     pub(super) ahead: f32,
-    /// a^2, m^2.
+    /// Value of a^2, m^2.
     pub(super) aside_squared: f32,
     /// b^2, m^2.
     pub(super) across_squared: f32,
@@ -202,7 +202,7 @@ impl NoisyHop {
         None
     }
 
-    /// The root between `low`, where g is not negative, and `high`, where it is.
+    /// Returns the root of g in [`low`, `high`]; g is not negative at `low`, and negative at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

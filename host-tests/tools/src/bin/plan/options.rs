@@ -56,7 +56,7 @@ struct Wanted {
     /// The best places for this number of relays, 1 to 1000
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     uavs: Option<u16>,
-    /// The fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
+    /// Find the fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-9, 1e9))]
     target_sir: Option<f64>,
     /// --target-sir in dB, -90 to 90
