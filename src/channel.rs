@@ -61,7 +61,7 @@ impl core::fmt::Display for ChannelError {
 impl core::error::Error for ChannelError {}
 
 impl Channel {
-    /// Creates a channel at `carrier_hz` (1e6 to 1e12) with the excess loss *factors* `excess_los` and `excess_nlos` (1 to 1e20).
+    /// Creates a channel at `carrier_hz`, 1e6 to 1e12. The excess losses `excess_los` and `excess_nlos` are *factors*, 1 to 1e20.
     ///
     /// # Errors
     /// [`ChannelError`] names the parameter that is outside its range.
@@ -153,7 +153,7 @@ impl Channel {
         }
     }
 
-    /// Path-loss factor between two drones, 1/m^2: a receiver at d metres from P watts receives P / (factor d^2).
+    /// Path-loss factor between two drones, 1/m^2. A receiver at d metres from P watts receives P / (factor d^2).
     pub const fn mu_los(&self) -> f64 {
         self.mu_los
     }

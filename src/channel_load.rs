@@ -31,7 +31,7 @@ const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Relays in range of one place in a chain whose radios reach four relays far; a frame then waits for its own time only.
+/// Relays in range of one place in a chain whose radios reach four relays far. A frame then waits for its own time only.
 const NEAR: u16 = 9;
 
 /// Maximum wait for the channel, in frame times.
@@ -48,7 +48,7 @@ pub struct ChannelLoad {
 }
 
 impl ChannelLoad {
-    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4: an overhead of 12 bytes per frame.
+    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4. An overhead of 12 bytes per frame.
     pub const fn of_radios(in_range: u16) -> Self {
         Self {
             in_range,
@@ -56,7 +56,8 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the bits of keep-alive traffic in one `probe_after`, in bit µs/s, divided by the allowed fraction of the channel.
+    /// Returns the bits of keep-alive traffic in one `probe_after`, in bit µs/s. They are divided by the allowed fraction of the
+    /// channel.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -137,7 +138,7 @@ impl ChannelLoad {
         pairs.saturating_add(1)
     }
 
-    /// Returns the minimum `probe_after` on a channel of `baud` bit/s; `dead_after` should be three times that.
+    /// Returns the minimum `probe_after` on a channel of `baud` bit/s. `dead_after` should be three times that.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         Duration::from_micros(self.needed().div_ceil(baud))

@@ -13,7 +13,7 @@ use crate::side::Side;
 pub enum Event {
     /// `Relay::setpoint` has changed: fly there, or hold the position if there is none.
     SetpointChanged,
-    /// The chain has agreed on positions, and on a target SIR (`Relay::target`) where the interference is known.
+    /// The chain has agreed on positions. Where the interference is known, it has agreed on a target SIR (`Relay::target`), too.
     Converged,
     /// Every allowed target SIR is infeasible (raised at the leader: relay 1; in a field relay N). All relays keep their positions.
     /// `Relay::restart`, a new view or a new mission makes the leader try again.
@@ -27,15 +27,15 @@ pub enum Event {
         /// Index of the neighbour.
         node: u16,
     },
-    /// A lost neighbour is received again, or another node has replaced it; `node` then differs from that of the loss.
+    /// A lost neighbour is received again, or another node has replaced it. `node` then differs from that of the loss.
     NeighbourBack {
         /// Side of the neighbour.
         side: Side,
         /// Index of the neighbour.
         node: u16,
     },
-    /// A node has reported eight times in a row that it does not receive this relay, so it cannot be a neighbour. Raised once
-    /// until the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
+    /// A node has reported eight times in a row that it does not receive this relay. It cannot be a neighbour. Raised once until
+    /// the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node.
         node: u16,
@@ -46,19 +46,18 @@ pub enum Event {
         /// Index of the node.
         node: u16,
     },
-    /// Three handshakes in a row under a node's index are signed with another key, and none between them with the right key. An
-    /// operator gives both nodes the same key. A single forged frame does not raise it, but an attacker without the key who sends
-    /// three in a row does: if that node is received at the same time, it is an attack and the node is fine.
+    /// Three handshakes in a row under a node's index are signed with another key. None between them has the right key. An operator
+    /// gives both nodes the same key. A single forged frame does not raise it, but an attacker without the key who sends three in a
+    /// row does: if that node is received at the same time, it is an attack and the node is fine.
     KeyMismatch {
         /// Index of the node.
         node: u16,
     },
-    /// Five handshakes in a row under a node's index, with the right key, have an epoch that is not newer than the known one. The
+    /// Five handshakes in a row under a node's index have an epoch that is not newer than the known one. Their key is right. The
     /// epoch is older, or the same with the same seed, and none between them is newer: the node did not increase its epoch at its
-    /// last start, and its frames are rejected. An operator increases that node's epoch and restarts it, or restarts this relay
-    /// and its other neighbours. A replay of one recorded frame does not raise it, but a replay in order of five handshakes of
-    /// one start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive
-    /// ([`Event::IndexTaken`]).
+    /// last start, and its frames are rejected. An operator increases that node's epoch and restarts it, or restarts this relay and
+    /// its other neighbours. A replay of one recorded frame does not raise it, but a replay in order of five handshakes of one
+    /// start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive ([`Event::IndexTaken`]).
     EpochWentBack {
         /// Index of the node.
         node: u16,
@@ -82,17 +81,17 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was rejected, because it has no valid line on earth or leaves the relay's own geofence. The relay keeps
-    /// its mission, and the ground station is informed. Raised once for each such mission. An operator uploads one whose sites
-    /// are as far apart as its distance, and within the geofence.
+    /// A newer mission was rejected. It has no valid line on earth, or leaves the relay's own geofence. The relay keeps its
+    /// mission, and the ground station is informed. Raised once for each such mission. An operator uploads one whose sites are as
+    /// far apart as its distance, and within the geofence.
     UploadRefused {
         /// Reason of the rejection.
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::belief`). New positions follow.
     Believed,
-    /// The measurements do not fit a single source on the ground, are too few, or are contradictory (raised at the leader).
-    /// `Relay::unfit` gives the reason.
+    /// The measurements do not fit a single source on the ground (raised at the leader). They may also be too few, or
+    /// contradictory. `Relay::unfit` gives the reason.
     InterfererUnclear,
     /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator checks its
     /// receiver. Transmitter and receiver are reported by the leader only, a relay that measures nothing at all by itself only.

@@ -18,7 +18,7 @@ pub struct Geodetic {
 }
 
 impl Geodetic {
-    /// Returns the nearest representable position; `None` for a latitude, longitude or height that is not finite or out of range.
+    /// Returns the nearest representable position. `None` for a latitude, longitude or height that is not finite or out of range.
     ///
     /// ```
     /// use uav_relay::Geodetic;
@@ -66,7 +66,7 @@ pub struct Sites {
 pub(crate) const SITES_LENGTH: usize = 24;
 
 impl Sites {
-    /// Encodes latitude, longitude and height of the transmitter, then of the receiver, as four little-endian bytes each.
+    /// Encodes latitude, longitude and height of the transmitter, then of the receiver. Each takes four little-endian bytes.
     pub(crate) fn to_bytes(self) -> [u8; SITES_LENGTH] {
         let Self { tx, rx } = self;
         let numbers = [
@@ -111,7 +111,7 @@ pub enum LineError {
     Distance,
     /// The mission's sites are less than 10 m or more than 100 km apart.
     Sites,
-    /// The mission's altitudes exceed the relay's own geofence, [`GuardConfig::fence`](crate::guard::config::GuardConfig).
+    /// The mission's altitudes exceed the relay's own geofence. See [`GuardConfig::fence`](crate::guard::config::GuardConfig).
     Altitude,
     /// The mission's lateral band exceeds the geofence.
     Lateral,

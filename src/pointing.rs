@@ -21,7 +21,7 @@ const MAX_ERROR_RAD: f32 = 0.002_967;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
-    /// Angle in the ground plane from x toward y, rad, within -pi to pi; 0 for a position straight above or below.
+    /// Angle in the ground plane from x toward y, rad, within -pi to pi. 0 for a position straight above or below.
     pub azimuth_rad: f32,
     /// Angle above the horizon, rad, within -pi/2 to pi/2.
     pub elevation_rad: f32,
@@ -30,7 +30,8 @@ pub struct Bearing {
 }
 
 impl Bearing {
-    /// Returns the bearing of a position `ahead_m` farther along x, `aside_m` farther along y and `climb_m` higher.
+    /// Returns the bearing of a position relative to this one. It is `ahead_m` farther along x, `aside_m` along y and `climb_m`
+    /// higher.
     ///
     /// `None` for a zero distance, and for values that are not finite or whose distance overflows.
     ///
@@ -69,7 +70,7 @@ impl Bearing {
         )
     }
 
-    /// Returns the bearing of the mission's interferer, on the ground, seen from `from`; for steering a null toward it.
+    /// Returns the bearing of the mission's interferer, on the ground, seen from `from`. For steering a null toward it.
     ///
     /// `None` if the relay is at the interferer's position, or the interference has no position.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {
@@ -93,7 +94,7 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// Returns the angle whose tangent is `opposite` / `adjacent`, in the quadrant of the two; 0 if both are 0.
+/// Returns the angle whose tangent is `opposite` / `adjacent`, in the quadrant of the two. 0 if both are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());
     if large > 0.0 {
@@ -115,7 +116,7 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::place::Placement;
 
-    /// Returns the errors of azimuth and elevation (rad), of the direction (rad) and of the distance (relative).
+    /// Returns the errors of azimuth, elevation and direction, rad, and the relative error of the distance.
     fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {
         let bearing = Bearing::new(ahead_m, aside_m, climb_m).unwrap();
         let [x, y, h] = [ahead_m, aside_m, climb_m].map(f64::from);

@@ -4,9 +4,9 @@
 //! instructions, more than the rest of a reach. This one derives a first estimate from the exponent and improves it by Heron's
 //! rule on the FPU. It uses additions, multiplications and divisions only, so every target gives the same bits.
 
-/// Returns the square root of `x`, within one unit in the last place of an f32; 0 for `x` below the smallest normal f32. 18
-/// instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa: a factor
-/// of 4 changes only the exponent of the result, so two octaves cover all exponents.
+/// Returns the square root of `x`, within one unit in the last place of an f32. 0 for `x` below the smallest normal f32. 18
+/// instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa: a factor of
+/// 4 changes only the exponent of the result, so two octaves cover all exponents.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
 pub(crate) fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)

@@ -173,14 +173,14 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first solves the chain from the mission (bracketed schedule): one round trip if the solution is right.
+    /// True if the leader first solves the chain from the mission (bracketed schedule). One round trip if the solution is right.
     pub predict: bool,
     /// Two links or one shared channel.
     pub wiring: Wiring,
     /// Key and epoch for signing frames. With it the relay accepts signed frames only; without it, it accepts frames from any
     /// sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
-    /// Maximum time of a sweep (100 bytes) from one relay's `poll_transmit` to the next one's, including its computation; above
+    /// Maximum time of a sweep (100 bytes) from one relay's `poll_transmit` to the next one's. It includes the computation; above
     /// 0. It is scaled for longer messages.
     pub hop_time: Duration,
     /// Silence of a neighbour after which heartbeats are requested, 16 times until `dead_after`; above 0.
@@ -192,16 +192,17 @@ pub struct Settings {
     pub quorum: bool,
     /// Behaviour of the relay without a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence; `None` for no guard. With it
-    /// the firmware has to report the drone's position: `Relay::handle_position`.
+    /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence. `None` for no guard. With it the
+    /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware converts positions to latitudes and longitudes along a line between two configured sites. Then an
+    /// True if the firmware converts positions to latitudes and longitudes. The line is between two configured sites. Then an
     /// upload without sites of its own is rejected if its distance differs. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
 impl Default for Settings {
-    /// Bracketed with prediction, two links of 57 600 baud or faster, neighbours lost after 15 s of silence.
+    /// Creates the default: bracketed with prediction, and two links of 57 600 baud or faster. Neighbours are lost after 15 s of
+    /// silence.
     fn default() -> Self {
         Self::DEFAULT
     }
@@ -228,7 +229,7 @@ impl Settings {
         sited: false,
     };
 
-    /// Settings for a UART of `baud` bit/s to each neighbour: the defaults, with a longer `hop_time` below 57 600 bit/s.
+    /// Settings for a UART of `baud` bit/s to each neighbour. The defaults, with a longer `hop_time` below 57 600 bit/s.
     ///
     /// `hop_time` has 10 ms for computing and for the buffers on the way. Set it for a link that needs more, such as a USB adapter.
     ///
@@ -308,16 +309,16 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature that the crate was
-    /// built without.
+    /// `method` cannot be used. It chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature
+    /// that the crate was built without.
     Method,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,
-    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000, or the crate was built
+    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000. Or the crate was built
     /// without the feature `field`.
     Measure,
-    /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1, or the mission is in a field, or the
-    /// crate was built without the feature `sensing`.
+    /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1. Or the mission is in a field,
+    /// or the crate was built without the feature `sensing`.
     Listen,
     /// `hop_time` is zero.
     HopTime,
@@ -441,7 +442,7 @@ pub enum WithoutQuorum {
     /// Hold the agreed position.
     #[default]
     Hold,
-    /// Leave the line from the agreed position, along y and upward; with a guard, only within its geofence
+    /// Leave the line from the agreed position, along y and upward. With a guard, only within its geofence
     /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
         /// Lateral offset, m: -1e4 to 1e4.

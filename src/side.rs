@@ -6,9 +6,9 @@ use crate::mission::Heading;
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Toward the transmitter.
+    /// Side of the transmitter.
     Upstream,
-    /// Toward the receiver.
+    /// Side of the receiver.
     Downstream,
 }
 

@@ -34,7 +34,7 @@ use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 
-/// Returns the inverse interference at `at`, the one term of a hop's SIR that depends on the kind of interference.
+/// Returns the inverse interference at `at`. It is the one term of a hop's SIR that depends on the kind of interference.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an interferer
 /// it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) / `Upsilon_max`, with
@@ -83,7 +83,7 @@ impl Sender {
         }
     }
 
-    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x; infinite if both are at one place.
+    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x. Infinite if both are at one place.
     ///
     /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's
     /// `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is
@@ -95,8 +95,7 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`: the paper's `SIR_{N+1}`, K / (d^2 + y^2 +
-/// h^2).
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. The paper's `SIR_{N+1}`, K / (d^2 + y^2 + h^2).
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
@@ -117,7 +116,7 @@ const DOUBLINGS: u8 = 64;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extremum {
-    /// SIR_1 falls up to this x, m (the paper's Psi^x), and rises beyond: the interferer is ahead of Tx (X > 0).
+    /// SIR_1 falls up to this x, m (the paper's Psi^x), and rises beyond. The interferer is ahead of Tx (X > 0).
     Valley(f32),
     /// SIR_1 falls up to the first x, m, rises up to the second and falls beyond: X > 0, with noise.
     ValleyAndHill(f32, f32),
@@ -207,7 +206,7 @@ impl Slope {
     }
 }
 
-/// Returns the last x in [`low`, `high`] at which `holds` is true; it is true at `low` and changes once.
+/// Returns the last x in [`low`, `high`] at which `holds` is true. It is true at `low` and changes once.
 fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
     let (mut low, mut high) = (low, high);
     for _ in 0..HALVINGS {
@@ -232,7 +231,7 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
     at
 }
 
-/// Returns the largest SIR that a relay at `altitude_m` can have on the first hop, over all x in [0, D].
+/// Returns the largest SIR of the first hop to a relay at `altitude_m`. The maximum is over all x in [0, D].
 ///
 /// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of [`first_hop_turn`] for X
 /// < 0, with noise as well. In a field it is an upper bound: the largest Upsilon right above the transmitter. It is larger at

@@ -10,7 +10,7 @@ pub struct Stats {
     pub repeats: u32,
     /// Passes of any kind, and proposals, that this relay has started as the leader.
     pub sweeps: u32,
-    /// Messages received from a neighbour with values in range; some are also counted below, for example as stale.
+    /// Messages received from a neighbour with values in range. Some are also counted below, for example as stale.
     pub received: u32,
     /// Duplicate passes and proposals, to which the reply is sent again.
     pub repeated: u32,
@@ -26,7 +26,7 @@ pub struct Stats {
     pub version: u32,
     /// Handshake frames with the right tag; they have no effect beyond the handshake.
     pub handshakes: u32,
-    /// Intact frames without a tag at a relay with a key; without a key, messages that are accepted with a tag only.
+    /// Intact frames without a tag at a relay with a key. Without a key, messages that are accepted with a tag only.
     pub unsigned: u32,
     /// Intact frames with a wrong tag: of a sender without the key, altered, or of another epoch.
     pub forged: u32,
@@ -38,16 +38,16 @@ pub struct Stats {
     pub foreign: u32,
     /// Intact frames from a node that is no neighbour, or for another node on a link to this relay only.
     pub misaddressed: u32,
-    /// Messages from the wrong side: a pass or proposal from downstream of its direction, or a reply from upstream of it.
+    /// Messages from the wrong side. A pass or proposal from downstream of its direction, or a reply from upstream of it.
     pub misdirected: u32,
-    /// Messages of another mission ([`Event::MissionMismatch`](crate::Event::MissionMismatch)), and offers of a mission for other
-    /// sites ([`Event::UploadRefused`](crate::Event::UploadRefused)).
+    /// Messages of another mission, and offers of a mission for other sites. The events are
+    /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Messages of a round or view change that belong to another view, or to a mission that is not flown in it.
+    /// Messages of a round or view change that belong to another view. They may also belong to a mission that is not flown in it.
     pub view: u32,
     /// New views that this relay has accepted.
     pub views: u32,
-    /// Messages of a pass or view change that is over or cannot be joined; offers that answer no recent hello.
+    /// Messages of a pass or view change that is over or cannot be joined. Offers that answer no recent hello.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or without a measurement in progress.
     pub samples_refused: u32,

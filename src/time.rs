@@ -95,13 +95,13 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Maximum backward step of the caller's time that is taken for out-of-order calls, not for a clock step.
+/// Maximum backward step of the caller's time that counts as out-of-order calls. A larger one is a clock step.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum forward step, some 140 years: a wrong reading does not take internal time to its end, where no timer expires.
+/// Maximum forward step, some 140 years. A wrong reading does not take internal time to its end, where no timer expires.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Converts the caller's time, which may step in either direction, to internal time, which never runs backward.
+/// Converts the caller's time to internal time, which never runs backward. The caller's time may step in either direction.
 ///
 /// | caller's time | internal time |
 /// | --- | --- |
@@ -186,7 +186,7 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` and a random eighth of it at most, so that relays on a shared channel do not stay in step.
+    /// Returns `span` and a random eighth of it at most. Relays on a shared channel then do not stay in step.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

@@ -2,7 +2,7 @@
 
 use crate::mission::MAX_RELAYS;
 
-/// Identifier of a view, ordered: a number, and the node that proposed it, so that no two nodes propose the same view.
+/// Identifier of a view, ordered. A number, and the node that proposed it, so that no two nodes propose the same view.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);

@@ -1,4 +1,4 @@
-//! Cost of the runners around a relay: a full sweep from one port to the other, on polled and on asynchronous ports.
+//! Cost of the runners around a relay. A full sweep from one port to the other, on polled and on asynchronous ports.
 
 use core::cell::Cell;
 use core::convert::Infallible;

@@ -1,4 +1,4 @@
-//! Cost of converting positions between the line and the earth, in f64, for which this core has no instructions.
+//! Cost of converting positions between the line and the earth, in f64. This core has no f64 instructions.
 
 use core::hint::black_box;
 

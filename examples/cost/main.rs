@@ -1,4 +1,4 @@
-//! Cost of a relay's calls on a Cortex-M4F, in instructions and bytes of stack; run by `cargo cost` in QEMU.
+//! Cost of a relay's calls on a Cortex-M4F, in instructions and bytes of stack. Run by `cargo cost` in QEMU.
 //!
 //! With `-icount shift=7` QEMU advances 128 ns with every instruction, and SysTick counts at 168 MHz on this machine, so that the
 //! counter measures instructions. They are exact and the same in every run, but they are not cycles. Results are printed by

@@ -1,5 +1,5 @@
-//! Firmware that shows that target and PC agree on every byte: on USART2 (TX PA2, RX PA3), 115 200 baud, it answers each frame
-//! with the crate's result. `host-tests/tests/qemu/golden.rs` compares the answers with those of a PC.
+//! Firmware that shows that target and PC agree on every byte. On USART2 (TX PA2, RX PA3), 115 200 baud, it answers each frame with
+//! the crate's result. `host-tests/tests/qemu/golden.rs` compares the answers with those of a PC.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -36,7 +36,7 @@ fn start() -> Option<Uart> {
     Serial::new(chip.USART2, (a.pa2, a.pa3), config, &mut rcc).ok()
 }
 
-/// Nothing else runs here, so it may wait for the port.
+/// Answers each frame; blocks on the port, because nothing else runs here.
 #[cfg(target_os = "none")]
 fn serve(mut uart: Uart) -> ! {
     use embedded_hal_nb::serial::Read as _;

@@ -1,4 +1,4 @@
-//! The `--config` file of all tools, translated to command-line options and inserted before those of the command line.
+//! Reader of the `--config` file of all tools. Its keys become options before those of the command line.
 //!
 //! Every number therefore has one name and one check, and the command line overrides the file.
 
@@ -40,7 +40,7 @@ impl Beyond {
         let is_passed_over = |one: &&Override| one.is("--altitude") || one.is("--uav-power");
         self.overrides.iter().find(is_passed_over).map_or(Ok(()), |one| {
             Err(format!(
-                "{}: relay {index} has what is its own by a [[relay]] of --config; say it there",
+                "{}: relay {index} has values of its own in a [[relay]] of --config; state it there",
                 one.option
             ))
         })
@@ -77,7 +77,7 @@ pub fn tell(overrides: &[Override], log: &Log) {
             Instant::ZERO,
             "override",
             json!({ "option": option, "instead_of": instead, "file": file }),
-            format_args!("{option} counts, and not {instead} of {file}"),
+            format_args!("{option} replaces {instead} of {file}"),
         );
     }
 }
@@ -217,7 +217,7 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Returns the words of the `--config` file and the command line, and the settings that only a file can give.
+/// Returns the words of the `--config` file and the command line. The settings that only a file can give come with them.
 ///
 /// `section` adds the program's own section of the file.
 ///

@@ -24,7 +24,7 @@ pub fn next(file: &Path) -> Result<u32, String> {
     let last: u32 = last.ok_or_else(|| named("must hold a number within 0 to 4294967294"))?;
     let epoch = last
         .checked_add(1)
-        .ok_or_else(|| named("there is no epoch after that"))?;
+        .ok_or_else(|| named("is the largest epoch, and a start needs a larger one"))?;
     keep(file, format!("{epoch}\n").as_bytes())
         .map_err(|error| named(&format!("cannot be written: {error}")))?;
     Ok(epoch)

@@ -1,5 +1,5 @@
-//! Log lines, written by a separate thread, so that a slow reader or a full disk never blocks the program. A line that can not be
-//! written is dropped and counted; the next written line reports how many were.
+//! Log lines, written by a separate thread. A slow reader or a full disk never blocks the program. A line that cannot be written is
+//! dropped and counted. The next written line reports the number of dropped lines.
 
 use std::fmt;
 use std::fs::File;
@@ -203,7 +203,7 @@ impl Writer {
         if dropped > self.told {
             let more = dropped - self.told;
             let fields = json!({ "dropped": dropped });
-            let said = format!("{more} lines dropped, nobody took them");
+            let said = format!("{more} lines dropped: the output was full or closed");
             text += &self.format.line(now, "log", fields, &said);
         }
         text += line;

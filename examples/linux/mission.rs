@@ -37,8 +37,8 @@ pub struct MissionOptions {
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
     pub uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9), position along the line to the receiver and to the right of it (m, -1e7 to 1e7);
-    /// `unknown` for relays that listen; default 80,500,400
+    /// Interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to the
+    /// right of it. `unknown` for relays that listen; default 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
     pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1

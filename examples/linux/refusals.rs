@@ -47,13 +47,13 @@ impl Refusals {
             (
                 signs && unsigned >= MANY,
                 unsigned,
-                "are not signed: has the other one a --key-file?",
+                "are not signed: does the sender have a --key-file?",
             ),
             (
                 version >= MANY,
                 version,
                 if signs {
-                    "are of another version of the format: is the other one's software of the same age?"
+                    "are of another version of the format: do all relays run the same software version?"
                 } else {
                     "are signed, and this relay has no --key-file; or they are of another version of the format"
                 },

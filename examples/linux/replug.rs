@@ -74,7 +74,7 @@ impl Replug {
                 now,
                 "port lost",
                 fields,
-                format_args!("{failure}; tried again until it is back"),
+                format_args!("{failure}; retried until it is back"),
             );
             self.tty = None;
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
@@ -84,9 +84,10 @@ impl Replug {
             && let Some(fault) = tap.fault()
         {
             let fields = json!({ "fault": fault, "left_out": tap.left_out() });
-            let what =
-                format_args!("--capture cannot be written any more: {fault}; all else goes on");
-            log.say(now, "capture over", fields, what);
+            let what = format_args!(
+                "--capture cannot be written: {fault}; the capture ends, and everything else continues"
+            );
+            log.say(now, "capture ended", fields, what);
         }
         if self.tty.is_none() && self.again_at <= now {
             self.pause = self.pause.times(2).min(LONGEST);

@@ -79,7 +79,7 @@ impl Service {
         let Self { log, requests, .. } = self;
         if requests.take_hangup() {
             log.reopen();
-            let what = format_args!("the log was opened again, the {who} goes on");
+            let what = format_args!("the log file was reopened; the {who} continues");
             log.tell(time, "hang-up", what);
         }
         if requests.take_status() {

@@ -9,7 +9,7 @@ use uav_relay::{Geodetic, Sites};
 /// Options of the two ends of the line.
 #[derive(Args, Debug)]
 pub struct SiteOptions {
-    /// Position of the transmitter: latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
+    /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_rx", allow_hyphen_values = true, value_parser = site)]
     site_tx: Option<Geodetic>,
     /// Position of the receiver

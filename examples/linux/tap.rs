@@ -76,7 +76,11 @@ impl Tap {
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let is_told = self.fate.is_told.swap(true, Ordering::Relaxed);
-        let fault = self.fate.fault.get().map_or("its writer is gone", |it| it);
+        let fault = self
+            .fate
+            .fault
+            .get()
+            .map_or("its writer thread has ended", |it| it);
         (!is_told).then_some(fault)
     }
 

@@ -34,9 +34,9 @@ impl Tty {
             Errno::NOENT => format!("{name}: No such file: is it plugged in?"),
             Errno::ISDIR => format!("{name}: is a directory, and no tty"),
             Errno::ACCESS => format!(
-                "{name}: may not be opened by this user; on most systems the group dialout may"
+                "{name}: permission denied; on most systems members of the group dialout may open it"
             ),
-            Errno::INVAL => format!("{name}: does not do {baud} bit/s"),
+            Errno::INVAL => format!("{name}: does not support {baud} bit/s"),
             error => format!("{name}: {error}"),
         })?;
         Ok(Self {

@@ -1,11 +1,11 @@
-//! Reports an autopilot that does not answer after a start, once for each kind of fault: no bytes, no MAVLink, no autopilot.
+//! Reports an autopilot that does not answer after a start, once for each kind of fault. No bytes, no MAVLink, no autopilot.
 
 use uav_relay::{Duration, Instant};
 
 /// Time that an autopilot has to answer. It sends a HEARTBEAT every second.
 const PATIENCE: Duration = Duration::from_millis(3_000);
 
-/// Best data received from the port since the start.
+/// Kind of the most specific data received from the port since the start.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Answer {
     /// Empty so far: no byte has arrived.

@@ -1,4 +1,4 @@
-//! Detects a drone that is far from its line, for instance because latitude and longitude of the sites are swapped.
+//! Detects a drone that is far from its line. A frequent cause: latitude and longitude of the sites are swapped.
 //!
 //! | kind | position | reported |
 //! | --- | --- | --- |

@@ -119,12 +119,12 @@ impl Companion {
             Instant::ZERO,
             EVENT,
             format_args!(
-                "by {place}{from}, {} m/s at most; flies once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                "by {place}{from}, {} m/s at most; engaged once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
         );
         if self.plan.key.is_some() {
-            let what = "frames are signed, and only what is signed with its key counts";
+            let what = "frames are signed, and frames that are not signed with its key are ignored";
             log.tell(Instant::ZERO, EVENT, format_args!("{what}"));
         }
     }
@@ -135,7 +135,7 @@ impl Companion {
             log.tell(
                 now,
                 EVENT,
-                format_args!("{refused} frames refused by their signatures"),
+                format_args!("{refused} frames rejected because of their signatures"),
             );
         }
     }
@@ -253,15 +253,15 @@ impl Companion {
     fn unanswered(&self, answer: Answer) -> String {
         match (answer, &self.port) {
             (Answer::Nothing, Port::Udp(datagrams)) => {
-                format!("nobody answers at {}", datagrams.silence())
+                format!("no answer at {}", datagrams.silence())
             }
             (Answer::Nothing, Port::Tty(tty)) => format!(
-                "nobody answers at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its baud rate?",
+                "no answer at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its baud rate?",
                 tty.path().display(),
                 tty.baud()
             ),
             (Answer::Noise, port) => format!(
-                "what comes by {} is no MAVLink 2: {}, and MAVLink 2 its protocol there?",
+                "the bytes received at {} are not MAVLink 2: {}, and is its protocol there MAVLink 2?",
                 self.plan.place,
                 match port {
                     Port::Udp(_) => "is that the autopilot's port".to_owned(),
@@ -269,7 +269,7 @@ impl Companion {
                 }
             ),
             (Answer::Others, _) => format!(
-                "frames come by {}, none of them from a PX4 or an ArduCopter: is that the port of the autopilot itself (component 1)?",
+                "no frame received at {} is from a PX4 or an ArduCopter: is that the port of the autopilot itself (component 1)?",
                 self.plan.place
             ),
         }
@@ -338,19 +338,23 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
         AutopilotEvent::Found(kind) => {
             log.tell(now, EVENT, format_args!("found {}", called(kind)));
         }
-        AutopilotEvent::Restarted => log.tell(now, EVENT, format_args!("was switched off and on")),
+        AutopilotEvent::Restarted => log.tell(now, EVENT, format_args!("restarted")),
         AutopilotEvent::Refused => log.tell(
             now,
             EVENT,
-            format_args!("does not fly where it is told to; is the place outside its fence?"),
+            format_args!(
+                "flies to another target than it was sent; is the setpoint outside its fence?"
+            ),
         ),
         AutopilotEvent::State(state) => {
             let what = match state {
-                State::Silent => "silent; look at the cable, the baud rate and MAVLink 2",
+                State::Silent => {
+                    "no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2"
+                }
                 State::Grounded => "on the ground, or not armed",
-                State::Standby => "in the air, not flown by the relay",
-                State::Engaged => "flies to the relay's setpoints",
-                State::Blind => "no position; keeps its last target",
+                State::Standby => "in the air, not controlled by the relay",
+                State::Engaged => "setpoint control engaged",
+                State::Blind => "no position; keeps the last target",
             };
             let fields = json!({ "state": word(state) });
             log.say(now, EVENT, fields, format_args!("{what}"));
@@ -386,7 +390,7 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
             commanded(now, log, "command refused", text, relays, from);
         }
         AutopilotEvent::FenceBreached => {
-            log.tell(now, EVENT, format_args!("says that its fence is breached"));
+            log.tell(now, EVENT, format_args!("fence breached"));
         }
         AutopilotEvent::Mistrusted(why) => {
             log.tell(now, EVENT, format_args!("{}", mistrusted(why)));
@@ -424,18 +428,18 @@ fn commanded(
 
 const fn cause(cause: ReleaseCause) -> &'static str {
     match cause {
-        ReleaseCause::Chosen => "another mode was chosen",
-        ReleaseCause::Failsafe => "the autopilot's failsafe",
-        ReleaseCause::Fence => "the autopilot's fence is breached",
+        ReleaseCause::Chosen => "the pilot or a ground station chose another mode",
+        ReleaseCause::Failsafe => "failsafe of the autopilot",
+        ReleaseCause::Fence => "fence of the autopilot breached",
         ReleaseCause::Link => "the link was interrupted or late",
-        _ => "for a reason of the autopilot",
+        _ => "the reason is unknown",
     }
 }
 
 const fn mode(mode: FlightMode) -> &'static str {
     match mode {
-        FlightMode::Companion => "OFFBOARD or GUIDED still",
-        FlightMode::Sticks => "one that is flown with the sticks",
+        FlightMode::Companion => "still OFFBOARD or GUIDED",
+        FlightMode::Sticks => "a manual mode",
         FlightMode::Hold => "Hold or LOITER",
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
@@ -447,14 +451,16 @@ const fn mode(mode: FlightMode) -> &'static str {
 const fn waits(reason: WaitReason) -> &'static str {
     match reason {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
-        WaitReason::Link => "what the autopilot says comes late",
+        WaitReason::Link => "messages from the autopilot arrive late",
         WaitReason::Found => {
-            "it is in OFFBOARD or GUIDED, which nobody has chosen since the link is up; choose another mode first"
+            "it was in OFFBOARD or GUIDED before this program started; choose another mode first"
         }
-        WaitReason::Unseen => "no mode that was chosen has been seen since the link is up",
+        WaitReason::Unseen => {
+            "no other mode than OFFBOARD or GUIDED was reported since this program started"
+        }
         WaitReason::Position => "there is no position near the line",
         WaitReason::NotReady => "the relay is not in order with its neighbours",
-        _ => "for a reason of the autopilot",
+        _ => "the reason is unknown",
     }
 }
 
@@ -470,20 +476,18 @@ const fn word(state: State) -> &'static str {
 
 const fn mistrusted(why: Mistrust) -> &'static str {
     match why {
-        Mistrust::NoKey => {
-            "signs its frames, and answers nothing that is not signed: give --autopilot-key-file"
-        }
+        Mistrust::NoKey => "signs its frames and ignores unsigned ones: give --autopilot-key-file",
         Mistrust::SignsOnly => {
-            "signs its frames, and answers what is not signed: it flies without --autopilot-key-file"
+            "signs its frames but answers unsigned ones: it is controlled without --autopilot-key-file"
         }
         Mistrust::Unsigned => {
-            "does not sign, and is not heard: set its key, or leave out --autopilot-key-file"
+            "does not sign its frames, which are ignored: set its key, or leave out --autopilot-key-file"
         }
         Mistrust::OtherKey => {
-            "signs with another key than that of --autopilot-key-file, and is not heard"
+            "signs with another key than that of --autopilot-key-file; its frames are ignored"
         }
-        Mistrust::Old => "signs with a time of the past, and is not heard: look at its clock",
-        _ => "is not believed",
+        Mistrust::Old => "signs with an old timestamp; its frames are ignored: check its clock",
+        _ => "is not trusted",
     }
 }
 

@@ -8,19 +8,18 @@ use uav_relay_linux::command::number;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Listening")]
 pub(crate) struct ListenOptions {
-    /// Locate the interferer from measurements of the relays: RADIO_STATUS of a SiK radio on the link of --autopilot, or lines
-    /// with a power in the FIFO of --positions. --interferer is then an initial guess, or `unknown`. Give it to all relays or to
-    /// none
+    /// Locate the interferer from measurements of the relays. RADIO_STATUS of a SiK radio on the link of --autopilot, or lines with
+    /// a power in the FIFO of --positions. --interferer is then an initial guess, or `unknown`. Give it to all relays or to none
     #[arg(long, conflicts_with = "field")]
     listen: bool,
     /// Track a moving interferer: estimate its velocity, too, and forget measurements sooner
     #[arg(long, requires = "listen")]
     following: bool,
-    /// Time from an agreement to the next collection of measurements by the first relay, s, 0.01 to 1e5; default 5, with
+    /// Time from an agreement to the next collection of measurements by the first relay, s, 0.01 to 1e5. Default 5, with
     /// --following 1
     #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.01, 1e5))]
     listen_every: Option<f32>,
-    /// Half-life of the weight of a measurement, s, 0.01 to 1e12; default 60, with --following 16 over the number of relays
+    /// Half-life of the weight of a measurement, s, 0.01 to 1e12. Default 60, with --following 16 over the number of relays
     #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.01, 1e12))]
     listen_half_life: Option<f32>,
     /// Relative error of one measurement, 0.001 to 1; default 0.03, for a SiK radio rather 0.1

@@ -77,7 +77,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "no such command; there is {CLEAR} N, with the numbers of all lost relays on one side that have landed"
+                "unknown command; the command is {CLEAR} N, with the numbers of all lost relays on one side that have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -126,7 +126,7 @@ impl Lost {
         let is_heard = relay.neighbours().contains(&Some(number)) && !self.nodes.contains(&number);
         if is_heard {
             return Err(format!(
-                "relay {number} is heard, and is not lost; switch it off first if it has landed"
+                "relay {number} is received and not lost; switch it off first if it has landed"
             ));
         }
         Ok(number)
@@ -140,7 +140,7 @@ pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> Strin
         Side::Downstream => "downstream",
     };
     format!(
-        "{} cleared: this relay keeps clear of no lost relay {stream} any more",
+        "{} cleared: no lost relay {stream} limits this relay any more",
         listed(named)
     )
 }

@@ -1,4 +1,4 @@
-//! A relay on a Linux companion computer, over real ttys: USB adapters, the UART of a header, telemetry radios.
+//! A relay on a Linux companion computer, over real ttys. USB adapters, the UART of a header, telemetry radios.
 //!
 //! ```text
 //! cargo companion --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1

@@ -54,7 +54,7 @@ struct Options {
     /// Network number; frames of other networks are ignored
     #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
     network: u16,
-    /// File with the network's key, 64 hexadecimal digits: frames are signed, and unsigned ones are rejected
+    /// File with the network's key, 64 hexadecimal digits. Frames are signed, and unsigned ones are rejected
     #[arg(long, value_name = "FILE", requires = "epoch_file")]
     key_file: Option<PathBuf>,
     /// File with the epoch, a number increased at every start; created if missing; it must never go back
@@ -63,7 +63,7 @@ struct Options {
     /// File for the newest mission uploaded in flight; without it an uploaded mission is lost at a restart
     #[arg(long, value_name = "FILE", requires = "key_file")]
     upload_file: Option<PathBuf>,
-    /// File for this relay's votes on the membership of the chain, created if missing; needed for a restart in flight. Remove it
+    /// File for this relay's votes on the membership of the chain, created if missing. Needed for a restart in flight. Remove it
     /// before another flight
     #[arg(long, value_name = "FILE")]
     view_file: Option<PathBuf>,
@@ -73,8 +73,8 @@ struct Options {
     /// Milliseconds of silence before a neighbour counts as lost, more than --probe-after-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
     dead_after_ms: u64,
-    /// FIFO for lines `x_m y_m altitude_m` with the drone's position, twice a second or more often: setpoints then keep drones
-    /// apart. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
+    /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep drones apart.
+    /// With --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
     positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
@@ -90,8 +90,8 @@ struct Options {
     /// Bit rate of its tty, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
     autopilot_baud: u32,
-    /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits: frames to it are signed, and unsigned ones from it
-    /// are rejected
+    /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits. Frames to it are signed, and unsigned ones from it are
+    /// rejected
     #[arg(long, value_name = "FILE", requires = "autopilot")]
     autopilot_key_file: Option<PathBuf>,
     /// Maximum speed of the drone, m/s, 0.1 to 20
@@ -99,7 +99,7 @@ struct Options {
     speed: f32,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Maximum position error of a hovering drone, m, 0 to 1000; drones may come closer to each other by as much
+    /// Maximum position error of a hovering drone, m, 0 to 1000. Drones may come closer to each other by as much
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.0, 1_000.0))]
     position_error: f32,
     #[command(flatten)]
@@ -107,7 +107,7 @@ struct Options {
     /// Method of finding positions; with --field only `align`. The first relay's setting counts, with --field the last relay's
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
-    /// Interference field instead of --interferer: Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the
+    /// Interference field instead of --interferer. Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the
     /// receiver (m, -1e7 to 1e7), X rising
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
@@ -305,7 +305,7 @@ fn ttys(options: &Options) -> Result<Ttys, String> {
         Some(tty) if neither => return Ok(Ttys::Shared(tty.clone())),
         Some(tty) => {
             return Err(format!(
-                "--shared {}: is the only tty, without --upstream and --downstream",
+                "--shared {}: cannot be combined with --upstream and --downstream",
                 tty.display()
             ));
         }

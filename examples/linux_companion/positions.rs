@@ -89,7 +89,7 @@ fn refuse(now: Instant, log: &Log, listens: bool, bad: &mut u64, line: &[u8]) {
         now,
         "position",
         format_args!(
-            "{text:?} is not x_m y_m altitude_m{}; more of these are only counted",
+            "{text:?} is not x_m y_m altitude_m{}; further ones are only counted",
             if listens {
                 format!(" [POWER] or receiver POWER, {POWER}")
             } else {
@@ -106,14 +106,14 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
             Instant::ZERO,
             "guarded",
             format_args!(
-                "setpoints keep drones apart on their way, by {}",
+                "setpoints keep drones apart while they move, by {}",
                 positions.fifo
             ),
         ),
         None => log.tell(
             Instant::ZERO,
             "unguarded",
-            format_args!("no --positions, nothing keeps drones apart on their way"),
+            format_args!("no --positions: drones are not kept apart while they move"),
         ),
     }
 }

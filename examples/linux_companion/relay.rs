@@ -182,7 +182,7 @@ impl Flight {
             self.views.kept().and_then(Kept::wake),
         ];
         if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
-            log.tell(time, "not taken", format_args!("{why}"));
+            log.tell(time, "rejected", format_args!("{why}"));
         }
         let name = |node| self.report.name(node);
         let waits = self.waits.tend(time, log, relay, name);

@@ -84,12 +84,14 @@ impl Report {
                 Instant::ZERO,
                 "signed",
                 json!({ "epoch": epoch }),
-                format_args!("frames carry a tag, epoch {epoch}"),
+                format_args!("frames are signed, epoch {epoch}"),
             ),
             None => self.log.tell(
                 Instant::ZERO,
                 "unsigned",
-                format_args!("no --key-file, anybody can send frames"),
+                format_args!(
+                    "no --key-file: frames are not signed, and anybody in range can send frames"
+                ),
             ),
         }
     }
@@ -109,9 +111,9 @@ impl Report {
     pub(crate) fn stands_by(&self) {
         self.log.tell(
             Instant::ZERO,
-            "stands by",
+            "restored",
             format_args!(
-                "what it has said in votes before this start; before another flight remove its --view-file"
+                "votes of before this start, from --view-file; before another flight remove that file"
             ),
         );
     }
@@ -125,20 +127,20 @@ impl Report {
                 }
             }
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
-            Event::Infeasible => tell("infeasible", format_args!("no target can be met")),
+            Event::Infeasible => tell("infeasible", format_args!("no target SIR can be met")),
             Event::Adopted => self.adopted(now, relay),
             Event::Reformed => self.reformed(now, relay),
             Event::Believed => self.believed(now, relay.belief()),
             Event::LeaseLapsed => tell(
-                "lapsed",
+                "lease expired",
                 format_args!(
-                    "not all relays can be reached; holds its place and asks for a new view"
+                    "not all relays are reachable; holds its position and requests a new view"
                 ),
             ),
             Event::NoQuorum => tell(
                 "no quorum",
                 format_args!(
-                    "too few relays can be reached; bring the missing ones into reach, or land these"
+                    "too few relays are reachable; holds its position; bring the missing relays into range, or land these"
                 ),
             ),
             Event::UploadRefused { why } => self.refused(now, why),
@@ -148,13 +150,13 @@ impl Report {
                     now,
                     "uploaded",
                     json!({ "version": version }),
-                    format_args!("holds version {version} of the mission"),
+                    format_args!("stored version {version} of the mission"),
                 );
             }
             Event::InterfererUnclear => tell(
-                "unclear",
+                "interferer unclear",
                 format_args!(
-                    "what the relays hear is not of one source on the ground, or says too little; the last belief is kept"
+                    "the measurements do not fit one interferer on the ground, or are too few; the last estimate is kept"
                 ),
             ),
             other => self.of_a_node(now, other, relay),
@@ -178,24 +180,20 @@ impl Report {
     /// Logs a rejected upload, with the allowed range if it violates the geofence.
     fn refused(&self, now: Instant, why: LineError) {
         let Some(fence) = self.fence else {
-            return self
-                .log
-                .tell(now, "refused", format_args!("an upload; {why}"));
+            return self.log.tell(now, "upload refused", format_args!("{why}"));
         };
         let range = match why {
             LineError::Altitude => [fence.least_altitude_m, fence.most_altitude_m],
             LineError::Lateral => [fence.least_y_m, fence.most_y_m],
             LineError::Length => [fence.least_x_m, fence.most_x_m],
             _ => {
-                return self
-                    .log
-                    .tell(now, "refused", format_args!("an upload; {why}"));
+                return self.log.tell(now, "upload refused", format_args!("{why}"));
             }
         };
         let [least, most] = range;
-        let what = format_args!("an upload; {why}, {least} to {most} m");
+        let what = format_args!("{why}, {least} to {most} m");
         self.log
-            .say(now, "refused", json!({ "range_m": range }), what);
+            .say(now, "upload refused", json!({ "range_m": range }), what);
     }
 
     fn of_a_node(&self, now: Instant, event: Event, relay: &Relay) {
@@ -218,53 +216,51 @@ impl Report {
         match event {
             Event::NeighbourLost { .. } => say(
                 "lost",
-                format_args!("no sign of life from {name} {stream}; look for that drone"),
+                format_args!("{name} {stream} does not reply; look for that drone"),
             ),
             Event::NeighbourBack { .. } => {
-                say("back", format_args!("{name} {stream} is heard"));
+                say("back", format_args!("{name} {stream} is received"));
             }
             Event::NotHeard { .. } => say(
                 "not heard",
                 format_args!(
-                    "{name} does not hear this relay; look at this one's transmitter and that one's receiver"
+                    "{name} does not receive this relay; check this relay's transmitter and the receiver of {name}"
                 ),
             ),
             Event::MissionMismatch { .. } => say(
                 "mismatch",
                 format_args!(
-                    "{name} flies another mission than 0x{:04x}; load both with the same one",
+                    "{name} flies another mission than 0x{:04x}; load the same mission into both",
                     self.flown(relay)
                 ),
             ),
             Event::KeyMismatch { .. } => say(
                 "key",
                 format_args!(
-                    "{name} signs with another key, or somebody does in its name; give both the same --key-file"
+                    "{name} signs with another key, or an attacker uses its number; give both the same --key-file"
                 ),
             ),
             Event::EpochWentBack { .. } => say(
                 "epoch",
                 format_args!(
-                    "that of {name} went back and it is refused; raise the number in the --epoch-file of {name} and start it again"
+                    "the epoch of {name} went back, and its frames are rejected; raise the number in the --epoch-file of {name} and restart it"
                 ),
             ),
             Event::SensorOff { .. } => say(
                 "sensor",
                 format_args!(
-                    "{name} hears something else than all the others and is left out; look at its receiver"
+                    "the measurements of {name} do not fit those of the others and are ignored; check its receiver"
                 ),
             ),
             _ if relay.stands_down() => say(
-                "index taken",
+                "duplicate index",
                 format_args!(
-                    "another relay flies as relay {node}, and this one is passive, without a setpoint; land one and give it its own --index"
+                    "another relay uses number {node}, and this one is passive, without a setpoint; land one and give it its own --index"
                 ),
             ),
             _ => say(
-                "index taken",
-                format_args!(
-                    "two relays fly as relay {node}; land one and give it its own --index"
-                ),
+                "duplicate index",
+                format_args!("two relays use number {node}; land one and give it its own --index"),
             ),
         }
     }
@@ -275,7 +271,7 @@ impl Report {
             "stopped",
             counted(stats),
             format_args!(
-                "relay {}, {} frames sent, {} received, {} refused",
+                "relay {}, {} frames sent, {} received, {} rejected",
                 self.identity.index,
                 stats.sent,
                 stats.received,
@@ -289,7 +285,7 @@ impl Report {
         self.identity.index
     }
 
-    /// Returns the name of a node by its initial number, with 0 for the transmitter and N + 1 for the receiver.
+    /// Returns the name of a node by its initial number. 0 is the transmitter, N + 1 the receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),
@@ -332,9 +328,9 @@ impl Report {
         let view = relay.view().number();
         self.log.say(
             now,
-            "formed anew",
+            "view accepted",
             json!({ "place": place, "relays": relays, "view": view }),
-            format_args!("{relays} relays, this one at place {place}, view {view}"),
+            format_args!("{relays} relays, this relay at place {place}, view {view}"),
         );
     }
 
@@ -349,7 +345,7 @@ impl Report {
     }
 
     fn believed(&self, now: Instant, told: Told) {
-        let tell = |text: fmt::Arguments<'_>| self.log.tell(now, "believed", text);
+        let tell = |text: fmt::Arguments<'_>| self.log.tell(now, "estimate", text);
         match told.belief {
             Belief::Source { source, receiver_w } => self.log.say(
                 now,
@@ -364,8 +360,8 @@ impl Report {
                     Exact(source.y_m)
                 ),
             ),
-            Belief::Unknown(spread) => tell(format_args!("nothing is known; spread {spread:?}")),
-            Belief::Mission => tell(format_args!("what the mission says")),
+            Belief::Unknown(spread) => tell(format_args!("interference unknown; the relays spread, pattern {spread:?}")),
+            Belief::Mission => tell(format_args!("the interferer of the mission")),
         }
     }
 }

@@ -53,7 +53,7 @@ impl Waits {
             let whom = node.map_or_else(|| "its neighbour".to_owned(), &name);
             let fields = json!({ "node": node, "reason": reason.map(word) });
             let text = match reason {
-                Some(reason) => format!("stays where it is: {}", said(reason, &whom)),
+                Some(reason) => format!("holds its position: {}", said(reason, &whom)),
                 None => format!("no longer waits for {whom}"),
             };
             log.say(now, "waits", fields, format_args!("{text}"));
@@ -77,22 +77,24 @@ pub(crate) const fn word(reason: HoldReason) -> &'static str {
 
 fn said(reason: HoldReason, whom: &str) -> String {
     match reason {
-        HoldReason::Unheard => format!("{whom} is not flown, or has told no place yet"),
+        HoldReason::Unheard => {
+            format!("{whom} is not engaged, or has not reported its position yet")
+        }
         HoldReason::Order => format!(
-            "it is on the wrong side of {whom} along the line, or too near to be certain; fly one of the two to its own side by hand"
+            "this drone is on the wrong side of {whom} along the line, or too near to be certain; fly one of the two to its own side by hand"
         ),
         HoldReason::Close => {
-            format!("the places agreed on are nearer to {whom} than the drones may come yet")
+            format!("the agreed position is nearer to {whom} than the drones may come yet")
         }
         HoldReason::Lost => {
-            format!("a relay beyond that fell silent may still hover there, between it and {whom}")
+            format!("a lost relay may still hover between this drone and {whom}")
         }
         HoldReason::NotFlown => {
             format!("{whom} is not engaged, and is in the way or makes no room")
         }
-        HoldReason::Pending => format!("{whom} has made no room yet"),
+        HoldReason::Pending => format!("{whom} has not made room yet"),
         HoldReason::Halted => {
-            format!("a relay beyond {whom} is not in order; its own log says why")
+            format!("a relay beyond {whom} is out of order; its log has the reason")
         }
     }
 }

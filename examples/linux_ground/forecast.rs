@@ -1,4 +1,4 @@
-//! Forecast of the relays' positions: simulated relays with the on-board code adopt the new mission beforehand.
+//! Forecast of the relays' positions. Simulated relays with the on-board code adopt the new mission beforehand.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant as Clock};

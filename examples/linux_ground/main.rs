@@ -1,4 +1,4 @@
-//! Ground station at one end of a chain, over a tty: uploads a new mission, or keeps answering the relays.
+//! Ground station at one end of a chain, over a tty. Uploads a new mission, or keeps answering the relays.
 //!
 //! ```text
 //! cargo ground --tty /dev/ttyUSB0 --end tx --of 3 \

@@ -154,9 +154,7 @@ impl Measurements {
                 now,
                 "measurement",
                 fields,
-                format_args!(
-                    "{power_w:.3e} W by {name}; the next ones are handed on without a line"
-                ),
+                format_args!("{power_w:.3e} W by {name}; further ones are reported without a line"),
             );
         }
     }
@@ -171,7 +169,7 @@ impl Measurements {
             now,
             "measurement",
             format_args!(
-                "{text:?} is not POWER or {own} POWER, {POWER}; more of these are only counted"
+                "{text:?} is not POWER or {own} POWER, {POWER}; further ones are only counted"
             ),
         );
     }

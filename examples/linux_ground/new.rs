@@ -31,7 +31,7 @@ pub(crate) struct NewOptions {
     /// New altitude of every relay, m, 0.1 to 1e4
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
     new_altitude: Option<f32>,
-    /// New range of altitudes to choose from, m, 0.1 to 1e4; default: the present range, or the new altitude alone if the present
+    /// New range of altitudes to choose from, m, 0.1 to 1e4. Default: the present range, or the new altitude alone if the present
     /// range is a single one
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
@@ -47,7 +47,8 @@ pub(crate) struct NewOptions {
     /// New power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
     new_uav_power: Option<f32>,
-    /// New interferer: power (W, 1e-6 to 1e9), position along the line to the receiver and to the right of it (m, -1e7 to 1e7)
+    /// New interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to
+    /// the right of it
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
     /// New noise power at every receiver, W, 0 to 1
@@ -225,7 +226,7 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     ))
 }
 
-/// Returns the largest turn t of the line, degrees, that keeps the order despite position errors of 1 m.
+/// Returns the largest turn of the line, degrees, that keeps the relays' order. Position errors are up to 1 m.
 ///
 /// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
 /// For the separation s and the width w of the lateral range it solves s cos t - w sin t = min(2 m, s / 2).

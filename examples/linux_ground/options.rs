@@ -18,10 +18,10 @@ use uav_relay_scenario::key;
 use crate::forecast::Loaded;
 use crate::new::{Basis, NewOptions};
 
-/// Transmitter or receiver end of a chain of relays in flight: uploads a new mission, or keeps answering the relays (--stand).
-/// The options up to --min-separation describe the mission loaded into the relays; those that begin with --new- change it. All
-/// other values stay as the chain flies them: the chain is asked first. The changes, and the distance that each relay moves, are
-/// shown and must be confirmed before the upload. The number of relays can not change
+/// Transmitter or receiver end of a chain of relays in flight. Uploads a new mission, or keeps answering the relays (--stand). The
+/// options up to --min-separation describe the mission loaded into the relays; those that begin with --new- change it. All other
+/// values stay as the chain flies them: the chain is asked first. The changes, and the distance that each relay moves, are shown
+/// and must be confirmed before the upload. The number of relays can not change
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", version, disable_version_flag = true)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
@@ -58,7 +58,7 @@ struct Options {
     /// Print the version of the program
     #[arg(short = 'V', action = ArgAction::Version)]
     own_version: Option<bool>,
-    /// Seconds until an upload is given up, 1 to 86400; with --stand the failure is logged and the program goes on
+    /// Seconds until an upload is given up, 1 to 86400. With --stand the failure is logged and the program goes on
     #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 86_400))]
     timeout: u64,
     /// Number of relays, 1 to 1000
@@ -68,7 +68,7 @@ struct Options {
     loaded: MissionOptions,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Method of the relays for finding positions, as given to the first relay; used for the forecast of their moves
+    /// Method of the relays for finding positions, as given to the first relay. Used for the forecast of their moves
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
     #[command(flatten)]
@@ -79,16 +79,17 @@ struct Options {
     /// Upload without confirmation; required if standard input is no terminal
     #[arg(long, requires = "version")]
     yes: bool,
-    /// Also upload missions outside the geofence, for relays without a drone, which have none. It is that of --altitude, --band,
+    /// Upload missions outside the geofence, too, for relays without a drone, which have none. The geofence is that of --altitude,
+    /// --band,
     /// --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
     no_fence: bool,
     /// Take values that are not given from the loaded mission instead of the flown one
     #[arg(long, requires = "version")]
     from_loaded: bool,
-    /// Source of interference measurements at this end: a FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or
-    /// `udp:HOST:PORT`. Each line is the mean received power, W, 1e-30 to 1e6, or dBm with that unit, as -95 dBm. It is reported
-    /// to nearby relays that --listen
+    /// Source of interference measurements at this end. A FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or
+    /// `udp:HOST:PORT`. Each line is the mean received power, W, 1e-30 to 1e6, or dBm with that unit, as -95 dBm. It is reported to
+    /// nearby relays that --listen
     #[arg(
         long,
         value_name = "FIFO|FILE|udp:[HOST:]PORT",

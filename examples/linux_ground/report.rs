@@ -32,7 +32,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
         Instant::ZERO,
         "signed",
         json!({ "epoch": epoch }),
-        format_args!("frames carry a tag, epoch {epoch}"),
+        format_args!("frames are signed, epoch {epoch}"),
     );
 }
 
@@ -237,7 +237,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
 pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let fields = json!({ "node": node });
     if is_heard {
-        let what = format_args!("relay {node} is heard, and hears this station");
+        let what = format_args!("relay {node} is received, and receives this station");
         log.say(now, "back", fields, what);
     } else {
         let what = format_args!("relay {node} does not answer");

@@ -107,7 +107,7 @@ impl<'a> Station<'a> {
         let log = &self.service.log;
         let silent = self.hearing.look(time, &self.ground, log);
         if let Some(why) = self.refusals.look(time, self.ground.stats(), true) {
-            log.tell(time, "not taken", format_args!("{why}"));
+            log.tell(time, "rejected", format_args!("{why}"));
         }
         let over = self.uploading(time);
         if over.is_some() {

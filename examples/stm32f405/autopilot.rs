@@ -1,4 +1,4 @@
-//! Link to the drone's autopilot, a PX4 or ArduCopter, at USART1: TX PA9, RX PA10, 115 200 baud, MAVLink 2.
+//! Link to the drone's autopilot, a PX4 or ArduCopter, at USART1. TX PA9, RX PA10, 115 200 baud, MAVLink 2.
 //!
 //! It flies drones whose block has sites; without them the port is never opened.
 
@@ -94,7 +94,7 @@ impl Autopilot {
         Some(autopilot)
     }
 
-    /// Processes received bytes, and exchanges data with the relay: its next frames carry the newest position.
+    /// Processes received bytes, and exchanges data with the relay. Its next frames carry the newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);

@@ -1,4 +1,4 @@
-//! Replacement of `autopilot.rs` without the feature `flight`: a drone whose block has sites does not fly with such an image.
+//! Replacement of `autopilot.rs` without the feature `flight`. A drone whose block has sites does not fly with such an image.
 
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::USART1;

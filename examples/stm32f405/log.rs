@@ -53,7 +53,7 @@ pub(crate) fn started(begun: &Begun) {
 
 pub(crate) fn unguarded() {
     defmt::warn!(
-        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way"
+        "no sites: no autopilot is controlled, and drones are not kept apart while they move"
     );
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn unguarded() {
 #[cfg(feature = "flight")]
 pub(crate) fn flies(course: &Course) {
     defmt::info!(
-        "the autopilot flies along {=f64} m at {=f32} m/s or less",
+        "autopilot: line of {=f64} m, at most {=f32} m/s",
         course.axis.distance_m(),
         course.pace.speed_m_s
     );
@@ -86,7 +86,9 @@ pub(crate) fn no_flight() {
 
 #[cfg(feature = "mavlink-signing")]
 pub(crate) fn signs_to_autopilot() {
-    defmt::info!("frames to the autopilot are signed, and only what is signed with its key counts");
+    defmt::info!(
+        "frames to the autopilot are signed, and frames that are not signed with its key are ignored"
+    );
 }
 
 #[cfg(all(feature = "flight", not(feature = "mavlink-signing")))]
@@ -100,9 +102,9 @@ pub(crate) fn cannot_sign_to_autopilot() {
 pub(crate) fn autopilot(event: AutopilotEvent) {
     match event {
         AutopilotEvent::Found(kind) => defmt::info!("autopilot: found, {}", kind),
-        AutopilotEvent::Restarted => defmt::warn!("autopilot: was switched off and on"),
+        AutopilotEvent::Restarted => defmt::warn!("autopilot: restarted"),
         AutopilotEvent::Refused => defmt::warn!(
-            "autopilot: does not fly where it is told to; is the place outside its fence?"
+            "autopilot: flies to another target than it was sent; is the setpoint outside its fence?"
         ),
         AutopilotEvent::Released(release) => defmt::warn!("autopilot: released, {}", release),
         AutopilotEvent::Waits(reason) => {
@@ -116,38 +118,46 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
             relays,
             from
         ),
-        AutopilotEvent::FenceBreached => defmt::warn!("autopilot: its fence is breached"),
+        AutopilotEvent::FenceBreached => defmt::warn!("autopilot: fence breached"),
         AutopilotEvent::State(State::Silent) => {
-            defmt::warn!("autopilot: silent; look at the cable, the baud rate and MAVLink 2");
+            defmt::warn!(
+                "autopilot: no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2"
+            );
         }
         AutopilotEvent::State(State::Grounded) => {
             defmt::info!("autopilot: on the ground, or not armed");
         }
         AutopilotEvent::State(State::Standby) => {
-            defmt::info!("autopilot: in the air, not flown by the relay");
+            defmt::info!("autopilot: in the air, not controlled by the relay");
         }
         AutopilotEvent::State(State::Engaged) => {
-            defmt::info!("autopilot: flies to the relay's setpoints");
+            defmt::info!("autopilot: setpoint control engaged");
         }
         AutopilotEvent::State(State::Blind) => {
-            defmt::warn!("autopilot: no position; keeps its last target");
+            defmt::warn!("autopilot: no position; keeps the last target");
         }
         AutopilotEvent::Mistrusted(Mistrust::NoKey) => {
             defmt::error!(
-                "autopilot: signs, and answers nothing that is not signed; no key in the block"
+                "autopilot: signs its frames and ignores unsigned ones; no key in the block"
             );
         }
         AutopilotEvent::Mistrusted(Mistrust::SignsOnly) => {
-            defmt::info!("autopilot: signs, and answers what is not signed; no key in the block");
+            defmt::info!(
+                "autopilot: signs its frames but answers unsigned ones; no key in the block"
+            );
         }
         AutopilotEvent::Mistrusted(Mistrust::Unsigned) => {
-            defmt::error!("autopilot: does not sign, and is not heard; a key in the block");
+            defmt::error!(
+                "autopilot: does not sign its frames, which are ignored; a key in the block"
+            );
         }
         AutopilotEvent::Mistrusted(Mistrust::OtherKey) => {
-            defmt::error!("autopilot: signs with another key than the block's, and is not heard");
+            defmt::error!(
+                "autopilot: signs with another key than the block's; its frames are ignored"
+            );
         }
         AutopilotEvent::Mistrusted(Mistrust::Old) => {
-            defmt::error!("autopilot: signs with a time of the past, and is not heard");
+            defmt::error!("autopilot: signs with an old timestamp; its frames are ignored");
         }
         other => defmt::info!("autopilot: {}", other),
     }
@@ -169,10 +179,12 @@ pub(crate) fn refused(error: ConfigError) {
             defmt::error!("configuration refused: rounds or altitudes of adjust");
         }
         ConfigError::Measure => {
-            defmt::error!("configuration refused: samples or most interference");
+            defmt::error!("configuration refused: samples or i_max_w");
         }
         ConfigError::Listen => {
-            defmt::error!("configuration refused: how it listens, out of range or in a field");
+            defmt::error!(
+                "configuration refused: settings for measurements (listen) out of range, or in a field"
+            );
         }
         ConfigError::Interferer => {
             defmt::error!("configuration refused: interferer and field at once");
@@ -185,13 +197,13 @@ pub(crate) fn refused(error: ConfigError) {
             defmt::error!("configuration refused: key or epoch, without the other or out of range");
         }
         ConfigError::Speed => {
-            defmt::error!("configuration refused: greatest speed out of range, or without sites");
+            defmt::error!("configuration refused: speed out of range, or without sites");
         }
         ConfigError::AutopilotKey => {
             defmt::error!("configuration refused: an autopilot's key without sites");
         }
         ConfigError::Silence => {
-            defmt::error!("configuration refused: silence before a question, over 1200000 ms");
+            defmt::error!("configuration refused: probe_after_ms above 1200000");
         }
         ConfigError::Field(error) => defmt::error!("configuration refused: field, {}", error),
         ConfigError::Channel(error) => defmt::error!("configuration refused: channel, {}", error),
@@ -206,7 +218,7 @@ pub(crate) fn signs(epoch: u32, kept: bool) {
         defmt::info!("frames are signed, epoch {=u32}", epoch);
     } else {
         defmt::error!(
-            "frames are signed, epoch {=u32}; it cannot be kept: raise the epoch of the block before the next start",
+            "frames are signed, epoch {=u32}; it cannot be stored: raise the epoch of the block before the next start",
             epoch
         );
     }
@@ -214,7 +226,7 @@ pub(crate) fn signs(epoch: u32, kept: bool) {
 
 #[cfg(feature = "auth")]
 pub(crate) fn unsigned() {
-    defmt::warn!("no key: frames are not signed, and anybody can send some");
+    defmt::warn!("no key: frames are not signed, and anybody in range can send frames");
 }
 
 #[cfg(feature = "auth")]
@@ -232,10 +244,10 @@ pub(crate) fn resumes(version: u16) {
 #[cfg(feature = "upload")]
 pub(crate) fn uploaded(version: u16, kept: bool) {
     if kept {
-        defmt::info!("mission version {=u16} is kept", version);
+        defmt::info!("mission version {=u16} stored", version);
     } else {
         defmt::warn!(
-            "mission version {=u16} cannot be kept: after a reboot it has to come again",
+            "mission version {=u16} cannot be stored: after a reboot it has to be uploaded again",
             version
         );
     }
@@ -244,20 +256,18 @@ pub(crate) fn uploaded(version: u16, kept: bool) {
 /// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
 pub(crate) fn stands_by(taken: bool) {
     if taken {
-        defmt::info!("what was said in the votes on views before holds");
+        defmt::info!("votes restored from flash");
     } else {
-        defmt::error!("what was said in the votes on views before is of another firmware");
+        defmt::error!("votes in flash are of another firmware, and ignored");
     }
 }
 
 /// Logs that storing the votes works again (`kept`) or fails.
 pub(crate) fn votes(kept: bool) {
     if kept {
-        defmt::info!("what is said in the votes on views is kept again");
+        defmt::info!("votes can be stored again");
     } else {
-        defmt::error!(
-            "what is said in the votes on views cannot be kept: a reboot in flight forgets it"
-        );
+        defmt::error!("votes cannot be stored: a reboot in flight loses them");
     }
 }
 
@@ -275,13 +285,13 @@ pub(crate) fn event(event: Event, relay: &Relay) {
     defmt::info!("event {}", event);
     #[cfg(feature = "upload")]
     if event == Event::Adopted {
-        defmt::info!("mission version {=u16} is flown", relay.version());
+        defmt::info!("mission version {=u16} adopted", relay.version());
     }
     if event == Event::Believed
         && let Belief::Source { source, .. } = relay.belief().belief
     {
         defmt::info!(
-            "believed: interferer {=f32} W ({=u32:#010x}) x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x})",
+            "estimate: interferer {=f32} W ({=u32:#010x}) x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x})",
             source.power_w,
             source.power_w.to_bits(),
             source.x_m,

@@ -1,5 +1,5 @@
-//! The relay of `stm32f405` on asynchronous ports: same wiring, drone and log, but run by `uav_relay::asynch` on an executor of
-//! 30 lines.
+//! The relay of `stm32f405` on asynchronous ports. Same wiring, drone and log, but run by `uav_relay::asynch` on an executor of 30
+//! lines.
 //!
 //! It serves for comparison with the polled one (`cargo cost`), and for the emulator (`cargo test --test qemu`), where Embassy
 //! would wait for good for a clock that QEMU lacks. For a board of your own begin with `examples/embassy`. It has no autopilot

@@ -1,4 +1,4 @@
-//! Firmware of a relay on an STM32F405 that shares one radio channel with all relays: `stm32f405` with one serial port to the
+//! Firmware of a relay on an STM32F405 that shares one radio channel with all relays. `stm32f405` with one serial port to the
 //! radio.
 //!
 //! ```text

@@ -9,7 +9,7 @@ use uav_relay_scenario::mission;
 /// Network number of [`relay`].
 pub const NETWORK: u16 = 7;
 
-/// Returns the paper's chain of `relays`, with the reference model's path losses and no minimum separation.
+/// Returns the paper's chain of `relays`. Path losses are the reference model's, and there is no minimum separation.
 ///
 /// # Panics
 /// No mission has this number of relays.
@@ -38,7 +38,7 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
 }
 
-/// Returns the record of a relay that has agreed on view `number` of `relays` relays, proposed by relay 1.
+/// Returns the record of a relay that has agreed on view `number`. The view has `relays` relays and was proposed by relay 1.
 ///
 /// `base` is the digest of the loaded mission; `member` is true if the relay is in the view.
 ///

@@ -16,7 +16,7 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Returns a chain with X = 500, Y = 150, relays at 220 m, a band of 20 m to 300 m, and 4 m of separation.
+/// Returns the chain of X = 500, Y = 150, relays at 220 m, a band of 20 m to 300 m. The least separation is 4 m.
 fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     let mut link = Link {
         y_i: 150.0,
@@ -79,7 +79,7 @@ fn rises(outcome: &Outcome) -> bool {
     outcome.rounds.windows(2).all(|pair| pair[1] >= pair[0])
 }
 
-/// Compares the local searches for fifty relays at 220 m: the optimum, 6.49838, is 19.4 % above the start.
+/// Compares the local searches for fifty relays at 220 m. The optimum, 6.49838, is 19.4 % above the start.
 #[test]
 fn fine_turns_gain_what_a_coarse_grid_does_not() {
     let of = |rounds, local| {
@@ -118,7 +118,7 @@ fn fine_turns_gain_what_a_coarse_grid_does_not() {
     assert!((ten / 5.555 - 1.0).abs() < 1e-3, "{ten}");
 }
 
-/// Compares the paper's grid search, from a far from balanced start, with the values of a separate program.
+/// Compares the paper's grid search with the values of a separate program. Its start is far from balanced.
 #[test]
 fn the_grid_moves_where_a_separate_program_moves() {
     let link = Link {

@@ -272,7 +272,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
     }
 }
 
-/// Checks own altitudes and powers: the leader mispredicts, and the search finds the farthest chain's optimum.
+/// Checks own altitudes and powers. The leader mispredicts, and the search finds the farthest chain's optimum.
 #[test]
 fn a_mixed_chain_is_solved_as_it_is() {
     let mission = mission(8);

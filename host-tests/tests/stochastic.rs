@@ -1,4 +1,4 @@
-//! Algorithm 4: positions in a field of interference by messages from Rx toward Tx, configured or measured.
+//! Algorithm 4: positions in a field of interference by messages from Rx toward Tx. The field is configured or measured.
 
 use host_tests::flights::settle;
 use rand::{Rng, RngExt, SeedableRng};
@@ -94,7 +94,7 @@ fn retreats_agree_with_the_reference() {
     assert!(worst < 1e-6);
 }
 
-/// Compares chains in an even field with the closed-form optimum: N 1 to 50, with and without prediction.
+/// Compares chains in an even field with the closed-form optimum. N 1 to 50, with and without prediction.
 #[test]
 fn in_an_even_field_the_optimum_is_found() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(62));

@@ -1,4 +1,4 @@
-//! The link to an autopilot on an asynchronous port, beside the relay of its drone.
+//! Link to an autopilot on an asynchronous port, beside the relay of its drone.
 
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
@@ -18,20 +18,21 @@ use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
 use crate::time::Duration;
 
-/// So long a port that has failed, or is full, is left alone.
+/// Pause after an error or a full port.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// The link to a drone's autopilot, which tasks share: the one that runs its port, and whoever has an event for it, or wants one.
+/// Link to a drone's autopilot that several tasks share.
 ///
-/// It hands the relay where the drone is and whether its setpoint is flown, and the autopilot the setpoint. It is for tasks of the executor
-/// that runs the relay's ports, as [`AsyncRelay`] is.
+/// One task runs the port, others pass events to the link or wait for its events. The link passes the drone's position and control
+/// state to the relay, and the setpoint to the autopilot. All tasks belong to the executor that runs the relay's ports, as with
+/// [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Something has come in, or has happened.
+    /// Signal: bytes were received, or an event occurred.
     news: Signal,
-    /// There may be something to send.
+    /// Signal: there may be a frame to send.
     speech: Signal,
-    /// Who waits for an event.
+    /// Waker of the task that waits for an event.
     listener: Cell<Option<Waker>>,
 }
 
@@ -54,8 +55,8 @@ impl AsyncAutopilot {
         }
     }
 
-    /// An event of the relay: the operator reads of those that matter in flight, and a new setpoint is told at once. Without it the
-    /// autopilot hears of a setpoint the next time that it is told one, within a second.
+    /// Processes an event of the relay. Events that matter in flight are sent to the operator, and a new setpoint is used at once.
+    /// Without this call the autopilot receives a new setpoint with the next target, within a second.
     ///
     /// Constant work.
     pub fn handle_event(&self, event: Event) {
@@ -65,8 +66,8 @@ impl AsyncAutopilot {
         self.news.raise();
     }
 
-    /// Completes with the next thing the firmware should know of the autopilot. One task waits for it at a time; a second takes the place of
-    /// the first. Safe to drop: an event that was not handed out is handed out next.
+    /// Completes with the next event for the firmware. One task waits for it at a time; a second one replaces the first. Safe to
+    /// drop: an event that was not returned is returned next.
     ///
     /// Constant work each time it is polled.
     pub fn next_event(&self) -> impl Future<Output = AutopilotEvent> + '_ {
@@ -79,17 +80,17 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Whether the relay's setpoint is flown.
+    /// Returns true if the drone flies to the relay's setpoint.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }
 
-    /// Moves bytes between the link and its port, and places between the link and `relay`, for good. It is joined with, or spawned beside,
-    /// what runs the relay's ports.
+    /// Exchanges bytes between the link and its port, and positions between the link and `relay`, for good. Join it with, or spawn
+    /// it beside, the future that runs the relay's ports.
     ///
-    /// Each time it is polled the port is read once ([`READ_LIMIT`] bytes at most), and written what the link has. A
-    /// writer that never completes keeps nobody from hearing where the drone is. It may be dropped at any `await`, and called again: of a
-    /// frame that was being written the rest is gone, which the autopilot's checksum tells.
+    /// Each poll reads the port once ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that never completes
+    /// does not delay the reader. The future may be dropped at any `await`, and created again: the rest of a frame that was being
+    /// written is lost, which the autopilot detects by the checksum.
     pub async fn run(
         &self,
         relay: &AsyncRelay<'_>,
@@ -105,7 +106,7 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Takes what comes in, for good.
+    /// Processes received bytes, for good.
     async fn hear(&self, clock: &impl Clock, rx: &mut impl Read) -> Infallible {
         let mut buffer = [0; READ_LIMIT];
         loop {
@@ -119,7 +120,7 @@ impl AsyncAutopilot {
                         yield_now().await;
                     }
                 }
-                // The end of a stream that may go on, or a byte that is lost: the checksum tells.
+                // End of a stream that may continue, or a lost byte, which the checksum detects.
                 Ok(0) | Err(_) => clock.sleep_until(clock.now() + PAUSE).await,
             }
         }
@@ -144,7 +145,7 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Sends what there is, for good.
+    /// Sends pending frames, for good.
     async fn say(&self, clock: &impl Clock, tx: &mut impl Write) -> Infallible {
         loop {
             self.speech.settle();
@@ -162,7 +163,7 @@ impl AsyncAutopilot {
     }
 }
 
-/// Writes all of these bytes; `None` where it cannot.
+/// Writes all of these bytes; `None` if the port fails or is full.
 async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     while !bytes.is_empty() {
         match tx.write(bytes).await {
@@ -173,7 +174,7 @@ async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// Something that one future raises and another waits for.
+/// Signal that one future raises and another one waits for.
 struct Signal {
     is_raised: Cell<bool>,
     waits: Cell<Option<Waker>>,
@@ -192,12 +193,12 @@ impl Signal {
         wake(&self.waits);
     }
 
-    /// What was raised so far is being looked after.
+    /// Clears the signal; what was raised so far is being handled.
     fn settle(&self) {
         self.is_raised.set(false);
     }
 
-    /// Completes once it is raised.
+    /// Completes once the signal is raised.
     fn raised(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             keep(&self.waits, cx);

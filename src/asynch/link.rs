@@ -1,4 +1,4 @@
-//! One port: reader, writer, frame queue, and driver-enable pin.
+//! Asynchronous port: reader, writer, frame queue, and driver-enable pin.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -20,7 +20,7 @@ use crate::wire::frame::{FrameBuf, MAX_FRAME};
 /// Pause after a failure of a port, in byte times.
 const PAUSE: u32 = 128;
 
-/// Time for which the pin stays high after the last byte, in byte times: one for the byte on the line, one for clock tolerance.
+/// Time for which the pin stays high after the last byte, in byte times. One for the byte on the line, one for clock tolerance.
 const HOLD: u32 = 2;
 
 /// Delimiter that ends a frame, also one that was cut short.
@@ -77,7 +77,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns the future that receives, the future that sends, and the queue between the relay and the latter.
+    /// Returns the future that receives, the future that sends. A queue connects the relay and the sending future.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -170,7 +170,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sends a frame, after a delimiter if the previous one may have been cut short; returns true on success.
+    /// Sends a frame, after a delimiter if the previous one may have been cut short. Returns true on success.
     async fn send(&mut self, frame: &[u8], clock: &impl Clock) -> bool {
         if self.cut && !self.write(&DELIMITER, clock).await {
             return false;

@@ -1,4 +1,4 @@
-//! A relay on asynchronous serial ports ([`embedded_io_async`]): [`serial`](crate::serial) for an executor.
+//! A relay on asynchronous serial ports ([`embedded_io_async`]). [`serial`](crate::serial) for an executor.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -147,7 +147,7 @@ where
     UPin: OutputPin,
     DPin: OutputPin,
 {
-    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair): links toward transmitter and receiver.
+    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair). Links toward transmitter and receiver.
     pub const fn new(
         upstream: AsyncLink<UR, UW, UPin>,
         downstream: AsyncLink<DR, DW, DPin>,
@@ -190,7 +190,7 @@ where
     }
 }
 
-/// Link to a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable pin. Channel access is
+/// Link to a channel that all neighbours receive. A radio modem, or a half-duplex bus with a driver-enable pin. Channel access is
 /// up to the modem; this crate only keeps relays from retransmitting in step.
 #[derive(Debug)]
 pub struct AsyncShared<R, W, Pin = NoPin> {

@@ -1,4 +1,4 @@
-//! A relay that several tasks of one executor share: the task that runs its ports, and tasks with inputs.
+//! A relay that several tasks of one executor share. The task that runs its ports, and tasks with inputs.
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
@@ -46,7 +46,7 @@ impl<'a> AsyncRelay<'a> {
         }
     }
 
-    /// Passes the relay to `work`, for a position, a sample or a mission; the ports run once this task waits. Returns `None`, and
+    /// Passes the relay to `work`, for a position, a sample or a mission. The ports run once this task waits. Returns `None`, and
     /// does nothing, inside the `work` of another call, which already has the relay. Takes constant time beside that of `work`.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);

@@ -66,8 +66,8 @@ pub struct Estimate {
     pub beta: f32,
     /// Upsilon = E[1/I], 1/W: 1e-9 to 1e32, so it may be a point of a [`Field`](super::Field).
     pub upsilon_per_w: f32,
-    /// Standard error of `upsilon_per_w`, 1/W, above 0: the truth is within two of them with a probability of about 95 %. It
-    /// covers sampling only, not a deviation of the interference from a Beta distribution.
+    /// Standard error of `upsilon_per_w`, 1/W, above 0. The truth is within two of them with a probability of about 95 %. It covers
+    /// sampling only, not a deviation of the interference from a Beta distribution.
     pub standard_error_per_w: f32,
     /// Number of samples used.
     pub samples: u32,
@@ -80,7 +80,7 @@ impl Estimator {
     /// too low.
     pub const MIN_SAMPLES: u32 = 100;
 
-    /// Creates an estimator without samples, for interference that never exceeds `i_max_w`, W: 1e-30 to 1e6.
+    /// Creates an estimator without samples, for interference that never exceeds `i_max_w`, W. 1e-30 to 1e6.
     ///
     /// With any other `i_max_w` it rejects every sample and never gives an estimate.
     pub const fn new(i_max_w: f32) -> Self {
@@ -94,7 +94,7 @@ impl Estimator {
         }
     }
 
-    /// Adds a measured interference power, W, above 0 and at most `I_max`; other values are counted as rejected.
+    /// Adds a measured interference power, W, above 0 and at most `I_max`. Other values are counted as rejected.
     ///
     /// Rejected are NaN, infinities, negative numbers, powers above `I_max`, and 0. A 0 means less than the receiver can measure,
     /// has probability 0 in a Beta distribution with alpha > 1, and its omission only makes Upsilon smaller. After 2^32 - 1
@@ -123,7 +123,7 @@ impl Estimator {
         self.accepted
     }
 
-    /// Number of rejected samples; many of them mean that `I_max` is too small, or that the receiver measures nothing.
+    /// Number of rejected samples. Many of them mean that `I_max` is too small, or that the receiver measures nothing.
     pub const fn rejected(&self) -> u32 {
         self.rejected
     }

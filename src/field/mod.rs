@@ -9,7 +9,7 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon, 1/W: interference between 1e9 W and 1e-32 W, far outside of what is measured.
+/// Allowed range of Upsilon, 1/W. Interference between 1e9 W and 1e-32 W, far outside of what is measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Upsilon at one position.
@@ -210,7 +210,7 @@ pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
 }
 
 impl FieldPoint {
-    /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution with shapes `alpha` and `beta`.
+    /// Returns Upsilon = E[1/I], 1/W, of a Beta distribution. I / `i_max_w` has the shapes `alpha` and `beta`.
     ///
     /// (alpha + beta - 1) / ((alpha - 1) `I_max`); the paper prints it without `I_max`, for I relative to it. `i_max_w` in W. `None`
     /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,

@@ -31,7 +31,7 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Allowed difference between the mission's distance and that of the sites, m, for the rounding of the sites and of f32.
+/// Allowed difference between the mission's distance and that of the sites, m. It covers the rounding of the sites and of f32.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why a pair of sites is rejected.
@@ -205,7 +205,7 @@ impl Axis {
         is_near.then_some(place)
     }
 
-    /// Returns the distance along the ground from a point to the nearest point of the line, m; `None` for an invalid point.
+    /// Returns the distance along the ground from a point to the nearest point of the line, m. `None` for an invalid point.
     ///
     /// It is defined everywhere on earth, also where [`place`](Self::place) is `None`. Constant work.
     ///
@@ -527,7 +527,7 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Special cases of the line: its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
+/// Special cases of the line. Its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

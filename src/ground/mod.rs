@@ -1,4 +1,4 @@
-//! Ground station: the transmitter or the receiver as a node that uploads missions and reports interference.
+//! Ground station at the transmitter or the receiver. It uploads missions and reports interference.
 //!
 //! | progress | state of the polled relay | action |
 //! | --- | --- | --- |
@@ -35,7 +35,7 @@ const PATIENCE: Duration = Duration::from_millis(1_000);
 /// Unanswered questions to one relay before the next relay is polled.
 const QUESTIONS: u8 = 3;
 
-/// Ground station at the transmitter or the receiver: uploads missions and reports interference; sans-IO.
+/// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
 ///
 /// After every input call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then wait for a byte or for
 /// [`poll_timeout`](Self::poll_timeout). It accepts any bytes and ignores what is not addressed to it.
@@ -183,7 +183,7 @@ impl Ground {
         self.again = Some(now + PATIENCE);
     }
 
-    /// Reports the interference measured here to the relays nearby; returns false if outside 1e-30 to 1e6 W.
+    /// Reports the interference measured here to the relays nearby. Returns false if outside 1e-30 to 1e6 W.
     ///
     /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged long enough
     /// for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is
@@ -208,7 +208,7 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames to this node that were rejected: not from a relay in reach, invalid, or replayed.
+    /// Returns the number of intact frames to this node that were rejected. Not from a relay in reach, invalid, or replayed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -224,7 +224,8 @@ impl Ground {
         &self.stats
     }
 
-    /// Returns the node numbers of the relays in reach, nearest first, each with true if its key has been verified.
+    /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay's key has been
+    /// verified.
     ///
     /// After a restart or a new handshake a relay is unverified until it answers. Work: four relays at most.
     pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
@@ -419,7 +420,7 @@ impl Ground {
         }
     }
 
-    /// Returns the latest time of the next [`Ground::handle_timeout`] call; `None` once there is nothing left to do.
+    /// Returns the latest time of the next [`Ground::handle_timeout`] call. `None` once there is nothing left to do.
     pub fn poll_timeout(&self) -> Option<Instant> {
         Some(self.clock.external(self.again?))
     }
@@ -555,7 +556,7 @@ pub enum Progress {
     },
 }
 
-/// Number of reports between handshakes: a relay that has restarted can read reports after the next handshake.
+/// Number of reports between handshakes. A relay that has restarted can read reports after the next handshake.
 const LEVELS_A_GREETING: u8 = 16;
 
 /// Last measurement, and the relays that have not received it.
@@ -576,7 +577,7 @@ impl Levels {
         measured: 0,
     };
 
-    /// Records a measurement, W, for the relays at distances 1 to `within`; returns true if a handshake to them is due first.
+    /// Records a measurement, W, for the relays at distances 1 to `within`. Returns true if a handshake to them is due first.
     pub(super) fn measured(&mut self, power_w: f32, within: u16) -> bool {
         self.power_w = power_w;
         self.untold = (1..=within).fold(0, |all, distance| all | bit(distance));

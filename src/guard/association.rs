@@ -12,7 +12,7 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of messages of another association in a row that show a new one, not late messages of an old one.
+/// Number of messages of another association in a row that show a new one. Fewer may be late messages of an old one.
 const STRAYS: u8 = 3;
 
 /// Reminders, one per second, after which a halt request that is not repeated expires.
@@ -53,7 +53,7 @@ pub(super) struct Association {
     halt_left: u8,
     /// True while a halt request is sent to the neighbour.
     told_halt: bool,
-    /// Number of the association that the neighbour has left, 0 for none: the neighbour is absent, that is not flown.
+    /// Number of the association that the neighbour has left, 0 for none. The neighbour is absent, that is not flown.
     absent: u16,
     /// Pending notice of the association that this relay has left.
     parting: Option<Parting>,
@@ -93,7 +93,7 @@ impl Association {
         (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m, or NaN.
+    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m. NaN if unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -143,7 +143,7 @@ impl Association {
         fence.says(Fence::RELEASED) && fence.echo == self.own
     }
 
-    /// Returns the next association after this relay has left this one, with a notice if the neighbour relies on this one.
+    /// Returns the next association after this relay has left this one. It has a notice if the neighbour relies on this one.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = Parting {
             own: self.own,
@@ -273,7 +273,7 @@ impl Association {
         self.seen_left = self.seen_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay without an association, not flown or just started: its position, and a halt request to
+    /// Returns the message of a relay without an association, not flown or just started. Its position, and a halt request to
     /// forward.
     pub(super) fn tell_alone(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.parting.is_none();
@@ -294,12 +294,12 @@ impl Association {
     }
 }
 
-/// Limit of this relay's x because of a lost relay that may still hover, and an obstacle that is not flown.
+/// Limit of this relay's x. Its cause is a lost relay that may still hover, or an obstacle that is not flown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Nearest lost node, and the limit, m.
     lost: Option<(u16, f32)>,
-    /// x from which on a relay that was lost nearby is at least the separation away, m; until then only its position across the
+    /// x from which on a relay that was lost nearby is at least the separation away, m. Until then only its position across the
     /// line may separate the two. NaN if there is none.
     near_m: f32,
     /// True if a lost relay was out of order with this one at its last message.
@@ -360,7 +360,7 @@ impl KeepOut {
         self.unflown = None;
     }
 
-    /// Returns the keep-out for another line, along which the position of a drone that is not flown is unknown.
+    /// Returns the keep-out for another line. Along it the position of a drone that is not flown is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
@@ -381,9 +381,9 @@ impl KeepOut {
         ways.is_some_and(|(from, to)| self.way(from, to, &own.config) != to)
     }
 
-    /// Returns the part of the path from `from` to `to` that keeps the separation from a drone that is not flown. If `from` is
-    /// closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the separation
-    /// apart across the line. Within the separation along x only moves across the line away from the drone remain.
+    /// Returns the part of the path from `from` to `to` that keeps clear of a drone that is not flown. It keeps the separation. If
+    /// `from` is closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the
+    /// separation apart across the line. Within the separation along x only moves across the line away from the drone remain.
     pub(super) fn way(&self, from: Placement, to: Placement, config: &GuardConfig) -> Placement {
         let Some((_, drone)) = self.unflown else {
             return to;
@@ -407,7 +407,7 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits relays lost before the first setpoint `x_m`: never heard, they may hover anywhere beyond, at the separation from
+    /// Limits relays lost before the first setpoint `x_m`. Never heard, they may hover anywhere beyond, at the separation from
     /// `near_m` on.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
@@ -431,7 +431,7 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends that state if this relay is beyond `near_m` by `is_beyond`; it then stays at least that far away.
+    /// Ends that state if this relay is beyond `near_m` by `is_beyond`. It then stays at least that far away.
     pub(super) fn part(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -449,7 +449,7 @@ impl KeepOut {
         self.disordered = true;
     }
 
-    /// Returns true while a lost relay may be on the wrong side, so that no path along x leads away from it.
+    /// Returns true while a lost relay may be on the wrong side. No path along x then leads away from it.
     pub(super) const fn is_disordered(&self) -> bool {
         self.disordered
     }
@@ -458,7 +458,7 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Keeps clear of relays at `side` that were never heard and may hover anywhere beyond `limit_m`, until any of them has sent
+    /// Keeps clear of relays at `side` that were never heard. They may hover anywhere beyond `limit_m`, until any of them has sent
     /// a message.
     pub(super) fn expect(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
@@ -486,7 +486,7 @@ pub struct Fence {
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
-    /// Position of the sender across the line, or the one it flies to, m: both -1e7 to 1e7.
+    /// Position of the sender across the line, or its target there, m. Both coordinates are -1e7 to 1e7.
     pub across: CrossSection,
     /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
     /// must not move across the line.
@@ -503,15 +503,15 @@ impl Fence {
     pub const STILL: u8 = 1;
     /// Flag of the follower: it agrees to `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
-    /// Flag: the sender, or a relay beyond it, has to move across the line, and needs the separation along x for that.
+    /// Flag: the sender, or a relay beyond it, has to move across the line. It needs the separation along x for that.
     pub const OPENS: u8 = 4;
     /// Flag: echo of the last [`OPENS`](Self::OPENS) received from the destination.
     pub const ECHO_OPENS: u8 = 8;
-    /// Flag: the sender has left this association, because it does not fly to its setpoints, or did not for a time. Positions and
-    /// the number of the fence are not valid.
+    /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
+    /// number of the fence are not valid.
     pub const RELEASED: u8 = 16;
-    /// Flag: the sender, or a relay beyond it, is not in order with its neighbours, so all relays hold their positions. It is
-    /// repeated every second, and valid in any association.
+    /// Flag: the sender, or a relay beyond it, is not in order with its neighbours. All relays hold their positions. It is repeated
+    /// every second, and valid in any association.
     pub const HALTS: u8 = 32;
     /// Flag: the position shows the order only, and grants nothing. Of the follower: it is not in order with its neighbour
     /// downstream. With [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is its last reported x.
@@ -551,7 +551,7 @@ impl Fence {
 pub enum HoldReason {
     /// The neighbour has not agreed to a fence yet.
     Unheard,
-    /// The neighbour is on the wrong side of this relay along the line, or too close along it for certainty: neither moves.
+    /// The neighbour is on the wrong side of this relay along the line, or too close for certainty. Neither moves.
     Order,
     /// The agreed distance along x is less than allowed, given the current positions across the line.
     Close,

@@ -51,17 +51,17 @@ pub struct GuardConfig {
     pub separation_m: f32,
     /// Number of relays of the mission, 1 to 1000; the same on all relays.
     pub relays: u16,
-    /// Maximum deviation of a hovering relay's reported position from its setpoint, m in each coordinate: 0 to 1e3. It reduces
-    /// the separation by this much at each of two relays.
+    /// Maximum deviation of a hovering relay's reported position from its setpoint, m in each coordinate. 0 to 1e3. It reduces the
+    /// separation by this much at each of two relays.
     pub hover_m: f32,
-    /// Time after `Guard::steer` within which the relay flies toward the new setpoint: the latency to the flight controller plus
+    /// Time after `Guard::steer` within which the relay flies toward the new setpoint. The latency to the flight controller plus
     /// the stopping time from maximum speed. With the autopilot link it is
     /// [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
 }
 
 impl GuardConfig {
-    /// Returns the configuration for a mission: its separation, distance, and altitude band including the profile's altitude.
+    /// Returns the configuration for a mission. Its separation, distance, and altitude band including the profile's altitude.
     ///
     /// If relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the geofence needs
     /// [room](Self::with_room_for) for that, because it limits them.
@@ -95,7 +95,7 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the configuration with a geofence that has room for relays that leave the line without a quorum.
+    /// Returns the configuration with a larger geofence. It has room for relays that leave the line without a quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.fence;
@@ -155,7 +155,7 @@ impl GuardConfig {
         }
     }
 
-    /// Returns true if a relay may start at `place`: so close to the geofence that all numbers are exact enough.
+    /// Returns true if a relay may start at `place`. So close to the geofence that all numbers are exact enough.
     pub(super) fn may_begin_at(&self, place: Placement) -> bool {
         let (near, box_place) = (BEGIN_WITHIN_M, self.cut(place));
         (place.x_m - box_place.x_m).abs() <= near
@@ -182,7 +182,7 @@ impl GuardConfig {
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position, m: four steps of an f32 at the far end of the geofence.
+    /// Returns the maximum rounding error of a position, m. Four steps of an f32 at the far end of the geofence.
     pub(super) fn rounding(&self) -> f32 {
         4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
     }

@@ -170,7 +170,7 @@ impl FenceFollower {
         (self.association.is_none() || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
     }
 
-    /// Returns true if this relay must not move across the line, because its position there may separate the two.
+    /// Returns true if this relay must not move across the line. Its position there may separate the two.
     pub(super) fn is_held(&self, own: &Own) -> bool {
         self.asked_m < own.config.separation_m
     }
@@ -185,7 +185,8 @@ impl FenceFollower {
         self.is_agreed() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the requested step if, with `downstream_m` on the other side, the two neighbours stay the separation apart.
+    /// Agrees to the requested step if the two neighbours stay the separation apart. `downstream_m` is the distance on the other
+    /// side.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.asked_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -203,7 +204,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true without a neighbour, or if the neighbour has found this relay beyond it; before, it announces no fence.
+    /// Returns true without a neighbour, or if the neighbour has found this relay beyond it. Before, it announces no fence.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered() && (self.association.is_none() || self.is_agreed())
     }
@@ -219,7 +220,7 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Updates the state after a report: the owner waits for the news that the newest fence has been cleared.
+    /// Updates the state after a report. The owner waits for the news that the newest fence has been cleared.
     pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
         if self.is_agreed() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -227,8 +228,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest x of the neighbour upstream and relays beyond it that are not yet the separation below it, m. It
-    /// applies until this relay has cleared the first fence: then all of them are below this relay.
+    /// Returns the highest x of the neighbour upstream and relays beyond it that are too near to it, m. They are not yet the
+    /// separation below it. It applies until this relay has cleared the first fence: then all of them are below this relay.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)

@@ -1,4 +1,4 @@
-//! Motion guard: keeps relays apart while they fly to new agreed positions, even if messages are lost or late.
+//! Motion guard: keeps relays apart while they fly to new agreed positions. Messages may be lost or late.
 //!
 //! Relays are in order along x. Normally neighbours are the separation apart *along x*, and then so are all relays, whatever they
 //! do across the line. Two relays whose agreed positions are beside or above each other come closer along x once both have
@@ -119,7 +119,7 @@ pub struct Guard {
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
-    /// True while this relay requests a halt: it is out of order with a neighbour, or not in order for some reminders.
+    /// True while this relay requests a halt. It is out of order with a neighbour, or not in order for some reminders.
     disorder: bool,
     /// Reminders in a row without order.
     waits: u8,
@@ -285,7 +285,7 @@ impl Guard {
         }
     }
 
-    /// Moves the setpoint as far as currently granted, and returns it; `None` before there is an agreed position and a report.
+    /// Moves the setpoint as far as currently granted, and returns it. `None` before there is an agreed position and a report.
     ///
     /// `now` is the time at which the setpoint is passed on: the relay flies toward it within [`GuardConfig::lag`].
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
@@ -381,7 +381,7 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if this relay is on its own side of both neighbours, by their messages or by their reported positions.
+    /// Returns true if this relay is on its own side of both neighbours. Their messages or their reported positions show that.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -475,7 +475,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position, limited to the geofence, and the relay was reported there since.
+    /// Returns true if the setpoint is the agreed position and the relay was reported there since. The agreed position is limited
+    /// to the geofence.
     pub fn is_there(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -490,7 +491,7 @@ impl Guard {
         }
     }
 
-    /// Returns the reason that keeps this relay from its position on `side`; `None` if there is none, or no agreed position.
+    /// Returns the reason that keeps this relay from its position on `side`. `None` if there is none, or no agreed position.
     ///
     /// While a new agreement spreads it may refer to positions of the previous one. While the relay is not flown only
     /// [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown.

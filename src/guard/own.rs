@@ -138,7 +138,7 @@ pub(super) struct Own {
     pub(super) still: bool,
     /// True if the chain is to open, as far as known here.
     pub(super) open: bool,
-    /// True while this relay holds its position, because it or another one is not in order with its neighbours.
+    /// True while this relay holds its position. This relay or another one is not in order with its neighbours.
     pub(super) halted: bool,
     pub(super) reported: Option<Placement>,
     /// Last position sent while not flown.
@@ -179,7 +179,7 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the start of the next path: on its way to `setpoint` the relay may stop as far along x as it was reported.
+    /// Returns the start of the next path. On its way to `setpoint` the relay may stop as far along x as it was reported.
     pub(super) fn way_begins(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -196,8 +196,8 @@ impl Own {
         self.stands = self.stands.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for some reminders, although the agreed position is farther toward `side`, or
-    /// across the line unless this side is `clear` for that.
+    /// Returns true if the setpoint has not moved for some reminders before the agreed position. That position is farther toward
+    /// `side`, or across the line unless this side is `clear` for that.
     pub(super) fn waits(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -218,7 +218,7 @@ impl Own {
         })
     }
 
-    /// Clears the setpoint, since the relay is no longer flown to setpoints, or is again; it may be anywhere.
+    /// Clears the setpoint, since the relay is no longer flown to setpoints, or is again. It may be anywhere.
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
@@ -251,7 +251,7 @@ impl Own {
         self.go(place, now);
     }
 
-    /// Takes a report; the relay has arrived across the line if `at` is long enough after the last change there.
+    /// Takes a report. The relay has arrived across the line if `at` is long enough after the last change there.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag
             && self.is_near(place.cross_section(), self.across());

@@ -122,7 +122,8 @@ impl FenceOwner {
             && (self.association.is_none() || self.is_heard() && self.is_beyond(own))
     }
 
-    /// Returns true if the neighbour downstream has reported that it is not beyond this relay, with or without an association.
+    /// Returns true if the neighbour downstream has reported that it is not beyond this relay. It may have done so with or without
+    /// an association.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
@@ -148,7 +149,7 @@ impl FenceOwner {
         self.counted_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x, m, of this relay and relays beyond it that are in order only by the error of the reports.
+    /// Returns the lowest x of this relay and relays beyond it, m. These relays are in order only by the error of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
@@ -159,13 +160,13 @@ impl FenceOwner {
         }
     }
 
-    /// Returns this relay's distance from `counted_m`, m; `taken_m` is the distance that the follower allows the relay upstream.
+    /// Returns this relay's distance from `counted_m`, m. `taken_m` is the distance that the follower allows the relay upstream.
     pub(super) fn apart(&self, own: &Own, taken_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.granted_m.max(separation_m - taken_m).min(separation_m)
     }
 
-    /// Returns the minimum distance to the relay downstream, m; 0 near a lost one, and before the first fence is cleared.
+    /// Returns the minimum distance to the relay downstream, m. 0 near a lost one, and before the first fence is cleared.
     pub(super) fn kept(&self, own: &Own, taken_m: f32) -> f32 {
         let is_open = self.association.is_none() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -272,7 +273,7 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the best current x of the fence, m, its step, and true if that is final; `None` if there may be no fence.
+    /// Returns the best current x of the fence, m, its step, and true if that is final. `None` if there may be no fence.
     #[inline(never)] // called from several places
     fn wish(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.is_heard() || !self.is_beyond(own) {
@@ -296,7 +297,7 @@ impl FenceOwner {
         Some((goal.max(nearest), ask, goal >= nearest))
     }
 
-    /// Schedules a message after a move of the setpoint: at once for a final fence, otherwise at the next reminder.
+    /// Schedules a message after a move of the setpoint. At once for a final fence, otherwise at the next reminder.
     pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
         if let Some((x_m, ask, last)) = self.wish(own, taken_m, upstream_m) {
             let stays = last || own.reachable.is_still();

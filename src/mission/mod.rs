@@ -17,7 +17,7 @@ pub(crate) mod tests;
 /// Value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Two f32 steps just below the distance, as a fraction of it: positions this far apart near Rx remain distinct.
+/// Two f32 steps just below the distance, as a fraction of it. Positions this far apart near Rx remain distinct.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step between two positions, as a fraction of the distance.
@@ -48,7 +48,7 @@ pub struct MissionConfig {
     pub channel: Channel,
     /// Interference on the hops.
     pub interference: Interference,
-    /// Noise power at the input of every receiver, W: 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
+    /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
@@ -80,7 +80,7 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays with `min_separation_m` (plus a rounding of 5e-7 `distance_m`) between them need more than `distance_m`.
+    /// The relays need more than `distance_m` with `min_separation_m` between them. A rounding of 5e-7 `distance_m` is included.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -200,7 +200,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Lateral range 0: relays stay in the vertical plane through transmitter and receiver, as in the paper.
+    /// Lateral range 0, as in the paper. Relays stay in the vertical plane through transmitter and receiver.
     pub const NONE: Self = Self::at(0.0);
 
     /// Returns the band of a single value.
@@ -278,17 +278,17 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W: eta / (`mu_los` `p_MSI`), in a field m^2/W:
+    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W. eta / (`mu_los` `p_MSI`), in a field m^2/W:
     /// `Upsilon_max` / `mu_los`.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of a relay on the last hop per watt, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) /
-    /// eta. With noise, of the interference plus noise at Rx.
+    /// Gain of a relay on the last hop per watt, m^2/W. (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta.
+    /// With noise, of the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m; 0 without noise and in a field.
+    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m. 0 without noise and in a field.
     pub(super) noise_at_a_metre: f32,
 }
 
-/// Maximum noise relative to the interferer's power received at 1 m: above it the interferer would be lost in f32 rounding.
+/// Maximum noise relative to the interferer's power received at 1 m. Above it the interferer would be lost in f32 rounding.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
@@ -587,21 +587,20 @@ impl Mission {
 }
 
 impl Mission {
-    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR: `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
+    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR. `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
     /// eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts: (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` /
-    /// `mu_los`.
+    /// Gain of a hop from a relay of `power_w` watts. (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` / `mu_los`.
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// K of the last hop, m^2: the SIR at the receiver is K / squared distance to the relay of `power_w` watts.
+    /// K of the last hop, m^2. The SIR at the receiver is K / squared distance to the relay of `power_w` watts.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -628,7 +627,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x that keeps the separation of neighbours `across_squared` m^2 apart across the line.
+    /// Returns the minimum step in x that keeps the separation of two neighbours. `across_squared`, m^2, is their squared distance
+    /// across the line.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -753,7 +753,7 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Gains for an unknown interferer with relays of `power_w`: SIR = (D / d)^2 on every hop, so equal hops are best.
+/// Gains for an unknown interferer with relays of `power_w`. SIR = (D / d)^2 on every hop, so equal hops are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -1,4 +1,4 @@
-//! A message that travels along the chain and whose result comes back: stages, duplicates and retransmission.
+//! A message that travels along the chain and whose result comes back. Stages, duplicates and retransmission.
 //!
 //! View proposals, lease renewals and the passes of an agreement round all travel this way. The initiator sends a message to its neighbour
 //! and every relay forwards it. The last relay knows the result, and a reply with the result goes back through all of them. One
@@ -30,13 +30,14 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a pass on which relays compute: its frames are twice as long, and each relay may take thirty work portions.
+/// Factor on the wait for a pass on which relays compute. Its frames are twice as long, and each relay may take thirty work
+/// portions.
 const SLOW: u32 = 4;
 
 /// Base-2 logarithm of the most hop times between two retransmissions, less one: eight hop times.
 const LOG_MOST: u32 = 2;
 
-/// Hop times until the first retransmission on a lossy channel, and until the neighbour has replied to a duplicate.
+/// Hop times until the first retransmission on a lossy channel. In this time the neighbour has also replied to a duplicate.
 const SOON: u32 = 4;
 
 /// Messages for which the channel counts as lossy after a loss.
@@ -75,7 +76,7 @@ pub(crate) struct Path {
     pub(crate) slow: bool,
 }
 
-/// One relay's part in a message that travels along the chain and in its result.
+/// Part of one relay in a message that travels along the chain and in its result.
 #[derive(Clone, Debug)]
 pub(crate) struct Circulation {
     stage: Stage,
@@ -162,7 +163,7 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Replies with the result, over `path` to the initiator, which itself is no hop away and has nobody to reply to.
+    /// Replies with the result, over `path` to the initiator. The initiator itself is no hop away and has nobody to reply to.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -181,7 +182,7 @@ impl Circulation {
         self.stop(Stage::Idle);
     }
 
-    /// Completes the message without a result, and forgets its times: no later message is a sign of life by them.
+    /// Completes the message without a result, and forgets its times. No later message is a sign of life by them.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -194,7 +195,7 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles the same message once more: the previous relay has retransmitted it, `path` hops from the initiator.
+    /// Handles the same message once more. The previous relay has retransmitted it, `path` hops from the initiator.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
@@ -226,7 +227,7 @@ impl Circulation {
         core::mem::take(&mut self.is_forward_due) && self.is_outstanding()
     }
 
-    /// Starts the retransmission timer of a message that is forwarded at `now`, `path` hops from the last relay.
+    /// Starts the retransmission timer of a message forwarded at `now`. The last relay is `path` hops away.
     pub(crate) fn await_result(&mut self, now: Instant, path: Path) {
         let round_trip = (2 * u32::from(path.hops) + 2) * if path.slow { SLOW } else { 1 };
         let hops = match self.retries {

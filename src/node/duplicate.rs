@@ -1,4 +1,4 @@
-//! Duplicate index: another node uses this relay's node number, and at most one of the two may have a setpoint.
+//! Duplicate index: another node uses this relay's node number. At most one of the two may have a setpoint.
 //!
 //! Each start has a 30-bit *claim number*, drawn from the seed of `Relay::new`. Without a key it is sent in a Claim message to a
 //! neighbour; the other node with this index receives the claim directly, or as the neighbour's echo. A claim names the claim
@@ -78,7 +78,7 @@ pub(crate) const RAISED: u32 = 1 << 31;
 /// Time from the start to the first claim; each further interval is twice the previous one.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start to the first unprompted claims: by then, a hundred relays have agreed by `align`.
+/// Time from the start to the first unprompted claims. By then, a hundred relays have agreed by `align`.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
 /// Maximum interval between unprompted claims, before they continue every `dead_after`.
@@ -90,12 +90,12 @@ const DEFENCES: u8 = 32;
 /// Number of claims after another frame with this relay's index, [`least_interval`] apart.
 const QUESTIONS: u8 = 8;
 
-/// Returns the minimum interval between claims: the claims of two relays and their echoes leave room on the channel.
+/// Returns the minimum interval between claims. The claims of two relays and their echoes leave room on the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay: many fit into the time after which it becomes active.
+/// Returns the interval between claims of a passive relay. Many fit into the time after which it becomes active.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
@@ -108,8 +108,7 @@ pub(crate) struct DuplicateIndex {
     rival: u32,
     /// Claim number received last.
     heard: u32,
-    /// Time when another node with this index was received last, and true if this relay had a position when it was received
-    /// first.
+    /// Time when another node with this index was received last. True if this relay had a position when it was received first.
     contest: Option<(Instant, bool)>,
     /// Times when a duplicate of the own index, and of a neighbour's, was last observed.
     observed: [Option<Instant>; 2],
@@ -406,7 +405,7 @@ mod tests {
         }
     }
 
-    /// A claim that was sent before this relay's restart names its previous claim number, so it does not answer this start.
+    /// A claim sent before this relay's restart names its previous claim number. It does not answer this start.
     #[test]
     fn a_claim_that_does_not_answer_this_start_is_answered_and_has_no_other_effect() {
         let settings = Settings::default();
@@ -435,7 +434,7 @@ mod tests {
         }
     }
 
-    /// Checks the rows of the state table for claims: every order, lease, epoch and state of the other node.
+    /// Checks the rows of the state table for claims. Every order, lease, epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();
@@ -568,7 +567,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay claims its index for four seconds after a claim of an active node, or until that node is passive.
+    /// Checks that a relay claims its index after a claim of an active node. It does so for four seconds, or until that node is
+    /// passive.
     #[test]
     fn a_number_is_defended_for_four_seconds_or_until_the_other_is_passive() {
         let settings = Settings::default();

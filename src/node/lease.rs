@@ -78,7 +78,7 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease of a relay that was switched on at `now`; it may have been in a view that it does not remember.
+    /// Creates the lease of a relay that was switched on at `now`. It may have been in a view that it does not remember.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Open,
@@ -94,7 +94,7 @@ impl Lease {
         }
     }
 
-    /// Allows for a view before the restart: other members may rely on this relay for the longest possible lease.
+    /// Allows for a view before the restart. Other members may rely on this relay for the longest possible lease.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.relied_on = self.relied_on + longest_lease(settings);
     }
@@ -112,7 +112,7 @@ impl Lease {
         matches!(self.state, LeaseState::Open)
     }
 
-    /// Returns the silence after which a neighbour may be lost: the span of the last renewal, at least `dead_after`.
+    /// Returns the silence after which a neighbour may be lost. The span of the last renewal, at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let told = self.current.map_or(0, |current| current.span);
         from_tenths(told).max(settings.dead_after)
@@ -368,8 +368,8 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Returns the span, in tenths of a second, that a leader announces 40 s after an unfinished renewal of view 1. Just before,
-    /// it has accepted a view that follows view `base` and loses no relay.
+    /// Returns the span announced 40 s after an unfinished renewal of view 1, tenths of a second. Just before, the leader has
+    /// accepted a view that follows view `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

@@ -10,7 +10,7 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
-/// True with the feature `field`; without it `Settings::measure` is rejected, and the code is unreachable.
+/// True with the feature `field`. Without it `Settings::measure` is rejected, and the code is unreachable.
 const FIELD: bool = cfg!(feature = "field");
 
 /// Measurement of a relay or of a ground end.
@@ -37,7 +37,7 @@ pub enum Sample {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power at the ground receiver, for one of the last four relays; the view's last relay uses it.
+    /// Mean interference power at the ground receiver, for one of the last four relays. The view's last relay uses it.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,

@@ -1,4 +1,4 @@
-//! Setpoint on the way to the agreed position: limited by the [guard](crate::guard), or without a guard the agreed position.
+//! Setpoint on the way to the agreed position. Limited by the [guard](crate::guard), or without a guard the agreed position.
 
 use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
@@ -47,7 +47,7 @@ impl Steering {
         self.guard.as_mut().filter(|_| GUARD)
     }
 
-    /// Moves the setpoint toward `agreed` as far as the guard allows at `now`; returns true if it has changed.
+    /// Moves the setpoint toward `agreed` as far as the guard allows at `now`. Returns true if it has changed.
     pub(crate) fn steer(&mut self, now: Instant, agreed: Option<Placement>) -> bool {
         if let Some(agreed) = agreed
             && let Some(guard) = self.guard()

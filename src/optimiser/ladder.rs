@@ -20,7 +20,7 @@ const HALF: usize = TARGETS / 2;
 pub struct Ladder {
     /// Target below the middle gap.
     anchor: f32,
-    /// Middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120; with 0 `anchor` is the only target.
+    /// Middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120. With 0 `anchor` is the only target.
     gap: u8,
     /// Ratio of each gap to its inner neighbour: 1 + `growth` / 16.
     growth: u8,
@@ -49,7 +49,7 @@ impl Ladder {
         self.plain
     }
 
-    /// Returns targets with equal ratios, the lowest just below `low` and the highest just above `high`; 0 < `low` < `high`.
+    /// Returns targets with equal ratios, the lowest just below `low` and the highest just above `high`. 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -67,7 +67,8 @@ impl Ladder {
         )
     }
 
-    /// Returns targets with `centre` in the middle of a gap of `gap` (relative), growing outward until they span [`low`, `high`].
+    /// Returns targets with `centre` in the middle of a gap of `gap` (relative). The gaps grow outward until the targets span
+    /// [`low`, `high`].
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -162,7 +163,7 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the ratio of the highest target to the lower middle one, which is also that of the higher middle one to the lowest.
+/// Returns the ratio of the highest target to the lower middle one. That of the higher middle one to the lowest is the same.
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()

@@ -68,7 +68,7 @@ pub struct Hops {
 }
 
 impl Hops {
-    /// Returns the hops of a relay of `power_w` watts that receives with `gain_in`; `after` is `None` for relay N.
+    /// Returns the hops of a relay of `power_w` watts that receives with `gain_in`. `after` is `None` for relay N.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -100,7 +100,7 @@ impl Hops {
         }
     }
 
-    /// Returns the SIRs of the hops to and from the relay at `at`, with the same operations as [`crate::sir`].
+    /// Returns the SIRs of the hops to and from the relay at `at`. Their operations are those of [`crate::sir`].
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -148,7 +148,7 @@ pub struct LocalSearch {
     column: u8,
     /// Best row of the current round: its altitude and its worse SIR.
     best_row: (f32, f32),
-    /// Best position so far if it is better than the current one, and the worse SIR of the better of the two.
+    /// Best position so far if it is better than the current one, with its worse SIR. Otherwise the SIR is that of the current one.
     found: Option<Placement>,
     best_sir: f32,
 }
@@ -195,7 +195,7 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` if it is allowed and better than all before; returns its worse SIR, or -1 if it is not allowed.
+    /// Records `at` if it is allowed and better than all before. Returns its worse SIR, or -1 if it is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
@@ -208,7 +208,7 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns the altitude at `part`, 0 to 1, of the current range; the clamp corrects rounding at the band's end.
+    /// Returns the altitude at `part`, 0 to 1, of the current range. The clamp corrects rounding at the band's end.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -237,7 +237,7 @@ impl LocalSearch {
         Some(u16::from(HALVINGS) + 4)
     }
 
-    /// Searches a row for the x beyond which the incoming hop is no longer the better one; returns the best worse SIR.
+    /// Searches a row for the x beyond which the incoming hop is no longer the better one. Returns the best worse SIR.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;

@@ -1,4 +1,4 @@
-//! Pass of targets along the chain: each relay's reaches, the last relay's verdict, and the positions on the way back.
+//! Pass of targets along the chain. Each relay's reaches, the last relay's verdict, and the positions on the way back.
 //!
 //! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it still receives the relay before it, for any position
 //! of that relay up to its own reach. Toward Tx (Algorithm 4) it is the x closest to Tx from which the relay before it on the
@@ -158,7 +158,7 @@ impl Link<'_> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop that starts closest to Tx of all that end from `low` to `high`; on a plain pass, at `low`.
+    /// Returns the hop that starts closest to Tx of all that end from `low` to `high`. On a plain pass, at `low`.
     fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -179,7 +179,7 @@ impl Link<'_> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack of a chain with this last relay for `target`, m, and the relay's position in its range.
+    /// Returns the slack of a chain for `target`, m, and this last relay's position. The position is in its range.
     ///
     /// `reach` is the end of that range. A slack of 0 or more means that the chain closes. `None` if Rx is out of reach from
     /// everywhere. Toward Rx the slack is reach + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the
@@ -216,7 +216,8 @@ impl Link<'_> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the required position of the relay before, whose reach for `target` is `from_m`, with this one at `place`.
+    /// Returns the required position of the relay before, with this one at `place`. The reach of the relay before for `target` is
+    /// `from_m`.
     ///
     /// `None` if there is none, because a range that was assumed to have no holes has one. Bounded by two reaches, in a field by
     /// three for each of its points.
@@ -286,9 +287,9 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict on a pass of `ladder`, with its `targets`, from the slacks of those that every hop can meet. A target
-    /// is committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the ladder has no
-    /// other target: the step of the paper's Algorithm 1.
+    /// Returns the verdict on a pass of `ladder` from the slacks of targets that every hop can meet. `targets` are those of the
+    /// ladder. A target is committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the
+    /// ladder has no other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -324,7 +325,7 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Whole chain for one target: reaches from the leader to the last relay, and required positions on the way back.
+/// Whole chain for one target. Reaches from the leader to the last relay, and required positions on the way back.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
     pub(crate) target: f32,
@@ -361,7 +362,7 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns true if the chain closes, on a plain pass or with required positions that all relays can take.
+    /// Returns true if the chain closes. It does so on a plain pass, or with required positions that all relays can take.
     pub(crate) fn is_met(&self) -> bool {
         let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
         closes(self)

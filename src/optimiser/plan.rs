@@ -20,7 +20,7 @@ pub struct Agreed {
     pub commit: u8,
     /// Committed target, linear SIR.
     pub target: f32,
-    /// Lowest SIR that no chain at these altitudes has, linear; `None` with the paper's fixed step, which excludes some chains.
+    /// Lowest SIR that no chain at these altitudes has, linear. `None` with the paper's fixed step, which excludes some chains.
     pub most: Option<f32>,
     /// Number of sweeps.
     pub sweeps: u32,
@@ -192,7 +192,7 @@ pub fn place(
 }
 
 impl Mission {
-    /// Returns the position that relay `index` computes without messages, if every relay has the mission's common profile.
+    /// Returns the position that relay `index` computes without messages. Every relay must have the mission's common profile.
     ///
     /// It equals the agreement by messages to the bit: `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`.
     /// `None` if no target can be met.

@@ -1,4 +1,4 @@
-//! Maximum distance of a sender from its receiver in a field: Algorithm 4's steps back from Rx, in closed form.
+//! Maximum distance of a sender from its receiver in a field. Algorithm 4's steps back from Rx, in closed form.
 //!
 //! The receiver's position is known, and with it Upsilon. With the receiver at (x0, h0), its sender at (x0 - d, h) and A = p
 //! Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
@@ -63,7 +63,8 @@ impl Retreat {
         }
     }
 
-    /// Returns the same hop if not relay `index` but those before it hold back to leave themselves room.
+    /// Returns the same hop with a receiver that may go to the end of its range. The relays before `index` then hold back to leave
+    /// themselves room.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -81,7 +82,7 @@ impl Retreat {
         }
     }
 
-    /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`; `None` if there is none.
+    /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
     ///
     /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], `quiet` Upsilon there over the field's largest,
     /// above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
@@ -112,7 +113,7 @@ impl Retreat {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop that starts closest to Tx of all that end in [`low`, `high`]; `None` if there is none.
+    /// Returns the hop that starts closest to Tx of all that end in [`low`, `high`]. `None` if there is none.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -149,7 +150,7 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the mission's field with noise, or the receiver's measurement, 1/W, which includes the noise.
+    /// Returns the mission's field with noise, or the receiver's measurement, 1/W. The measurement includes the noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),

@@ -1,4 +1,4 @@
-//! Search for the highest target that the chain meets: selection of the next targets from the results of the last ones.
+//! Search for the highest target that the chain meets. Selection of the next targets from the results of the last ones.
 //!
 //! It implements both schedules of Algorithm 1. The paper's tries gamma_0, gamma_0 - epsilon, ..., one per sweep. The bracketed
 //! one tries a ladder of targets per sweep. Feasibility is monotone in the target, so the optimum is between the highest target
@@ -25,7 +25,7 @@ use crate::sir::{self, Sender};
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets per sweep around the interpolated optimum, until it is known to the mission's tolerance.
+    /// Sixteen targets per sweep around the interpolated optimum. They end once the optimum is known to the mission's tolerance.
     #[default]
     Bracketed,
     /// The paper's schedule: one target per sweep, from the ceiling downward.
@@ -53,7 +53,7 @@ const HIGHEST: f32 = 1e30;
 /// Target relative to the ceiling below which the search gives up.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of the roots of cubic and line for a smooth slack, as a fraction of the gap between two targets.
+/// Maximum difference of the roots of cubic and line for a smooth slack. It is a fraction of the gap between two targets.
 const BEND: f32 = 0.25;
 
 /// Minimum reduction of the bracket by a sweep after which the interpolation is used again.
@@ -77,7 +77,7 @@ pub struct Search {
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes: in the paper's schedule, and after a chain with relays that hold back was refused.
+    /// True for plain passes. In the paper's schedule, and after a chain with relays that hold back was refused.
     plain: bool,
     /// Lowest known target that no chain can meet.
     most: Option<f32>,
@@ -86,7 +86,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates a search by the leader of `mission` with the profile `leader`; other relays may have profiles of their own.
+    /// Creates a search by the leader of `mission` with the profile `leader`. Other relays may have profiles of their own.
     ///
     /// # Errors
     /// [`Infeasible`] if a relay right above the receiver gives it no SIR: the interferer is at the receiver.
@@ -150,7 +150,7 @@ impl Search {
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target that no chain can meet, after a pass with these `slacks`; `None` after plain passes only.
+    /// Returns the lowest target that no chain can meet, after a pass with these `slacks`. `None` after plain passes only.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if self.plain || self.trials.is_some() {
             return self.most;
@@ -257,8 +257,8 @@ impl Search {
     }
 }
 
-/// Returns the target with zero slack, by a cubic of log target in the slack through the four points about its sign change.
-/// `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
+/// Returns the target with zero slack, by a cubic of log target in the slack. The cubic passes through the four points about the
+/// sign change. `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -278,7 +278,7 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Evaluates the polynomial through `points` (abscissa, value) at 0; `None` unless the abscissae fall strictly.
+/// Evaluates the polynomial through `points` (abscissa, value) at 0. `None` unless the abscissae fall strictly.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -361,7 +361,7 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the next target of the bisection; at the end the best one again, if it is not the current one.
+    /// Selects the next target of the bisection. At the end the best one again, if it is not the current one.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

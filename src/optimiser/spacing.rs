@@ -1,4 +1,4 @@
-//! Reach of a hop: the closed forms of the paper's `d_1`, `d_k` and `d_max` as one numerically stable rule.
+//! Reach of a hop. The closed forms of the paper's `d_1`, `d_k` and `d_max` are one numerically stable rule.
 //!
 //! With the sender at (x0, y0, h0), the receiver at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
 //! gain, SIR >= gamma is
@@ -88,7 +88,7 @@ pub enum Stand {
     At(f32),
 }
 
-/// Maximum ratio of target and gain: above it no hop is short enough, and below it every term of f is finite.
+/// Maximum ratio of target and gain. Above it no hop is short enough, and below it every term of f is finite.
 const MOST_RATIO: f32 = 1e18;
 
 /// Hop toward Rx, prepared for evaluation with many targets.
@@ -182,7 +182,7 @@ impl Hop {
         Self { end_m, ..self }
     }
 
-    /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m; `None` if there is none.
+    /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m. `None` if there is none.
     ///
     /// `target` is a linear SIR above zero, `from_m` the sender's x in [0, D]. The result is rounded toward the sender, so it
     /// meets the target as an f32. Constant work; with noise at most 96 evaluations of the hop, usually five.
@@ -236,8 +236,8 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x at which the receiver meets `target` with its sender anywhere in [0, `from_m`]; `None` if there is
-    /// none.
+    /// Returns the largest x at which the receiver meets `target`; `None` if there is none. Its sender is anywhere in [0,
+    /// `from_m`].
     ///
     /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step before.
     /// Constant work.
@@ -284,7 +284,7 @@ impl Hop {
         }
     }
 
-    /// Returns the required position of the sender, whose reach for `target` is `from_m`, with the receiver at `place`.
+    /// Returns the required position of the sender, with the receiver at `place`. The sender's reach for `target` is `from_m`.
     ///
     /// It is the closest allowed position, which has the best SIR; `None` if there is none.
     pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
@@ -316,7 +316,7 @@ impl Hop {
         gathered.flatten().or_else(|| at(near))
     }
 
-    /// Returns the reach without a minimum step, as a smooth function of all parameters; `None` if there is none. It is before
+    /// Returns the reach without a minimum step, as a smooth function of all parameters. `None` if there is none. It is before
     /// `from_m` if the distance across the line is longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
@@ -370,7 +370,7 @@ impl Hop {
 /// Relative rounding error of a hop's SIR at the limit of its target.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns the x `d` beyond `from_m`, rounded toward it; `None` for a hop too short for an f32: two relays never share an x.
+/// Returns the x `d` beyond `from_m`, rounded toward it. `None` for a hop too short for an f32: two relays never share an x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -386,7 +386,7 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the maximum distance of a relay from the receiver for `target`, m along x: the paper's `d_max`.
+/// Returns the maximum distance of a relay from the receiver for `target`, m along x. The paper's `d_max`.
 ///
 /// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
 /// that it is smooth in the target for the root search.
@@ -450,7 +450,7 @@ pub(super) struct NoisyHop {
     pub(super) excess: f32,
     /// u, m.
     pub(super) ahead: f32,
-    /// a^2, m^2.
+    /// Value of a^2, m^2.
     pub(super) aside_squared: f32,
     /// b^2, m^2.
     pub(super) across_squared: f32,
@@ -461,7 +461,7 @@ pub(super) struct NoisyHop {
 }
 
 impl NoisyHop {
-    /// Returns the maximum distance at which the signal exceeds the noise as required, m, at most 1e9; `None` if there is none.
+    /// Returns the maximum distance at which the signal exceeds the noise as required, m, at most 1e9. `None` if there is none.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -494,7 +494,7 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer at which g's curvature changes sign, m; `None` if g is concave.
+    /// Returns the distance from the interferer at which g's curvature changes sign, m. `None` if g is concave.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -562,7 +562,7 @@ impl NoisyHop {
         None
     }
 
-    /// The root between `low`, where g is not negative, and `high`, where it is.
+    /// Returns the root of g in [`low`, `high`]; g is not negative at `low`, and negative at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
@@ -618,7 +618,7 @@ mod tests {
         )
     }
 
-    /// An interferer behind the transmitter makes SIR_1 rise at first: at 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
+    /// An interferer behind the transmitter makes SIR_1 rise at first. At 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

@@ -1,4 +1,4 @@
-//! Facade of a relay: bytes and time in, frames and events out, and records that a firmware keeps across a reboot.
+//! Facade of a relay: bytes and time in, frames and events out. It also has the records that a firmware keeps across a reboot.
 
 use super::{Port, Transmit};
 use crate::event::Event;
@@ -288,7 +288,7 @@ impl Relay {
         self.node.poll_event()
     }
 
-    /// Returns the latest time of the next [`Relay::handle_timeout`] call; after that call it is `None` or later than `now`.
+    /// Returns the latest time of the next [`Relay::handle_timeout`] call. After that call it is `None` or later than `now`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -357,7 +357,8 @@ impl Relay {
 
 #[cfg(feature = "upload")]
 impl Relay {
-    /// Restores `upload`, the newest one stored on [`Event::Uploaded`](crate::Event::Uploaded) before the relay was switched off.
+    /// Restores `upload`, the newest one stored before the relay was switched off. It was stored on
+    /// [`Event::Uploaded`](crate::Event::Uploaded).
     ///
     /// Call it right after the relay was created, before any other input. [`Relay::new`] still takes the mission that was loaded
     /// before flight. Takes constant time.
@@ -369,7 +370,7 @@ impl Relay {
         self.node.resume(upload)
     }
 
-    /// Accepts a new mission that was not received over the link; the chain adopts it like any other upload. Constant time.
+    /// Accepts a new mission that was not received over the link. The chain adopts it like any other upload. Constant time.
     ///
     /// # Errors
     /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays,
@@ -435,13 +436,13 @@ impl Relay {
         self.node.hold_reason(side)
     }
 
-    /// Returns the linear SIR of every hop of the agreed chain; `None` before an agreement or without known interference.
+    /// Returns the linear SIR of every hop of the agreed chain. `None` before an agreement or without known interference.
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns an upper bound of the linear SIR at the current altitudes, at the leader after Algorithm 1 or 4.
+    /// Returns an upper bound of the linear SIR at the current altitudes. The leader has it after Algorithm 1 or 4.
     ///
     /// No chain reaches it. `None` at other relays, and with the paper's fixed step, which omits chains.
     pub fn bound(&self) -> Option<f32> {
@@ -461,7 +462,7 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive, because another relay with the larger claim uses its index.
+    /// Returns true while this relay is passive. Another relay with the larger claim then uses its index.
     ///
     /// It has no setpoint and takes no part in the protocol until the other relay has been silent for twice
     /// `Settings::dead_after`, or until [`clear_index_taken`](Self::clear_index_taken) is called.
@@ -483,7 +484,7 @@ impl Relay {
         self.node.stats()
     }
 
-    /// Returns the relay's place in the agreed view: 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
+    /// Returns the relay's place in the agreed view. 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
         self.node.member().index
     }
@@ -501,7 +502,7 @@ impl Relay {
         Some(self.clock.external(until))
     }
 
-    /// Returns the node numbers of the neighbours toward the transmitter and toward the receiver; `None` for none.
+    /// Returns the node numbers of the neighbours toward the transmitter and toward the receiver. `None` for none.
     ///
     /// A node number is the index that a relay was configured with; no view changes it.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
@@ -525,12 +526,12 @@ impl Relay {
         self.node.round().meter().estimate()
     }
 
-    /// Returns the Upsilon that this relay uses instead of the agreed field's, 1/W, once it has measured enough.
+    /// Returns the measured Upsilon that this relay uses, 1/W. It replaces the agreed field's once this relay has measured enough.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// Returns the estimate of the interference and its number; the mission's until the chain has estimated another.
+    /// Returns the estimate of the interference and its number. The mission's until the chain has estimated another.
     pub fn belief(&self) -> Told {
         self.node.round().sensing().told()
     }
@@ -547,7 +548,8 @@ impl Relay {
         self.node.round().sensing().unfit()
     }
 
-    /// Returns the completed rounds of Algorithm 2 while it runs, and the chain's linear SIR after the last; at the leader.
+    /// Returns the completed rounds of Algorithm 2 while it runs, at the leader. The second value is the chain's linear SIR after
+    /// the last round.
     pub fn rounds(&self) -> Option<(u16, f32)> {
         self.node.round().rounds()
     }
@@ -559,7 +561,7 @@ impl Relay {
 }
 
 impl Relay {
-    /// Processes one measurement of the interference, W or linear SIR, if `Settings::measure` requires them.
+    /// Processes one measurement of the interference, W or linear SIR. It is used if `Settings::measure` requires measurements.
     ///
     /// Takes constant time. Unusable samples are counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
     ///
@@ -628,7 +630,7 @@ impl Relay {
         self.node.handle_control(self.clock.advance(now), flown)
     }
 
-    /// Reports that lost or unflown relays on `side` ([`handle_control`](Self::handle_control)) have landed or were removed.
+    /// Reports that lost or unflown relays on `side` have landed or were removed. See [`handle_control`](Self::handle_control).
     ///
     /// The guard no longer keeps clear of them. It keeps clear of the other relays of the view on that side until it has heard the
     /// nearest one; if that one is lost before, clear again. Takes constant time.
@@ -636,7 +638,7 @@ impl Relay {
         self.node.clear_lost(self.clock.advance(now), side);
     }
 
-    /// Reports that the other relay with this index ([`Event::IndexTaken`](crate::Event::IndexTaken)) is gone.
+    /// Reports that the other relay with this index is gone. See [`Event::IndexTaken`](crate::Event::IndexTaken).
     ///
     /// A [passive](Self::stands_down) relay becomes active, with a larger claim than the other had. Takes constant time.
     pub fn clear_index_taken(&mut self, now: Instant) {

@@ -36,7 +36,7 @@ pub enum Belief {
     Source {
         /// Position and power of the source.
         source: Interferer,
-        /// Interference power at the receiver, W; 0 if it has not measured: then the source's path loss over the ground is used.
+        /// Interference power at the receiver, W. 0 if it has not measured: then the source's path loss over the ground is used.
         receiver_w: f32,
     },
 }
@@ -74,17 +74,17 @@ pub struct Told {
     pub belief: Belief,
 }
 
-/// Mean square relative change that is not worth an agreement, even with more information,
+/// Mean square relative change that is not worth an agreement, even with more information.
 const WORTH: f64 = 1e-5;
 
-/// and the one that is a change of the interference,
+/// Mean square relative change that counts as a change of the interference.
 const CHANGE: f64 = 1e-4;
 
-/// if it exceeds the expected variance by this factor: for a stationary interferer, and for one that moves.
+/// Minimum ratio of such a change to the expected variance. For a stationary interferer, and for one that moves.
 const BEYOND_CHANCE: f64 = 8.0;
 const FOLLOWED: f64 = 1.5;
 
-/// The factor once a chain has settled: a larger change means another interferer, for which the estimation starts again.
+/// The factor once a chain has settled. A larger change means another interferer, for which the estimation starts again.
 const ANOTHER: f64 = 64.0;
 
 /// `CHANGE` for the receiver's own measurement.
@@ -93,7 +93,7 @@ const LOUDER: f64 = 0.025;
 /// Maximum squared deviation of the track from the fit, relative to the expected variance.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of the information for a refinement, and number of refinements until a chain has settled. So the chain stops
+/// Minimum growth of the information for a refinement, and maximum number of refinements. A chain has then settled and stops
 /// sending new estimates of a stationary interferer.
 const LEARNED: f64 = 1.1;
 const REFINED: u8 = 4;
@@ -114,7 +114,7 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Expected mean square relative error of the estimate.
     chance: f64,
-    /// Number of refinements for the same interferer; for a moving one, of those because of more information.
+    /// Number of refinements for the same interferer. For a moving one, of those because of more information.
     refined: u8,
     track: Track,
 }
@@ -137,7 +137,7 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Reviews the estimate `belief`, on which `mission` is based, with the chain's `sums` and the `levels` of its ends. `before` is
+/// Reviews the estimate `belief` with the chain's `sums` and the `levels` of its ends. `mission` is based on `belief`. `before` is
 /// the information when `belief` was adopted.
 pub(crate) fn review(
     mission: &Mission,
@@ -261,7 +261,7 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns the position of a moving interferer when the drones will have moved; `heard` is the mean time of the measurements.
+/// Returns the position of a moving interferer when the drones will have moved. `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -495,7 +495,7 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last and the predicted position at `then`, m along the line and to its right; `None` while it does not move.
+    /// Returns the last and the predicted position at `then`, m along the line and to its right. `None` while it does not move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

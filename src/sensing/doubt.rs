@@ -1,4 +1,4 @@
-//! Identification of the receiver whose measurements do not fit those of the others: that of a relay, or of an end of the chain.
+//! Identification of the receiver whose measurements do not fit those of the others. That of a relay, or of an end of the chain.
 //!
 //! # Relay
 //!
@@ -48,10 +48,10 @@ use crate::place::Placement;
 /// Maximum variance of consistent measurements, relative to the expected one.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum reduction of the misfit by an exclusion, in squared standard deviations,
+/// Minimum reduction of the misfit by an exclusion, in squared standard deviations.
 const DEVIATIONS: f64 = 49.0;
 
-/// and absolutely: some 15 % of one position.
+/// Minimum absolute reduction of the misfit by an exclusion: some 15 % of one position.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the variances without the second-best relay and without the faulty one.
@@ -63,16 +63,16 @@ const OF_ONE_MIND: f64 = 0.1;
 /// Passes between a failed trial and the next one.
 const REST: u8 = 4;
 
-/// Maximum squared difference at which a relay fits the others again: in squared standard deviations, and absolutely.
+/// Maximum squared difference at which a relay fits the others again. In squared standard deviations, and absolutely.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays for an identification: with four, an exclusion leaves three, which any three unknowns fit.
+/// Minimum number of relays for an identification. With four, an exclusion leaves three, which any three unknowns fit.
 const FEWEST: u16 = 5;
 
 /// Minimum number of positions, after fading; with fewer, any of them could be faulty.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the others' mean weight to that of a position; a smaller weight is lost in the rounding of the sums.
+/// Maximum ratio of the others' mean weight to that of a position. A smaller weight is lost in the rounding of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +92,8 @@ pub(crate) struct Trial {
     rest: u8,
     /// Node without which the others fit best.
     best: u16,
-    /// Misfit with all relays and without the best one, their variance, and the smallest variance without any other.
+    /// Misfit with all relays and without the best one, and their variance. The last value is the smallest variance without any
+    /// other.
     seen: f32,
     seen_best: f32,
     least: f32,
@@ -220,7 +221,8 @@ fn narrow(number: f64) -> f32 {
 /// find it, and it does not disturb the others.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd compared with the estimate `expected` and with the sums of all `others`.
+/// Returns true if the measurement at `place` is absurd. It is compared with the estimate `expected` and with the sums of all
+/// `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -240,8 +242,9 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay at `place` still does not fit the sums of all `others`. `expected` is the
-/// estimate there. The difference of v and the others' fit e is (v / e - e / v) / 2, which is symmetric in both.
+/// Returns true if the measurement of an excluded relay still does not fit. It is compared at `place` with the sums of all
+/// `others`. `expected` is the estimate there. The difference of v and the others' fit e is (v / e - e / v) / 2, which is symmetric
+/// in both.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -263,7 +266,8 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing should measure several times the noise, by repeated measurements of all others.
+/// Returns true if a relay that measures nothing should measure several times the noise. Repeated measurements of all others show
+/// that.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -278,7 +282,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than these squared standard deviations and difference.
+/// Returns true if a ratio of powers differs from 1 by more than these limits. They are squared standard deviations and a
+/// difference.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -287,7 +292,7 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Minimum squared difference of an end that does not fit: in squared standard deviations, and absolutely (a factor of 1.5).
+/// Minimum squared difference of an end that does not fit. In squared standard deviations, and absolutely (a factor of 1.5).
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays; with fewer and two ends, the faulty one is unknown.

@@ -18,11 +18,11 @@ use crate::mission::{Interferer, Mission};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Unfit {
-    /// Too few positions, or positions too close to one another to extrapolate.
+    /// Number or distance of positions too small to extrapolate.
     Places,
     /// The measurements fit no single source on the ground.
     NoSource,
-    /// The measurements are inconsistent, and the faulty one is unknown: with four relays or fewer, with more than one faulty
+    /// The measurements are inconsistent, and the faulty one is unknown. With four relays or fewer, with more than one faulty
     /// relay, or if the path loss between the interferer and an end differs from the mission's.
     Contradiction,
 }
@@ -41,7 +41,7 @@ pub struct FoundSource {
     pub source: Interferer,
     /// Variance of the position along the line and to its right, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source; otherwise it is the closest one, and the variance is unknown.
+    /// True if the measurements fit a single source. Otherwise it is the closest one, and the variance is unknown.
     pub is_one: bool,
 }
 
@@ -363,7 +363,7 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns v of the mission's source by terms; `None` without a known source, or outside of the measurable range.
+/// Returns v of the mission's source by terms. `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -371,7 +371,7 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the search area for sources, in units of D / 2: from D before Tx to D beyond Rx, and 1.5 D to each side.
+/// Half width of the search area for sources, in units of D / 2. From D before Tx to D beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
 /// Grid steps from the middle to the edge, of the first grid and of the finer ones.
@@ -381,8 +381,8 @@ const FINE: i8 = 2;
 /// Number of finer grids, with steps of 0.4 times those of the previous one.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the closest source on one side of the line of positions; `None` if no source fits at all. `sign` is 1
-/// or -1 for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// Returns X', Y' and k of the closest source on one side of the line of positions. `None` if no source fits at all. `sign` is 1 or
+/// -1 for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

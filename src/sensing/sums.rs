@@ -1,4 +1,4 @@
-//! Sums that a pass collects along the chain: eighteen numbers that contain all a fit needs of the measurements.
+//! Sums that a pass collects along the chain. Eighteen numbers that contain all a fit needs of the measurements.
 //!
 //! `Terms` are those of which 1 / I is a linear combination; a source has a coefficient for each. A [`Level`] is the interference
 //! at an end of the chain, on the ground, within the measurable range of powers.
@@ -79,7 +79,7 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Interference of v = 1, W: the middle of the measurable range, so that no square of a v leaves an f32.
+/// Interference of v = 1, W. The middle of the measurable range, so that no square of a v leaves an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v for the measurable range, [`MEASURED_W`].
@@ -125,7 +125,7 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Length of [`Sums`]: products of the terms, terms times v, v squared, number of positions, of measurements, and their age.
+/// Length of [`Sums`]. Products of the terms, terms times v, v squared, number of positions, of measurements, and their age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over positions.

@@ -1,4 +1,4 @@
-//! Serial link: received bytes, the transmit queue, the driver-enable pin, and counters of local faults.
+//! Serial link: received bytes, transmit queue, driver-enable pin, and counters of local faults.
 
 use super::READ_LIMIT;
 use super::port::{Fault, SerialPort};
@@ -34,7 +34,7 @@ impl OutputPin for NoPin {
     }
 }
 
-/// Minimum time of a byte of 10 bits (start bit, 8 data bits, stop bit) at `baud` bit/s, rounded up to a microsecond.
+/// Minimum time of a byte at `baud` bit/s, rounded up to a microsecond. A byte has a start bit, 8 data bits and a stop bit.
 ///
 /// `baud` is at least 1; 0 counts as 1.
 pub(crate) const fn byte_time(baud: u32) -> Duration {
@@ -75,7 +75,7 @@ impl<P: SerialPort> SerialLink<P> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte, and a pin that is high while this relay sends.
+    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte. The pin is high while this relay sends.
     ///
     /// The first poll sets the pin low, unless it has something to send.
     pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
@@ -264,7 +264,7 @@ pub struct SerialStats {
     pub framing: u32,
     /// Bytes with the wrong parity.
     pub parity: u32,
-    /// Bytes from a noisy line.
+    /// Number of bytes received with noise on the line.
     pub noise: u32,
     /// Reads that failed for another reason.
     pub other: u32,
@@ -274,7 +274,7 @@ pub struct SerialStats {
     pub pin: u32,
     /// Frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats what matters.
     pub dropped: u32,
-    /// Frames for a port that does not exist: the relay's [`Wiring`](crate::Wiring) does not match this driver.
+    /// Frames for a port that does not exist. The relay's [`Wiring`](crate::Wiring) does not match this driver.
     pub unrouted: u32,
 }
 

@@ -141,7 +141,7 @@ impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, 
     }
 }
 
-/// Serial port to a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable pin.
+/// Serial port to a channel that all neighbours receive. A radio modem, or a half-duplex bus with a driver-enable pin.
 ///
 /// Medium access is the modem's task; this crate only prevents relays from retransmitting in step.
 #[derive(Debug)]
@@ -165,7 +165,7 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {
-            /// Moves all bytes that can be moved, and returns the latest time of the next call, always later than `now`.
+            /// Moves all bytes that can be moved. Returns the latest time of the next call, always later than `now`.
             ///
             /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and
             /// the relay's pending frames; for a shared port, as many as fit.

@@ -38,13 +38,13 @@ impl core::error::Error for Fault {}
 ///
 /// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA may implement it directly.
 pub trait SerialPort {
-    /// Moves received bytes to the front of `into` (never empty), and returns their number; 0 if there is none.
+    /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if there is none.
     ///
     /// # Errors
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault>;
 
-    /// Accepts bytes from the front of `bytes` (never empty), and returns their number; 0 if there is no room.
+    /// Accepts bytes from the front of `bytes` (never empty), and returns their number. 0 if there is no room.
     ///
     /// # Errors
     /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.

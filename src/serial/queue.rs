@@ -50,7 +50,7 @@ use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicUsize, Ordering};
 use crate::serial::port::{Fault, SerialPort};
 use crate::time::Duration;
 
-/// Returns the depth of the receive queue at `baud` bit/s (10 bits a byte), for a main loop that reads at least every `longest`.
+/// Returns the depth of the receive queue at `baud` bit/s, 10 bits a byte. The main loop reads at least every `longest`.
 ///
 /// It is the number of bytes received meanwhile plus three: one byte more, a marker of lost bytes, and a slot that a queue never
 /// uses.
@@ -96,7 +96,7 @@ impl<F: FnMut()> Pend for F {
     }
 }
 
-/// Byte queues between an interrupt and the main loop: fewer than `IN` received bytes, and fewer than `OUT` to send.
+/// Byte queues between an interrupt and the main loop. Fewer than `IN` received bytes, and fewer than `OUT` to send.
 ///
 /// `OUT` should hold a frame of [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can sleep meanwhile.
 #[derive(Debug)]
@@ -217,7 +217,7 @@ impl<K> QueuedPort<'_, K> {
         self.outgoing.room()
     }
 
-    /// Received bytes lost because the queue was full: the main loop did not read for longer than its depth.
+    /// Received bytes lost because the queue was full. The main loop did not read for longer than its depth.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }

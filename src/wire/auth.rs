@@ -22,7 +22,7 @@ impl Key {
         Self(bytes)
     }
 
-    /// Returns the tag of `signed`, header and body of a frame, for the nonces of its sender and its receiver.
+    /// Returns the tag of `signed` for the nonces of its sender and its receiver. `signed` is the header and body of a frame.
     ///
     /// Work: two to five blocks of BLAKE2s.
     pub fn tag(&self, sender: u64, receiver: u64, signed: &[u8]) -> [u8; TAG] {
@@ -61,8 +61,8 @@ impl defmt::Format for Key {
 pub struct Auth {
     /// Secret key of the network.
     pub key: Key,
-    /// Start counter of this relay, from 1, larger at every start: a number in flash that is incremented before use, or the
-    /// seconds of a clock that never runs backward. If an epoch is reused, frames recorded in it are accepted again.
+    /// Start counter of this relay, from 1, larger at every start. A number in flash that is incremented before use, or the seconds
+    /// of a clock that never runs backward. If an epoch is reused, frames recorded in it are accepted again.
     pub epoch: u32,
 }
 
@@ -86,7 +86,7 @@ impl Auth {
     }
 }
 
-/// Nonces of the two ends of a link: an epoch, and below it a link number that starts at the relay's claim number.
+/// Nonces of the two ends of a link. An epoch, and below it a link number that starts at the relay's claim number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,

@@ -13,7 +13,7 @@ use super::frame::MAX_DECODED;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// More bytes than a frame of maximum length.
+    /// Number of bytes above the maximum length of a frame.
     Oversized,
     /// Delimiter inside a COBS run.
     Truncated,

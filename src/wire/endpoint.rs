@@ -1,4 +1,4 @@
-//! A node's end of its links: which received frames count, and how its own are addressed, numbered and signed.
+//! End of a node's links: accepts received frames, and addresses, numbers and signs its own.
 //!
 //! A relay and a ground station have one each. What a frame then means to them is theirs.
 
@@ -66,7 +66,7 @@ impl Endpoint {
         None
     }
 
-    /// Checks the tag of `frame` and counts every result but a fresh message; `None` if this node does not sign.
+    /// Checks the tag of `frame` and counts every result but a fresh message. `None` if this node does not sign.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -85,7 +85,8 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once no more frames can be sent: a signed counter is used once, and after four billion frames a new epoch is due.
+    /// Returns true once no more frames can be sent. A signed counter is used once, and after four billion frames a new epoch is
+    /// due.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }

@@ -19,7 +19,7 @@ const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire: COBS adds one byte below 254 bytes, the delimiter another one.
+/// Maximum length of a frame on the wire. COBS adds one byte below 254 bytes, the delimiter another one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
 /// Maximum length of a sweep on the wire, with sixteen targets.
@@ -53,7 +53,7 @@ pub struct Header {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FrameError {
-    /// Too short for a header and a CRC.
+    /// Length below that of a header and a CRC.
     Short,
     /// The CRC does not match.
     Crc,
@@ -76,7 +76,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Encodes `message` into `out`; returns the length including the delimiter, or 0 if a node number is too large.
+/// Encodes `message` into `out`. Returns the length including the delimiter, or 0 if a node number is too large.
 ///
 /// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
 pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
@@ -230,8 +230,8 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes COBS in place: the `len` bytes from the second one on, fewer than 254, then the delimiter; returns the total length.
-/// The encoders of `cobs` need a second buffer.
+/// Encodes COBS in place: the `len` bytes from the second one on, fewer than 254, then the delimiter. Returns the total length. The
+/// encoders of `cobs` need a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

@@ -157,7 +157,7 @@ impl Session {
         }
     }
 
-    /// Pins the entries of `nodes`, the current neighbours, and schedules handshakes to those without an entry.
+    /// Pins the entries of `nodes`, the current neighbours. Schedules handshakes to those without an entry.
     pub(crate) fn pin(&mut self, nodes: [Option<u16>; 2]) {
         self.pinned = nodes;
         for node in nodes.into_iter().flatten() {
@@ -185,7 +185,7 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`, for other nodes of this relay's number that receive it too.
+    /// Schedules a handshake to the known node `to`. Other nodes of this relay's number receive it, too.
     pub(crate) fn show(&mut self, to: u16) {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             peer.handshake = true;
@@ -438,14 +438,14 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch belong to two nodes: their numbers differ by more than one node's do. The increment by
+/// Returns true if two nonces of one epoch belong to two nodes. Their numbers differ by more than one node's do. The increment by
 /// which a node raises its claim number is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR
 }
 
-/// Returns the nonces in a handshake, of its sender and its receiver; `None` if `frame` is no handshake.
+/// Returns the nonces in a handshake, of its sender and its receiver. `None` if `frame` is no handshake.
 fn said(frame: &Opened<'_>) -> Option<Nonces> {
     let (other, rest) = frame.body.split_first_chunk::<8>()?;
     let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {

@@ -1,4 +1,4 @@
-//! Uploaded mission, which replaces the one loaded before flight; also the format in which a relay stores it across a reboot.
+//! Uploaded mission, which replaces the one loaded before flight. Also the format in which a relay stores it across a reboot.
 //!
 //! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before flight;
 //! relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it has one
@@ -96,7 +96,7 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// Adds the sites between which the mission is flown; relays then use the line between them for latitudes and longitudes.
+    /// Adds the sites between which the mission is flown. Relays then use the line between them for latitudes and longitudes.
     ///
     /// An upload without sites is flown between the configured ones, wherever the relays flew since.
     ///

@@ -153,7 +153,7 @@ pub enum ConfigError {
     Listen,
     /// Interferer not 0 although there is a field.
     Interferer,
-    /// More points than a block has room for.
+    /// The number of points exceeds a block's capacity.
     Points,
     /// Non-zero bytes behind the last point.
     Unused,

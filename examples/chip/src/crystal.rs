@@ -1,4 +1,4 @@
-//! Check of the crystal's frequency against the HSI, because a wrong crystal would make the PLL overclock the core.
+//! Check of the crystal's frequency against the HSI. A wrong crystal would make the PLL overclock the core.
 //!
 //! TIM11 captures every eighth edge of HSE / 31, its measurement input by RM0090 and RM0390 (TIM11_OR).
 

@@ -48,7 +48,7 @@ impl Reset {
     /// Returns the cause in words.
     pub const fn text(self) -> &'static str {
         match self {
-            Self::Power => "power came on",
+            Self::Power => "power-on reset",
             Self::Brownout => "the supply voltage was too low",
             Self::Pin => "the reset pin",
             Self::Software => "the program or the debug probe",

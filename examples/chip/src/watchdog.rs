@@ -10,8 +10,8 @@ use crate::registers::{Register, Registers};
 const PRESCALER: u32 = 0b100;
 const RELOAD: u32 = 2_999;
 
-/// Time from the last feeding to the reset, ms: typical, fastest and slowest (LSI of 32, 47 and 17 kHz). An erase of a flash
-/// sector of 128 KiB stops the core for at most 2 s.
+/// Time from the last feeding to the reset, ms. Typical, fastest and slowest (LSI of 32, 47 and 17 kHz). An erase of a flash sector
+/// of 128 KiB stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
 /// Longest sleep of a relay's loop, ms.

@@ -1,4 +1,4 @@
-//! Two sectors of a flash with the traits of `embedded-storage`, which drivers of Embassy and many HALs have.
+//! Two sectors of a flash behind the traits of `embedded-storage`. Drivers of Embassy and many HALs implement them.
 
 use core::ops::Range;
 

@@ -78,7 +78,7 @@ impl<W: Write> std::fmt::Debug for Capture<W> {
 }
 
 impl<W: Write> Capture<W> {
-    /// Starts a capture in `out`, written by `application`; `comment` describes the whole capture, empty for none.
+    /// Starts a capture in `out`, written by `application`. `comment` describes the whole capture, empty for none.
     ///
     /// Each frame is passed to `out` at once, which may buffer it.
     ///

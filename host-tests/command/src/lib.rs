@@ -126,7 +126,7 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
     })
 }
 
-/// Checks that a channel of `baud` carries relays that share it and probe a silent neighbour after `probe_after`.
+/// Checks that a channel of `baud` carries relays with this load and this `probe_after`.
 ///
 /// # Errors
 /// The least sufficient data rate, the number of relays on the channel, and the alternatives.

@@ -32,8 +32,8 @@ use problem::Problem;
 use results::{Results, Solved};
 use rivals::{Rivals, SOLVERS};
 
-/// Finds the best places for relays with this crate, SciPy and NLopt, on this machine and in one run, and prints what each
-/// reached and how long it took as a table in markdown.
+/// Places relays with this crate, SciPy and NLopt, and prints what each reached in which time. All run on this machine, one after
+/// the other. The table is markdown.
 #[derive(Parser, Debug)]
 #[command(
     name = "compare",
@@ -140,7 +140,7 @@ fn solve(options: &Options) -> Result<Results, Failure> {
     })
 }
 
-/// Solves one problem with every solver; this crate first, because the others' times are compared with its time.
+/// Solves one problem with every solver, with this crate first. The others' times are compared with its time.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
     let level = table::level(problem, &runs)?;

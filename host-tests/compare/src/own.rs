@@ -1,4 +1,4 @@
-//! This crate's chains and their times on this machine.
+//! Chains of this crate, and their times on this machine.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -58,9 +58,9 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     Ok(runs)
 }
 
-/// Solves the chain from the mission, as the leader does: at most about fifty passes of N hops, and N^2 / 2 hops for positions.
+/// Solves the chain from the mission, as the leader does. At most about fifty passes of N hops, and N^2 / 2 hops for positions.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
-    let none = || "no target can be met".to_owned();
+    let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;
     let agreed = solve(black_box(mission), Schedule::Bracketed, common).map_err(|_| none())?;
     (1..=mission.relays())
@@ -72,7 +72,7 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));
-    places.ok_or_else(|| "no target can be met".to_owned())
+    places.ok_or_else(|| "no target SIR can be met".to_owned())
 }
 
 fn flown(setup: Setup) -> Result<Vec<Placement>, String> {

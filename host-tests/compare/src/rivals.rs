@@ -14,7 +14,7 @@ use crate::score::GOOD;
 
 const PROGRAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/serve.py");
 
-/// Returns the wall-clock limit of an answer: a busy machine grants a share of the processor, and some steps cannot be cut.
+/// Returns the wall-clock limit of an answer. A busy machine grants a share of the processor, and some steps cannot be cut.
 fn patience(limit_s: f64) -> Duration {
     Duration::from_secs_f64(20.0 * limit_s + 60.0)
 }

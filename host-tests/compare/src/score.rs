@@ -7,7 +7,7 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Found, Mark};
 
-/// Relative difference from the optimum at which a chain is good enough: the tolerance of the relays' mission.
+/// Relative difference from the optimum at which a chain is good enough. The tolerance of the relays' mission.
 pub(crate) const GOOD: f64 = 1e-4;
 
 /// Tolerance of positions, m: sixteen times the rounding of an f32 at a kilometre.
@@ -16,7 +16,7 @@ const SLACK_M: f64 = 1e-3;
 /// Relative tolerance of a solver's reported SIR: ten times the rounding of a relay's f32 formulas.
 const SIR_SLACK: f64 = 1e-5;
 
-/// Why a chain does not count.
+/// Reason for which a chain does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
     Count(usize),
@@ -105,7 +105,7 @@ pub(crate) struct Score {
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// Returns the score of a solver's result against a chain of `level` (linear SIR): times are trusted, SIRs recomputed.
+/// Returns the score of a solver's result against a chain of `level` (linear SIR). Times are trusted, SIRs recomputed.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -30,7 +30,7 @@ pub struct Frame<'f> {
     pub refusal: Option<Refusal>,
 }
 
-/// Decodes a frame: `wire` are its bytes with the final delimiter, or the first bytes of a frame of `len`.
+/// Decodes a frame. `wire` are its bytes with the final delimiter, or the first bytes of a frame of `len`.
 ///
 /// The library decides whether it is rejected; the tables provide its fields and the reason.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {

@@ -42,7 +42,7 @@ impl TagCheck {
     }
 }
 
-/// Number of latest nonces per direction that are tried: frames before a new handshake may still be in flight.
+/// Number of latest nonces per direction that are tried. Frames before a new handshake may still be in flight.
 const TRIED: usize = 4;
 
 /// Network, sender and destination.

@@ -1,4 +1,4 @@
-//! Results common to all sets of features: positions, bytes on the air, and the refusal of missing features.
+//! Results common to all sets of features. Positions, bytes on the air, and the refusal of missing features.
 
 use uav_relay::SetupError;
 use uav_relay::mission::MissionError;

@@ -1,4 +1,4 @@
-//! Consistent overhead byte stuffing: encoding by a published encoder, decoding of damaged frames by the definition.
+//! Consistent overhead byte stuffing. Encoding by a published encoder, decoding of damaged frames by the definition.
 
 /// Encodes `plain` and appends the delimiter.
 pub fn stuffed(plain: &[u8]) -> Vec<u8> {

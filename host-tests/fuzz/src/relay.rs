@@ -188,7 +188,7 @@ impl Bench {
         self.now = self.now + span;
     }
 
-    /// Advances the time to the relay's next timeout, repeatedly.
+    /// Advances the time to the relay's next timeout, `times` times.
     fn wake(&mut self, times: u8) {
         for _ in 0..times {
             let Some(next) = self.watched.relay().poll_timeout() else {

@@ -1,5 +1,4 @@
-//! Fuzz target: any text as a scenario file gives a scenario within its ranges or a one-line error, and then a mission or an
-//! error.
+//! Fuzz target for scenario files. Any text gives a scenario within its ranges or a one-line error, and then a mission or an error.
 
 use uav_relay::Mission;
 

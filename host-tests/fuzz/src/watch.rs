@@ -1,4 +1,4 @@
-//! Watched relay: after every input its output is collected as by a firmware, and the promises of its documentation are checked.
+//! Watched relay. After every input its output is collected as by a firmware, and the guarantees of its documentation are checked.
 
 mod frames;
 mod number;

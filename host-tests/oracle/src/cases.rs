@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::reference::{Link, Station};
 
-/// Optimum (linear SIR) of the default scenario by number of relays, from the independent program, to nine digits.
+/// Optimum (linear SIR) of the default scenario by number of relays. The values are of an independent program, to nine digits.
 pub const OPTIMA: [(u16, f64); 12] = [
     (1, 1.490_121_51),
     (2, 1.616_583_02),

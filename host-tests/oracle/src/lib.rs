@@ -1,4 +1,4 @@
-//! Test oracles for placements: independent f64 optimisers, values of an independent program, and random scenarios.
+//! Test oracles for placements. Independent f64 optimisers, values of an independent program, and random scenarios.
 //!
 //! The optimisers share no formula with `uav-relay`; the scenarios are weighted toward where formulas break. No product depends
 //! on this crate.

@@ -9,7 +9,7 @@ use uav_relay_scenario::scene::{Corridor, Relay, Scene};
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Station};
 
-/// Returns the mission of a reference link, and the relays' own profiles; `None` if a relay would reject its numbers.
+/// Returns the mission of a reference link, and the relays' own profiles. `None` if a relay would reject its numbers.
 ///
 /// The first relay's profile is the mission's common one.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
@@ -49,7 +49,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
 
-/// Returns the scene of a reference link, with the first relay's altitude as its band; `None` without relays.
+/// Returns the scene of a reference link, with the first relay's altitude as its band. `None` without relays.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Station| Relay {
@@ -75,7 +75,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// Returns the mission of a reference link in a field, with identical relays; `None` if a relay would reject its numbers.
+/// Returns the mission of a reference link in a field, with identical relays. `None` if a relay would reject its numbers.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link

@@ -40,7 +40,7 @@ struct Told {
     wrong: Option<String>,
 }
 
-/// Runs a chain and returns the result as JSON: `report`, `film` if requested, and `wrong`, an error line, if something failed.
+/// Runs a chain and returns the result as JSON. `report`, `film` if requested, and `wrong`, an error line, if something failed.
 ///
 /// `options` are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML text.
 #[wasm_bindgen]

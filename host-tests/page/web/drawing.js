@@ -1,7 +1,7 @@
 "use strict";
-// The two views, in metres. What is drawn here knows nothing of where the numbers come from.
+// The two views, in metres. This file does not depend on the simulator.
 
-/** What a view shows, m, and the numbers on its second axis: y to the right of the line, which is down as seen from above, or height. */
+/** Ranges of the views, m, and the labels of the second axis: height, or y to the right of the line, which points down in the view from above. */
 const VIEWS = {
   above: { x: [-250, 1250], y: [-440, 460], down: true, ticks: [-400, -200, 0, 200, 400] },
   side: { x: [-250, 1250], y: [-110, 340], down: false, ticks: [0, 100, 200, 300] },
@@ -9,7 +9,7 @@ const VIEWS = {
 
 const SPACE = "http://www.w3.org/2000/svg";
 
-/** An element of a picture with these attributes, and text in it. */
+/** Creates an SVG element with these attributes and this text. */
 function element(name, attributes, text) {
   const made = document.createElementNS(SPACE, name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -24,13 +24,13 @@ const SHAPES = {
   relay: () => [element("circle", { class: "drone", r: 8 })],
 };
 
-/** How far around a sign a hand or a finger takes hold of it, px. */
+/** Radius around a symbol within which it can be pressed, px. */
 const REACH = { site: 20, jammer: 20, relay: 14, belief: 0 };
 
-/** Relays nearer to each other on the screen than this have no numbers in them, px. */
+/** Minimum distance of neighbouring relays for a number in each, px. */
 const CROWDED = 17;
 
-/** One view, drawn into an element that stays: signs and hops are made once, and moved after. */
+/** View drawn into one SVG element. Symbols and hops are created once and then moved. */
 class Picture {
   constructor(svg, view) {
     this.svg = svg;
@@ -44,24 +44,24 @@ class Picture {
     svg.replaceChildren(this.axes, this.hops);
   }
 
-  /** From metres to the picture. */
+  /** Converts metres to coordinates of the picture. */
   at([x, y]) {
     return [x - this.view.x[0], this.view.down ? y - this.view.y[0] : this.view.y[1] - y];
   }
 
-  /** From a place on the screen to metres. */
+  /** Converts a position on the screen to metres. */
   metres(clientX, clientY) {
     const there = new DOMPoint(clientX, clientY).matrixTransform(this.svg.getScreenCTM().inverse());
     return [there.x + this.view.x[0], this.view.down ? there.y + this.view.y[0] : this.view.y[1] - there.y];
   }
 
-  /** Finds out how many metres one pixel of the screen is: signs and letters are as large on every screen. Asked for before anything is
-   * changed, once: the browser lays out the page for it. */
+  /** Measures the metres per pixel, so that symbols and letters have the same size on every screen. It forces a layout of the page, so it is
+   * called once, before any change. */
   measure() {
     this.unit = this.size[0] / (this.svg.clientWidth || 850);
   }
 
-  /** The axes, for the size that the picture has now. */
+  /** Draws the axes for the present size of the picture. */
   frame() {
     const { unit, size: [width, height] } = this;
     if (this.framed === unit) return;
@@ -86,7 +86,7 @@ class Picture {
     return element("text", { class: kind, transform: `translate(${x} ${y}) scale(${this.unit})` }, text);
   }
 
-  /** The hops through these points; those of `marks` by their number, from 0 at Tx, have a class of their own. */
+  /** Draws the hops through these points. `marks` maps the number of a hop, from 0 at Tx, to a class. */
   chain(points, marks) {
     while (this.hops.childElementCount > Math.max(0, points.length - 1)) this.hops.lastChild.remove();
     while (this.hops.childElementCount < points.length - 1) this.hops.append(element("line", {}));
@@ -98,7 +98,7 @@ class Picture {
     });
   }
 
-  /** The signs that are there, each with its `id`, `shape`, `kind`, place `at`, attributes, and the text in or beside it. */
+  /** Draws the symbols, each with `id`, `shape`, `kind`, position `at`, attributes, and a text in or beside it. */
   put(signs) {
     const there = new Set(signs.map((sign) => sign.id));
     for (const [id, group] of this.signs) {
@@ -125,7 +125,7 @@ class Picture {
     }
   }
 
-  /** Whether signs there would be too near to each other for a number in each. */
+  /** Returns true if symbols at these points are too close for a number in each. */
   crowds(points) {
     return points.some(([x, y], at) => at > 0 && Math.hypot(x - points[at - 1][0], y - points[at - 1][1]) < CROWDED * this.unit);
   }

@@ -1,7 +1,7 @@
 "use strict";
-// The code that flies, in a thread of its own: the page stays awake whatever it computes.
+// The simulator with the on-board code, in a worker thread, so that the page stays responsive.
 
-/** What the other thread does: it begins with the compiled code, and answers each question with what `chain` gives. */
+/** Main function of the worker: receives the compiled code first, then answers each request with the result of `chain`. */
 function thread() {
   const code = new Promise((resolve) => { self.resolve = resolve; });
   self.onmessage = async ({ data }) => {
@@ -22,7 +22,7 @@ function thread() {
   };
 }
 
-/** A run that takes longer is given up as soon as something else is wanted, ms. */
+/** Time after which a run is cancelled if there is a newer request, ms. */
 const GIVEN_UP = 1_500;
 
 const engine = {
@@ -50,7 +50,7 @@ const engine = {
     this.worker.postMessage({ code: this.code });
   },
 
-  /** Asks for a run; of those that wait for the last one to end, only the newest is run. */
+  /** Requests a run. Of several waiting requests only the newest is run. */
   ask(question) {
     this.next = question;
     if (this.running && performance.now() - this.running.begun > GIVEN_UP) {

@@ -1,29 +1,29 @@
 "use strict";
-// What a hand does: it drags, presses, types.
+// Input: dragging, pressing, typing.
 
-/** How far from a sign a press still means it, px; and how much nearer than others those count that are dragged. */
+/** Maximum distance of a press from its handle, px, and the advantage of handles that can be dragged over relays. */
 const NEAR = 22;
 const DRAGGED = 6;
 
-/** A press that moves farther than this is a drag, px. */
+/** Movement from which a press is a drag, px. */
 const STILL = 8;
 
-/** What is held, where the press began, and whether it has become a drag of a relay. */
+/** Present press: the handle, its start, and true if it has become a drag of a relay. */
 const hand = { holds: null, from: [0, 0], drags: false };
 
-/** The handles of `picture`: `signs()` are where; `moved(id, x, y)` when one is put somewhere, `pressed(relay)` when a relay is, `left()` when one is let go, `refused()` when a relay is dragged. */
+/** Connects the handles of `picture`, whose positions `signs()` returns. Calls `moved(id, x, y)` for a drag, `left()` at its end, `pressed(relay)` for a press of a relay, and `refused()` for a drag of a relay. */
 function handle(picture, signs, { moved, pressed, left, refused }) {
   const { svg } = picture;
   const relays = () => signs().filter(({ relay }) => relay !== undefined);
   const isSign = (event) => event.target.closest("[role]") !== svg;
-  // A finger on a sign drags that, and does not scroll the page.
+  // A finger on a handle drags it and does not scroll the page.
   svg.addEventListener("touchstart", (event) => {
     if (isSign(event)) event.preventDefault();
   }, { passive: false });
   svg.addEventListener("pointerdown", (event) => {
     if (!isSign(event)) return;
     event.preventDefault();
-    // Where signs are crowded the nearest is meant, and not the one that was drawn last.
+    // Of several handles close together the nearest one counts, not the one drawn last.
     const [x, y] = picture.metres(event.clientX, event.clientY);
     const far = (sign) => Math.hypot(sign.x - x, sign.y - y) / picture.unit - (sign.relay === undefined ? DRAGGED : 0);
     const nearest = signs().sort((a, b) => far(a) - far(b))[0];
@@ -68,7 +68,7 @@ function handle(picture, signs, { moved, pressed, left, refused }) {
     event.preventDefault();
   });
 
-  /** The relay that Tab comes to: one of them, or it would take a hundred of them to get past. */
+  /** Makes this relay the only one that Tab reaches: otherwise up to a hundred relays would have to be passed. */
   function turn(id) {
     if (!id.startsWith("relay")) return;
     hand.relay = Number(id.slice("relay".length));
@@ -84,7 +84,7 @@ function handle(picture, signs, { moved, pressed, left, refused }) {
   }
 }
 
-/** Takes over what stands in the form: a number that is out of its range is said until it is mended, the others count. */
+/** Reads the form and returns an error line for each number out of its range. Valid fields are used. */
 function read() {
   const lines = [];
   for (const key of ["uavs", "power", "loss"]) {
@@ -92,7 +92,7 @@ function read() {
     const good = field.value !== "" && field.checkValidity();
     field.setAttribute("aria-invalid", String(!good));
     if (good) want[key] = Number(field.value);
-    else lines.push(`${field.parentElement.textContent.trim()} ${field.value || "(nothing)"}: must be within ${field.min} to ${field.max}`);
+    else lines.push(`${field.parentElement.textContent.trim()} ${field.value || "(empty)"}: must be within ${field.min} to ${field.max}`);
   }
   want.method = byId("method").value;
   want.listen = byId("listen").checked;

@@ -1,35 +1,35 @@
 "use strict";
-// The page: what is wanted, what came of it, and what is to be seen of that.
+// Page: connects the input, the runs and the pictures.
 
-/** The last run that came about, what is wrong with the next one, and with the fields, and where a hand is stopped. */
+/** State of the page: the last completed run, and the errors of the next run, of the fields and of a drag. */
 const shown = { run: null, asked: "", refused: "", fields: [], stopped: "", places: new Map(), frame: 0 };
 
 const pictures = Object.fromEntries(Object.entries(VIEWS).map(([name, view]) => [name, new Picture(byId(name), view)]));
 
-/** Where the relays are to be seen: each relay's number, whether it is on, whether it has a place yet, and where, in the world's x. */
+/** Returns the displayed relays: number, on or off, position agreed or not (`told`), and position, with x in the picture's coordinates. */
 function relays() {
   const { run } = shown;
   const tick = player.now;
   if (!run) return [];
   const there = tick ? tick.relays : run.last;
   const one = ([relay, { on, place }]) => {
-    // Until it is told where, it is shown where it is going to be.
+    // A relay without a position is drawn at its first one.
     const at = place || (run.first.get(relay) || {}).place;
     return at && { relay, on, told: Boolean(place), x: at[0] + run.tx, y: at[1], h: at[2] };
   };
   return [...there].map(one).filter(Boolean).sort((a, b) => a.x - b.x);
 }
 
-/** The SIR of every hop that is to be seen. */
+/** Returns the displayed SIR of every hop. */
 function sirs() {
   const { report } = shown.run;
   return player.now && !player.ended ? player.now.sirs : [...(report.relays || []).map((relay) => relay.sir), report.rx_sir];
 }
 
-/** Whether what is to be seen is of what is wanted. */
+/** Returns true if the run has the present input. */
 const isOf = (run) => Boolean(run) && run.words === options() && run.toml === scenario();
 
-/** Draws both views, with the relays where `moved` says. */
+/** Draws both views; `moved` replaces the positions of the relays during an animation. */
 function draw(moved) {
   const all = moved || relays();
   const chain = all.filter((relay) => relay.on);
@@ -38,7 +38,7 @@ function draw(moved) {
   const values = run ? sirs() : [];
   const speaks = player.playing && tick ? tick.says : null;
   const drift = want.moving && tick && wanted ? SPEED * tick.at_s : 0;
-  // Of the relays Tab comes to one, whichever of them are there.
+  // Exactly one relay can be reached by Tab.
   const stop = all.some(({ relay }) => relay === hand.relay) ? hand.relay : (all[0] || {}).relay;
   const marks = new Map();
   if (wanted && values.length === chain.length + 1) for (const hop of worstHops(values)) marks.set(hop, "worst");
@@ -76,7 +76,7 @@ function draw(moved) {
   }
 }
 
-/** What is said beside the pictures. */
+/** Updates the texts beside the pictures. */
 function tell() {
   complain([...shown.fields, shown.stopped, shown.refused]);
   const { run } = shown;
@@ -97,13 +97,13 @@ function tell() {
   byId("time").setAttribute("aria-valuetext", byId("clock").textContent);
 }
 
-/** How the relays are at the end of a run without a film. */
+/** Returns the final state of the relays of a run without a film. */
 function ended({ relays: kept, lost }) {
   const one = (on) => (relay) => [relay.index, { on, place: relay.x_m === undefined ? null : [relay.x_m, relay.y_m || 0, relay.h_m] }];
   return new Map([...kept.map(one(true)), ...(lost || []).map(one(false))]);
 }
 
-/** Takes what came of a run. What cannot be run is said, and what was shown stays. */
+/** Shows the result of a run. After an error the last result stays visible. */
 function take({ words, toml, tx, plays }, { text, took_ms }) {
   const told = JSON.parse(text);
   const { report, film } = told;
@@ -133,7 +133,7 @@ function take({ words, toml, tx, plays }, { text, took_ms }) {
 
 const still = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-/** From the places that are shown to those of the run. */
+/** Animates the relays from the displayed positions to those of the run. */
 function glide() {
   const from = shown.places;
   const to = relays();
@@ -155,10 +155,10 @@ function glide() {
   shown.frame = requestAnimationFrame(turn);
 }
 
-/** The options and the scenario of what is wanted, to compare. */
+/** Returns options and scenario of the present input, for comparisons. */
 const wish = () => `${options()}\n${scenario()}`;
 
-/** Has what is wanted run; played from `plays` s on, if that is given. */
+/** Starts a run of the present input; plays it from `plays` seconds on, if given. */
 function run(plays) {
   shown.asked = wish();
   engine.ask({ words: options(), toml: scenario(), tx: want.tx, film: !hand.holds, plays });
@@ -182,7 +182,7 @@ byId("play").addEventListener("click", () => {
   else player.play();
   player.seen();
 });
-/** What can be taken hold of, from above. */
+/** Returns the handles of the view from above. */
 const signs = () => [
   ...relays().map((relay) => ({ ...relay, id: `relay${relay.relay}` })),
   { id: "tx", x: want.tx, y: 0 }, { id: "rx", x: want.rx, y: 0 }, { id: "jammer", x: want.x, y: want.y },
@@ -228,10 +228,10 @@ new ResizeObserver(() => {
 
 byId("moving").disabled = true;
 for (const picture of Object.values(pictures)) picture.measure();
-// The first run came with the page: it is to be seen before the code is there.
+// The page contains the result of the first run, so that it is visible before the code is loaded.
 take({ words: options(), toml: scenario(), tx: want.tx }, { text: byId("first").textContent, took_ms: 0 });
 
-/** Called at the end of the page, when all of it is there. */
+/** Loads the code and starts the first run; called at the end of the page. */
 function begin() {
   engine.load(byId("code").textContent.trim()).then(() => {
     window.ready = true;

@@ -1,14 +1,14 @@
 "use strict";
-// A run from its beginning to its end, tick by tick.
+// Playback of a run, tick by tick.
 
-/** How long all of it takes, and one tick at least and at most, ms; and how much longer one in which something happened. */
+/** Duration of the playback, minimum and maximum of a tick, and duration of a tick with an event, ms. */
 const PLAYED = { all: 10_000, least: 25, most: 120, pause: 450 };
 
-/** Frames before a moment in which the chain changes are ticks of their own for so long, s; so many at most. */
+/** Time before a change of the chain in which each frame is a tick of its own, s, and the maximum number of such ticks. */
 const BEFORE = 0.7;
 const FRAMES = 400;
 
-/** What is played: for each tick its time, how the relays are, the SIRs, and who speaks. */
+/** Returns the ticks of a playback: time, states of the relays, SIRs, and sender of a frame. */
 function ticks(film, timeline) {
   const moving = film.stands.filter((stand) => stand.relays.some(([, , place]) => place)).map((stand) => stand.at_s);
   let coming = 0;
@@ -37,14 +37,14 @@ function ticks(film, timeline) {
 
 const player = {
   ticks: [], tick: 0, timer: null,
-  /** Called when another tick is to be seen. */
+  /** Callback after each change of the displayed tick. */
   seen: () => {},
 
   get playing() { return this.timer !== null; },
   get now() { return this.ticks[this.tick] || null; },
   get ended() { return this.tick >= this.ticks.length - 1; },
 
-  /** Takes another run, and stands at its end. */
+  /** Replaces the run, and shows its end. */
   take(all) {
     this.stop();
     this.ticks = all;
@@ -56,7 +56,7 @@ const player = {
     this.seen();
   },
 
-  /** Plays from here, or from its beginning once it has ended. */
+  /** Plays from the present tick, or from the beginning after the end. */
   play() {
     if (this.ended) this.tick = 0;
     const each = Math.min(PLAYED.most, Math.max(PLAYED.least, PLAYED.all / Math.max(1, this.ticks.length)));

@@ -1,24 +1,24 @@
 "use strict";
-// What the user wants, as `cargo chain` takes it.
+// Input of the user, as options and a scenario of `cargo chain`.
 
 const BEGINNING = { tx: 0, rx: 1000, x: 500, y: 400, power: 80, uavs: 8, method: "align", loss: 0, listen: false, moving: false };
 
-/** When relays that are switched off fall silent, and how long relays listen, s. */
+/** Time at which relays that are switched off become silent, and duration of the measurements, s. */
 const SILENT_S = 20;
 const LISTEN_S = 120;
 
-/** How fast an interferer goes that moves, m/s toward Rx. */
+/** Speed of a moving interferer toward Rx, m/s. */
 const SPEED = 3;
 
-/** A hand that is farther than this from the line, m, means to move Tx or Rx off it. */
+/** Distance from the line, m, beyond which a drag of Tx or Rx is refused with an explanation. */
 const BESIDE = 60;
 
-/** What Tx and Rx keep of distance, m. */
+/** Minimum distance of Tx and Rx, m. */
 const APART = 50;
 
 const want = { ...BEGINNING, off: new Set() };
 
-/** The command line of `cargo chain` for what is wanted, but for its scenario. */
+/** Returns the options of `cargo chain`, without the scenario. */
 function options() {
   const words = [`--uavs ${want.uavs}`, `--method ${want.method}`];
   if (want.loss > 0) words.push(`--loss ${want.loss / 100}`);
@@ -30,13 +30,13 @@ function options() {
   return words.join(" ");
 }
 
-/** A number as TOML has one of the kind that has a point. */
+/** Formats a number as a TOML float. */
 function real(number) {
   const text = String(number);
   return /[.e]/.test(text) ? text : `${text}.0`;
 }
 
-/** The scenario in which x begins at Tx. */
+/** Returns the scenario, whose x begins at Tx. */
 function scenario() {
   const joint = want.method === "joint";
   const lines = [
@@ -50,7 +50,7 @@ function scenario() {
   return `${lines.join("\n")}\n`;
 }
 
-/** Puts a handle to whole metres that it may be at; what keeps it from where it was meant to be, if anything does. */
+/** Moves a handle to whole metres within its range. Returns the reason if it could not follow the drag, otherwise "". */
 function move(id, x, y) {
   const [[left, right], [top, bottom]] = [VIEWS.above.x, VIEWS.above.y];
   const ranges = {
@@ -65,10 +65,10 @@ function move(id, x, y) {
   const near = id === "tx" ? there[0] > ranged[0][1] : id === "rx" && there[0] < ranged[0][0];
   if (near) return `Tx and Rx: must be at least ${APART} m apart`;
   if (id !== "jammer" && Math.abs(there[1]) > BESIDE) return "Tx and Rx cannot leave the line: drag them along it.";
-  return nx === there[0] && (id !== "jammer" || ny === there[1]) ? "" : "That is as far as the picture goes.";
+  return nx === there[0] && (id !== "jammer" || ny === there[1]) ? "" : "The picture ends here: nothing can be dragged beyond it.";
 }
 
-/** Where a handle is, and in words. */
+/** Returns the x of a handle, and its position as a text. */
 function standing(id) {
   const x = { tx: want.tx, rx: want.rx, jammer: want.x }[id];
   return { x, words: id === "jammer" ? `x ${x} m, y ${want.y} m` : `x ${x} m` };

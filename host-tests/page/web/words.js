@@ -1,5 +1,5 @@
 "use strict";
-// What is said beside the pictures.
+// Texts beside the pictures.
 
 const byId = (id) => document.getElementById(id);
 
@@ -7,14 +7,14 @@ const decibels = (linear) => `${(10 * Math.log10(linear)).toFixed(2)} dB`;
 
 function summary(report) {
   if (report.sir === undefined) return "No agreement.";
-  const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the best, with everything known.`;
+  const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the optimum with the interferer known.`;
   return `Worst hop: SIR ${report.sir.toPrecision(5)} (${decibels(report.sir)}) with ${report.relays.length} relays; ${report.messages} messages, ${report.bytes} bytes, ${report.virtual_s.toFixed(3)} s of virtual time.${share}`;
 }
 
-/** What is to be seen at a tick that is not the last. */
+/** Returns the summary of a tick before the last one. */
 function moment(tick, worst, chain) {
   const told = chain.filter((relay) => relay.told).length;
-  const sir = told < chain.length ? `${told} of ${chain.length} relays have a place` : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
+  const sir = told < chain.length ? `${told} of ${chain.length} relays have a position` : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
   return `At ${tick.at_s.toFixed(3)} s: ${sir}; ${tick.messages} messages.`;
 }
 
@@ -28,7 +28,7 @@ function worstHops(sirs) {
   return worst.length < sirs.length ? worst : [];
 }
 
-/** A list of SIRs, those of the worst hops marked; `ends` says where each hop ends. */
+/** Fills the list of SIRs and marks the worst hops; `ends` names the end of each hop. */
 function list(sirs, ends) {
   const [most, worst] = [Math.max(...sirs), new Set(worstHops(sirs))];
   const all = byId("hops");
@@ -47,7 +47,7 @@ function list(sirs, ends) {
   });
 }
 
-/** What happened, each in a line. */
+/** Fills the list of events. */
 function happened(timeline) {
   byId("happened").hidden = timeline.length === 0;
   byId("events").replaceChildren(...timeline.map((event) => {
@@ -55,12 +55,12 @@ function happened(timeline) {
     const who = event.relay === 0 ? "Tx" : `relay ${event.relay}`;
     const other = event.other === undefined ? "" : ` ${event.other}`;
     const relays = event.relays === undefined ? "" : `, ${event.relays} relays`;
-    item.textContent = `${event.at_s.toFixed(3)} s: ${who} ${event.what}${other}${relays}`;
+    item.textContent = `${event.at_s.toFixed(3)} s: ${who}: ${event.what}${other}${relays}`;
     return item;
   }));
 }
 
-/** Marks those that have happened by now, and has the last of them in sight. */
+/** Marks the first `told` events as past, and scrolls to the last of them. */
 function mark(told) {
   const [box, items] = [byId("events"), byId("events").children];
   [...items].forEach((item, at) => item.classList.toggle("coming", at >= told));
@@ -68,7 +68,7 @@ function mark(told) {
   if (last) box.scrollTop = last.offsetTop - box.offsetTop - box.clientHeight / 2;
 }
 
-/** Lines that help; nothing where nothing is wrong. */
+/** Shows error lines; hides the box if there are none. */
 function complain(lines) {
   const box = byId("wrong");
   const text = lines.filter((line) => line).join("\n");

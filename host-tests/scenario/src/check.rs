@@ -197,7 +197,7 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table that serde rejects after [`table`] has accepted it: the key table and the types differ.
+/// Creates the error for a table that serde rejects after [`table`] has accepted it. The key table and the types differ.
 pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

@@ -7,7 +7,7 @@ use core::fmt;
 
 const PREFIX: &str = "udp:";
 
-/// Ports at which PX4's simulation listens for a companion, and the first port that it sends to; both are numbered by vehicle.
+/// Ports at which PX4's simulation listens for a companion, and the first port that it sends to. Both are numbered by vehicle.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
 const PX4_SENDS_TO: u16 = 14_540;
 

@@ -14,7 +14,7 @@ const QUOTED: usize = 60;
 pub struct ScenarioError {
     /// File name as given by the user.
     pub file: String,
-    /// Location: a key such as `relay[1].index`, or a line and column; `None` if the whole file is at fault.
+    /// Location: a key such as `relay[1].index`, or a line and column. `None` if the whole file is at fault.
     pub key: Option<String>,
     /// Offending value as TOML, cut if long; `None` if there is none.
     pub value: Option<String>,
@@ -92,20 +92,20 @@ impl fmt::Display for Problem {
             Self::Syntax => "is not valid TOML",
             Self::UnknownKey => "is not a known key",
             Self::Missing => "is missing",
-            Self::SaidTwice => "says the same twice",
+            Self::SaidTwice => "is given twice",
             Self::NoSite => "needs [site]",
             Self::UnknownChoice => "is not known",
             Self::NoEndpoint(error) => return error.fmt(f),
             Self::OtherNumber => "contradicts plan.uavs",
-            Self::NoList => "is one table, and may be several",
-            Self::NoTable => "is a list, and there is only one",
+            Self::NoList => "is a table, and must be a list",
+            Self::NoTable => "is a list, and must be a table",
             Self::WrongType => "has the wrong type",
             Self::OutOfRange => "is out of range",
             Self::EmptyList => "has no entry",
             Self::TwoInterferences => "contradicts [[interferer]]",
             Self::NoInterference => "is missing, and so is field",
-            Self::DuplicateRelay => "is taken",
-            Self::NothingDiffers => "changes nothing",
+            Self::DuplicateRelay => "is already used",
+            Self::NothingDiffers => "has no effect",
             Self::OtherDistance => "contradicts [site]",
             Self::Unsorted => "is not in increasing order",
         })

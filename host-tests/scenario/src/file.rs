@@ -17,7 +17,8 @@ use crate::spec::{
     Scenario,
 };
 
-/// `deny_unknown_fields` guards the table of keys: a key that is listed there but missing here fails at once.
+/// Scenario file as serde reads it. `deny_unknown_fields` guards the table of keys: a key that is listed there but missing here
+/// fails at once.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFile {

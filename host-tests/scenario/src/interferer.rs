@@ -10,7 +10,7 @@ use crate::keys::number;
 use crate::power::Said;
 use crate::spec::{Line, Source};
 
-/// Largest change of interference, dB, by ignoring an interferer's height, anywhere that relays or Rx may be.
+/// Largest change of interference, dB, by ignoring an interferer's height. It holds anywhere that relays or Rx may be.
 const MOST_OFF_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -123,7 +123,8 @@ fn on_earth(
 }
 
 impl Room<'_> {
-    /// Returns the largest difference, dB, of the interference from `above_m` over (`x_m`, `y_m`) and from the ground below.
+    /// Returns the largest difference, dB, of the interference by a source's height. The source is `above_m` over (`x_m`, `y_m`),
+    /// or on the ground below.
     ///
     /// At a given altitude it is largest for the nearest relay position; altitudes are tried in steps. Rx is a further receiver.
     fn off_by_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {

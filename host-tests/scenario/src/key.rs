@@ -1,4 +1,4 @@
-//! Reads a secret key (of the network or the autopilot) from a file: 64 hexadecimal digits, as from `openssl rand -hex 32`.
+//! Reads a secret key (of the network or the autopilot) from a file. 64 hexadecimal digits, as from `openssl rand -hex 32`.
 
 use std::path::Path;
 

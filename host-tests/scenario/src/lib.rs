@@ -86,7 +86,7 @@ impl deployment::Deployment {
         Ok((scenario, sections))
     }
 
-    /// Parses the sections of a file whose plan is about to be replaced; `file_name` is used only in error messages.
+    /// Parses the sections of a file whose plan is about to be replaced. `file_name` is used only in error messages.
     ///
     /// # Errors
     /// Invalid TOML, and any mistake in a section.

@@ -12,7 +12,7 @@ use crate::number::narrow;
 use crate::scene::Scene;
 use crate::{Interference, Scenario, Source};
 
-/// Why a scenario is not a valid mission.
+/// Reason for which a scenario is not a valid mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -60,7 +60,7 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Returns the mission of `uavs` relays, with one interferer in place of several, and the relays' own profiles (index from 1).
+/// Returns the mission of `uavs` relays and the relays' own profiles. One interferer replaces several; indices begin with 1.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -136,7 +136,7 @@ pub fn mission(
     Ok((mission, profiles))
 }
 
-/// Returns the hypothetical interferer of a scenario with several; `None` with fewer, or if there is no good one.
+/// Returns the hypothetical interferer of a scenario with several. `None` with fewer, or if there is no good one.
 pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     match &scenario.interference {
         Interference::Sources(sources) if sources.len() > 1 => {
@@ -166,7 +166,7 @@ pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission with the Upsilon of Rx everywhere: the knowledge of relays before any measurement.
+/// Returns the mission with the Upsilon of Rx everywhere. The knowledge of relays before any measurement.
 #[must_use]
 pub fn told_of_an_even_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -190,7 +190,7 @@ pub fn told_of_an_even_field(mission: &Mission) -> Mission {
         .unwrap_or(*mission)
 }
 
-/// Returns alpha and beta of the distribution of I / `i_max_w` at `x_m`: alpha and Upsilon are interpolated.
+/// Returns alpha and beta of the distribution of I / `i_max_w` at `x_m`. alpha and Upsilon are interpolated.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);

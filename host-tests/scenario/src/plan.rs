@@ -31,7 +31,7 @@ pub enum PlannedMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedPlace {
-    /// Along the line from Tx, m.
+    /// Distance along the line from Tx, m.
     pub x_m: f64,
     /// Lateral position, m; positive to the right as seen from above.
     pub y_m: f64,

@@ -8,7 +8,7 @@ use toml::Table;
 
 use crate::error::{Problem, ScenarioError, cut};
 
-/// Largest file size, bytes: far more than 1000 relays and as many interferers, and it bounds `/dev/zero`.
+/// Largest file size, bytes. Far more than 1000 relays and as many interferers, and it bounds `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 
 pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {

@@ -69,11 +69,11 @@ pub struct Scene {
 /// Position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Along the line from Tx, m.
+    /// Distance along the line from Tx, m.
     pub x: f64,
     /// Lateral position, m; positive to the right of the line.
     pub y: f64,
-    /// Above ground, m, > 0.
+    /// Height above ground, m, > 0.
     pub h: f64,
 }
 
@@ -180,7 +180,7 @@ impl Scene {
         sirs.reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// Returns the SIR (linear) of the worst hop with relays at `along`, m from Tx, at their own altitudes above the line.
+    /// Returns the SIR (linear) of the worst hop. Relays are at `along`, m from Tx, at their own altitudes above the line.
     ///
     /// 0 unless there is one position per relay.
     pub fn sir_along(&self, along: &[f64]) -> f64 {

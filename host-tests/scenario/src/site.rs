@@ -25,7 +25,7 @@ struct RawSite {
     amsl_m: f64,
 }
 
-/// Returns the geographic line, if there are sites, and the distance from Tx to Rx: the given one, or that of the sites.
+/// Returns the geographic line, if there are sites, and the distance from Tx to Rx. The given one, or that of the sites.
 pub(super) fn line(
     file: &str,
     sites: Option<RawSites>,

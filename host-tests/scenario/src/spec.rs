@@ -8,7 +8,7 @@ use uav_relay::{Duration, Geodetic, Listen};
 use crate::number::{factor, narrow, watts};
 use crate::plan::Planned;
 
-/// Parameters of a flight, in SI units, with x along the line from Tx (x = 0) to Rx and y to its right as seen from above.
+/// Parameters of a flight, in SI units. x is along the line from Tx (x = 0) to Rx, y to its right as seen from above.
 ///
 /// Values from [`Scenario::load`] or [`Scenario::parse`] are within the ranges given here.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,7 @@ pub struct Scenario {
     pub lateral_max_m: f64,
     /// Least distance between two relays, m, 0 (its default) to 1e5.
     pub min_separation_m: f64,
-    /// EIRP of Tx (power and antenna gain), W, 1e-6 to 1e6.
+    /// EIRP of the transmitter (power and antenna gain), W, 1e-6 to 1e6.
     pub tx_w: f64,
     /// EIRP of relays without a power of their own, W, 1e-6 to 1e6.
     pub uav_w: f64,
@@ -37,7 +37,7 @@ pub struct Scenario {
     pub channel: ChannelSpec,
     /// Interference.
     pub interference: Interference,
-    /// Settings for relays that locate the interferer; [`Self::interference`] is then their initial knowledge, if any.
+    /// Settings for relays that locate the interferer. [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
     /// Receiver noise.
     pub noise: Noise,
@@ -153,7 +153,7 @@ impl Noise {
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise is too high for some receivers: there is noise, and the gains differ.
+    /// Returns true if the mission's noise is too high for some receivers. There is noise, and the gains differ.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -221,7 +221,7 @@ pub struct RelayOverride {
 }
 
 impl Default for ChannelSpec {
-    /// Returns the paper's channel: 2 GHz, 0.1 dB and 21 dB of excess loss, line of sight between ground and air.
+    /// Returns the paper's channel. 2 GHz, 0.1 dB and 21 dB of excess loss, line of sight between ground and air.
     fn default() -> Self {
         Self {
             carrier_hz: 2e9,
@@ -233,7 +233,7 @@ impl Default for ChannelSpec {
 }
 
 impl Default for Scenario {
-    /// Returns the paper's multi-hop scenario: 1 km, relays at 20 m and 4 m apart at least, one 80 W interferer halfway.
+    /// Returns the paper's multi-hop scenario. 1 km, relays at 20 m and 4 m apart at least, one 80 W interferer halfway.
     fn default() -> Self {
         Self {
             line: None,

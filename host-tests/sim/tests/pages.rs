@@ -128,7 +128,7 @@ fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
         panic!("{line}")
     };
     let expected = format!(
-        "noticed after {noticed:.1} s, the others at their new places after {:.1} s",
+        "noticed after {noticed:.1} s, the others at their new positions after {:.1} s",
         noticed + formed + converged
     );
     assert_eq!(cells[2], expected, "{command} prints: {line}");
@@ -138,7 +138,7 @@ fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
 #[test]
 fn the_limits_do_not_deny_what_the_guides_describe() {
     let limits = read("host-tests/RESULTS.md");
-    assert!(read("examples/FIRMWARE.md").contains("**Have it find the interferer.**"));
+    assert!(read("examples/FIRMWARE.md").contains("**Estimate the interferer.**"));
     assert!(read("examples/LINUX.md").contains("how strong the interference is where it stands"));
     for untrue in ["do not listen yet", "no message brings it from the ground"] {
         assert!(!limits.contains(untrue), "{untrue}");

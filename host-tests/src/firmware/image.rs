@@ -1,4 +1,4 @@
-//! Firmware image, built by cargo into a folder of its own, so that a waiting outer cargo does not hold its lock.
+//! Firmware image, built by cargo into a folder of its own. A waiting outer cargo does not hold the lock of that folder.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

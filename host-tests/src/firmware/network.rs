@@ -1,4 +1,4 @@
-//! Network of emulated drones: a thread for each receiving serial port, and one that carries bytes through the medium.
+//! Network of emulated drones. A thread for each receiving serial port, and one that carries bytes through the medium.
 //!
 //! Bytes not read in time are lost: a drone that falls behind receives less, instead of later and later.
 

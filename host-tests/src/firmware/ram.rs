@@ -1,4 +1,4 @@
-//! Mock of two flash sectors in RAM: writes only clear bits, places may be worn, and power may fail during any operation.
+//! Mock of two flash sectors in RAM. Writes only clear bits, places may be worn, and power may fail during any operation.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

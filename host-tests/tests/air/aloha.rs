@@ -23,7 +23,7 @@ fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
     Bench::new(access, (0..=NODES).map(hearers).collect(), seed)
 }
 
-/// Returns the fraction of time with intact frames at the listener, for `offered` frames per frame time.
+/// Returns the fraction of time with intact frames at the listener. `offered` is the number of frames per frame time.
 fn throughput(mut bench: Bench, offered: f64, frames: u64, slots: bool) -> f64 {
     let frame = bench.medium.air_time(BYTES).as_micros();
     let mut rng = ChaCha8Rng::seed_from_u64(7);

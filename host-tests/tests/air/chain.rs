@@ -4,7 +4,7 @@ use host_tests::fixtures::mission;
 use uav_relay::Side;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::deaf::Deaf;
-use uav_relay_sim::simulator::outcome::{Ending, Turning};
+use uav_relay_sim::simulator::outcome::{Ending, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
@@ -52,7 +52,7 @@ fn a_deaf_relay_receives_nothing_from_that_one_until_it_hears_again() {
         let told: Vec<_> = outcome
             .moments
             .iter()
-            .filter(|moment| matches!(moment.what, Turning::Deaf | Turning::Hears))
+            .filter(|moment| matches!(moment.what, TimelineEvent::Deaf | TimelineEvent::Hears))
             .map(|moment| (moment.at, moment.relay, moment.other))
             .collect();
         assert_eq!(told, [(at(0), 2, Some(1)), (seconds(30), 2, Some(1))]);

@@ -366,7 +366,7 @@ fn it_falls_silent_and_comes_back() {
     assert!(scene.vehicle.told.borrow().len() > before + 20);
 }
 
-/// Checks a writer that never completes: received messages are still processed, and the relay continues.
+/// Checks a writer that never completes. Received messages are still processed, and the relay continues.
 #[test]
 fn a_stuck_writer_keeps_nobody_from_hearing() {
     let mut scene = Scene::new(true);

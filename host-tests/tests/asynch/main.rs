@@ -88,7 +88,7 @@ fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
     all.map(|(at, _)| at).collect()
 }
 
-/// Checks that a blocked writer affects others no more, to the microsecond, than one that loses its bytes.
+/// Compares a blocked writer with one that loses its bytes. Others see no difference, to the microsecond.
 #[test]
 fn a_stuck_port_delays_nobody() {
     let until = Instant::from_millis(60_000);

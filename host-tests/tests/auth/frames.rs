@@ -1,4 +1,4 @@
-//! Encoding and decoding of frames by the rules of `FORMAT.md`, with CRC, COBS and BLAKE2s of other crates.
+//! Encoding and decoding of frames by the rules of `FORMAT.md`. CRC, COBS and BLAKE2s are of other crates.
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;

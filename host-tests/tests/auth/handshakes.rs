@@ -107,7 +107,7 @@ fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
     assert!(net.stats(2).received > 0);
 }
 
-/// Checks a genuine handshake that arrives while the relay trusts a recorded one and whose answer is lost.
+/// Checks a genuine handshake that arrives, with a lost answer, while the relay trusts a recorded one.
 #[test]
 fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -156,7 +156,7 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     assert!((15_000..15_100).contains(&lost_after), "{lost_after}");
 }
 
-/// Returns the time until relay 1 loses its silent neighbour, ms, and the number of handshakes accepted.
+/// Returns the time until relay 1 loses its silent neighbour (ms), and the accepted handshakes.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut frame = [0; MAX_FRAME];

@@ -89,7 +89,7 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
         assert_eq!(vehicle.events, []);
         for line in [
             "relay: denied, name all lost relays of one side",
-            "relay: lost relays are cleared",
+            "relay: lost relays cleared",
         ] {
             let text = Said::Text(line.to_owned());
             let has_said = vehicle.said.iter().any(|(_, said)| *said == text);

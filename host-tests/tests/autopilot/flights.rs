@@ -363,7 +363,7 @@ impl Flight {
     }
 }
 
-/// Returns the faults of a flight, the number of engagements, and true if it used the asynchronous runner.
+/// Returns the faults of a flight, the number of engagements. The last value is true if it used the asynchronous runner.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

@@ -155,7 +155,7 @@ fn nothing_is_flown_without_a_position_and_the_last_target_is_kept() {
             assert_eq!((target.lat_e7, target.lon_e7), (last.lat_e7, last.lon_e7));
             assert!(!target.has_velocity());
         }
-        assert!(vehicle.heard("relay: no position, keeps its last target"));
+        assert!(vehicle.heard("relay: no position, keeps last target"));
         vehicle.position_every_ms = 200;
         vehicle.run(800);
         assert_eq!(
@@ -385,11 +385,11 @@ fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
     vehicle.run(2_000);
     vehicle.engage();
     vehicle.run(12_000);
-    assert_eq!(view(&mut vehicle, None), ["relay: flies to a new place"]);
-    let waits = "relay: waits, has not heard the next drone";
+    assert_eq!(view(&mut vehicle, None), ["relay: flies to new position"]);
+    let waits = "relay: waits, no position from the next drone";
     assert_eq!(
         view(&mut vehicle, Some(Unheard)),
-        ["relay: flies to a new place", waits]
+        ["relay: flies to new position", waits]
     );
     assert_eq!(
         view(&mut vehicle, Some(Unheard)),
@@ -407,10 +407,7 @@ fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
     let from = vehicle.now;
     vehicle.link.handle_event(Event::Adopted);
     vehicle.run(500);
-    assert_eq!(
-        texts_since(&vehicle, from),
-        ["relay: a new mission was adopted"]
-    );
+    assert_eq!(texts_since(&vehicle, from), ["relay: new mission adopted"]);
 }
 
 /// Checks that reasons which change while an agreement spreads cause no text.
@@ -426,12 +423,12 @@ fn a_reason_that_does_not_last_is_not_told() {
         vehicle.link.handle_hold(vehicle.now, [reason, None]);
         vehicle.run(20);
     }
-    assert!(!vehicle.heard("relay: waits, may not yet near the drone before"));
+    assert!(!vehicle.heard("relay: waits, too close to the previous drone"));
     for _ in 0..200 {
         vehicle.link.handle_hold(vehicle.now, [Some(Close), None]);
         vehicle.run(20);
     }
-    assert!(vehicle.heard("relay: waits, may not yet near the drone before"));
+    assert!(vehicle.heard("relay: waits, too close to the previous drone"));
 }
 
 #[test]

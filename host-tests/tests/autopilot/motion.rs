@@ -146,7 +146,7 @@ fn what_was_set_is_the_most_that_is_flown() {
     }
 }
 
-/// Checks that the target decelerates as gently as it accelerated when the guard withdraws the setpoint.
+/// Withdraws the setpoint: the target must decelerate as gently as it accelerated.
 #[test]
 fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -173,7 +173,7 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     }
 }
 
-/// Checks that after the guard's stopping time a drone moves less than 0.5 m, and not away from its setpoint.
+/// Checks that after the guard's stopping time a drone moves less than 0.5 m. It does not move away from its setpoint.
 #[test]
 fn a_drone_has_stopped_after_the_stopping_time() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -221,14 +221,14 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
         assert_eq!((rig.targets, rig.real.resumed), (before, 0), "{kind:?}");
         assert_eq!(rig.link.state(), State::Standby);
         let reason = if kind == Kind::Px4 {
-            "relay: waits, the autopilot is in a failsafe"
+            "relay: waits, autopilot in failsafe"
         } else {
-            "relay: waits, take another mode first"
+            "relay: waits, change the mode first"
         };
         assert_eq!(rig.says(reason), 1, "{kind:?}: {:?}", rig.texts);
         assert!(rig.choose(Mode::Hold));
         rig.run(8_000);
-        assert_eq!(rig.says("relay: ready, its mode may be chosen"), 2);
+        assert_eq!(rig.says("relay: ready, choose the mode"), 2);
         assert!(rig.choose(Mode::Companion));
         rig.run(2_000);
         assert_eq!(rig.link.state(), State::Engaged);
@@ -382,7 +382,7 @@ fn a_drone_that_is_given_back_at_full_speed_stops() {
     }
 }
 
-/// Checks positions that are half a second older than reported: the drone arrives within the speed limit.
+/// Checks positions that are half a second older than reported. The drone arrives within the speed limit.
 #[test]
 fn positions_that_are_later_than_stated_do_no_harm_to_the_flight() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

@@ -150,8 +150,9 @@ pub(crate) struct Real {
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
     sequence: u8,
-    /// Start of the failsafe, and sending time of the stream's newest target.
+    /// Start of the failsafe.
     fell_at: Instant,
+    /// Sending time of the newest target.
     sent_at: Instant,
     /// Resumptions of OFFBOARD without a pilot, by targets sent after the failsafe was known, and before.
     pub(crate) resumed: u32,

@@ -192,7 +192,7 @@ impl Vehicle {
         self.drive();
     }
 
-    /// Flies for one step and sends messages to the link, which answers in [`drive`](Self::drive) or [`answer`](Self::answer).
+    /// Flies for one step and sends messages to the link. The link answers in [`drive`](Self::drive) or [`answer`](Self::answer).
     pub(crate) fn step_alone(&mut self) {
         self.now = Instant::from_micros(self.now.as_micros() + STEP_MS * 1_000);
         let ms = self.now.as_micros() / 1_000;

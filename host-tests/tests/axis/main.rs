@@ -244,7 +244,7 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Largest permitted relative error of a distance, for points within a distance of the line's middle, m.
+/// Largest permitted relative error of a distance. The first number is the distance of points from the line's middle, m.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]

@@ -105,7 +105,7 @@ fn is_off_a_swapped_line(kind: &str) {
     apart.drone.order("mode companion");
     let heard = apart.drone.hears_for(Duration::from_secs(3));
     assert!(!heard.iter().any(Heard::is_target), "{heard:?}");
-    assert!(!apart.relay.has_said("flies to the relay's setpoints"));
+    assert!(!apart.relay.has_said("setpoint control engaged"));
 }
 
 const fn with_height([lat, lon, _]: Site, amsl: f64) -> Site {

@@ -110,12 +110,12 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     assert_eq!(chain.settled(), simulated(&Scenario::default(), 3));
     fill_disk(chain.relays[1].pid(), true);
     let full = std::fs::metadata(&file).unwrap().len();
-    let line = chain.relays[1].line("capture over: ");
+    let line = chain.relays[1].line("capture ended: ");
     let why = "--capture cannot be written any more: File too large";
     assert!(line.contains(why), "{line}");
     // The neighbours keep asking for signs of life and receive them.
     std::thread::sleep(Duration::from_secs(4));
-    let again = chain.relays[1].lines_with("capture over");
+    let again = chain.relays[1].lines_with("capture ended");
     assert!(again.is_empty(), "once: {again:?}");
     for relay in &mut chain.relays {
         assert!(!relay.has_said("lost: ") && !relay.has_said("lapsed: "));
@@ -130,7 +130,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     }
 }
 
-/// Checks a full disk at a ground station, which reports the end of its capture and still answers relays.
+/// Checks a full disk at a ground station. It reports the end of its capture and still answers relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     let files = Files::new();
@@ -159,11 +159,11 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
         std::thread::sleep(Duration::from_millis(1_200));
         std::fs::write(&level, power).unwrap();
     }
-    station.line("capture over: --capture cannot be written any more: File too large");
+    station.line("capture ended: --capture cannot be written any more: File too large");
     if !station.has_said("back: relay 1") {
         station.line("back: relay 1 is heard");
     }
-    assert!(station.lines_with("capture over").is_empty(), "once");
+    assert!(station.lines_with("capture ended").is_empty(), "once");
     station.signal(Signal::TERM);
     assert_eq!(station.end().status, Some(0));
 }

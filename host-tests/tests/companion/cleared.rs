@@ -111,7 +111,7 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
     let still = Instant::now();
     drones.fly_until(|_| still.elapsed() > Duration::from_secs(2));
     assert!(drones.at[1][0] <= 46.0, "{:?}", drones.at);
-    let said = "relay 3 is cleared: this relay keeps clear of no lost relay downstream any more";
+    let said = "relay 3 is cleared: no lost relay downstream limits this relay any more";
     assert_eq!(commanded(&socket, "clear-lost 3"), (true, said.to_owned()));
     let uid = rustix::process::getuid().as_raw();
     let process = std::process::id();
@@ -137,7 +137,7 @@ fn a_client_that_sends_a_part_of_a_command_is_answered() {
     stream.read_to_string(&mut text).unwrap();
     let said: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(said["done"], false, "{text}");
-    relay.line("command refused: no such command; there is clear-lost N");
+    relay.line("command refused: unknown command; the command is clear-lost N");
     assert_eq!(asked(&socket)["relay"]["index"], 1);
     let mut silent = UnixStream::connect(&socket).unwrap();
     silent.set_read_timeout(Some(LIMIT)).unwrap();
@@ -190,7 +190,7 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 2");
     answer(&drone, 0);
     relay.line(
-        "cleared: relay 2 is cleared: this relay keeps clear of no lost relay downstream any more (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
+        "cleared: relay 2 is cleared: no lost relay downstream limits this relay any more (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
     );
     assert_eq!(
         asked(Path::new(&socket))["relay"]["lost"],

@@ -1,4 +1,4 @@
-//! One scenario file for `cargo plan`, the companion and the ground station, with sections of their own.
+//! Shared scenario file of `cargo plan`, the companion and the ground station, with their own sections.
 
 use std::path::{Path, PathBuf};
 
@@ -82,7 +82,7 @@ fn three_with_one_file_settle_where_the_simulated_chain_does() {
     assert_ne!(settled, simulated(&Scenario::default(), 3));
 }
 
-/// Checks by the digest, which covers every number of a mission, that all programs read the same mission.
+/// Checks by the digest that all programs read the same mission. It covers every number of a mission.
 #[test]
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Folder::new();

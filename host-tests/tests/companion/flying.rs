@@ -93,7 +93,7 @@ impl Flight {
         self.drone.order("arm");
         self.drone.order("takeoff");
         self.relay
-            .line("autopilot: in the air, not flown by the relay");
+            .line("autopilot: in the air, not controlled by the relay");
     }
 
     /// Chooses the companion's mode as the pilot; a PX4 grants it while targets are streamed.
@@ -104,9 +104,9 @@ impl Flight {
             self.drone.hears(Heard::is_target);
         }
         self.drone.order("mode companion");
-        self.relay.line("autopilot: flies to the relay's setpoints");
+        self.relay.line("autopilot: setpoint control engaged");
         self.drone
-            .hears(|heard| heard.says("relay: flies to its place"));
+            .hears(|heard| heard.says("relay: engaged, flies to position"));
     }
 
     /// Waits until the drone is at `place`.
@@ -121,9 +121,9 @@ impl Flight {
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay
-            .line("autopilot: in the air, not flown by the relay");
+            .line("autopilot: in the air, not controlled by the relay");
         let text = match mode {
-            "pilot" => "relay: released to the sticks",
+            "pilot" => "relay: released, manual mode",
             _ => "relay: released, returns (RTL)",
         };
         self.drone.hears(|heard| heard.says(text));
@@ -174,15 +174,13 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     }
     flight.relay.line("autopilot: ready");
     flight.drone.order("mode companion");
-    flight
-        .relay
-        .line("autopilot: flies to the relay's setpoints");
+    flight.relay.line("autopilot: setpoint control engaged");
     let mut all = flight
         .drone
         .hears_until(|heard| heard.0["own"].is_object() && apart_m(heard.own(), place) < 0.5);
     assert!(
         all.iter()
-            .any(|heard| heard.says("relay: flies to its place"))
+            .any(|heard| heard.says("relay: engaged, flies to position"))
     );
     all.extend(flight.drone.hears_for(2 * MOMENT));
     all.retain(|heard| heard.is_target() && heard.mode() == "companion");
@@ -200,7 +198,7 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
 fn is_switched_off_and_on(flight: &mut Flight) {
     flight.drone.order("reboot");
     flight.relay.line("autopilot: on the ground, or not armed");
-    flight.relay.line("autopilot: was switched off and on");
+    flight.relay.line("autopilot: restarted");
     flight.drone.forget();
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
 }
@@ -210,7 +208,7 @@ fn falls_silent(flight: &mut Flight) {
     flight.drone.order("mute");
     flight
         .relay
-        .line("autopilot: silent; look at the cable, the baud rate and MAVLink 2");
+        .line("autopilot: no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2");
     assert!(flight.targets_for(MOMENT).is_empty(), "nobody is there");
     flight.drone.order("speak");
 }
@@ -272,9 +270,9 @@ fn an_arducopter_that_refuses_is_told_of() {
     flight.takes_off();
     flight.drone.order("refuse");
     flight.is_engaged();
-    flight
-        .relay
-        .line("autopilot: does not fly where it is told to; is the place outside its fence?");
+    flight.relay.line(
+        "autopilot: flies to another target than it was sent; is the setpoint outside its fence?",
+    );
 }
 
 #[test]

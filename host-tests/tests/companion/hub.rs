@@ -1,4 +1,4 @@
-//! Radio channel of ttys with names as made by udev: each can be unplugged, and plugged in as another tty.
+//! Radio channel of ttys with names as made by udev. Each can be unplugged, and plugged in as another tty.
 
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};

@@ -49,7 +49,7 @@ fn one_finds_the_interferer_by_its_fifo() {
     writeln!(lines, "receiver {receiver_dbm} dBm").unwrap();
     write(&fifo, &lines);
     relay.line("position: \"1 2 3 0\" is not x_m y_m altitude_m [POWER] or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm with the unit behind it, as -95 dBm");
-    let believed = relay.line("believed: interferer ");
+    let believed = relay.line("estimate: interferer ");
     let [power_w, x_m, y_m] = bits(&believed)[..3] else {
         panic!("{believed}");
     };

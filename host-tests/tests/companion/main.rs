@@ -1,4 +1,4 @@
-//! Linux companion and ground station as processes on pseudo-terminals, compared with the simulated chain.
+//! Linux companion and ground station as processes on pseudo-terminals. Their chain is compared with the simulated one.
 #![cfg(target_os = "linux")]
 
 mod astray;

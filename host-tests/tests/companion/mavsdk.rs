@@ -32,20 +32,20 @@ fn mavsdk_is_led_to_its_place_and_let_go() {
     drone.order("air");
     // MAVSDK sends no `system_status`; a PX4 sends ACTIVE.
     drone.order("active");
-    relay.line("autopilot: in the air, not flown by the relay");
+    relay.line("autopilot: in the air, not controlled by the relay");
     let own = drone.hears(Heard::is_target);
     let off = apart_m(own.to(), on_earth(370.0, 15.0));
     assert!(off < 0.1, "{off} m off its own place");
     drone.order("mode offboard");
-    relay.line("autopilot: flies to the relay's setpoints");
+    relay.line("autopilot: setpoint control engaged");
     // A guarded relay has no setpoint before it is engaged.
     relay.line("setpoint: ");
-    drone.hears(|heard| heard.says("relay: flies to its place"));
+    drone.hears(|heard| heard.says("relay: engaged, flies to position"));
     let there = drone.hears(|heard| heard.is_target() && apart_m(heard.to(), place) < 0.05);
     assert_eq!(there.0["from"], serde_json::json!([1, 191]));
     drone.order("mode hold");
-    relay.line("autopilot: in the air, not flown by the relay");
-    drone.hears(|heard| heard.says("relay: released, holds its place"));
+    relay.line("autopilot: in the air, not controlled by the relay");
+    drone.hears(|heard| heard.says("relay: released, holds position"));
     relay.signal(Signal::TERM);
     assert_eq!(relay.end().status, Some(0));
 }

@@ -27,7 +27,7 @@ fn has(ended: &Ended, part: &str) -> bool {
 
 #[test]
 fn an_autopilot_that_signs_to_a_relay_without_a_key_is_told_of() {
-    let line = "autopilot: signs its frames, and answers nothing that is not signed: give --autopilot-key-file";
+    let line = "autopilot: signs its frames and ignores unsigned ones: give --autopilot-key-file";
     let (ended, believed) = tells(Some(ONE), None, line);
     assert!(!believed);
     assert!(has(&ended, "autopilot: found"), "{ended:?}");
@@ -35,18 +35,17 @@ fn an_autopilot_that_signs_to_a_relay_without_a_key_is_told_of() {
 
 #[test]
 fn an_autopilot_that_does_not_sign_is_told_of_and_not_heard() {
-    let line = "autopilot: does not sign, and is not heard";
+    let line = "autopilot: does not sign its frames, which are ignored";
     let (ended, _) = tells(None, Some(ONE), line);
-    assert!(has(&ended, "frames refused by their signatures"));
+    assert!(has(&ended, "frames rejected because of their signatures"));
     assert!(!has(&ended, "autopilot: found"), "{ended:?}");
 }
 
 #[test]
 fn two_keys_are_told_of_and_neither_hears_the_other() {
-    let line =
-        "autopilot: signs with another key than that of --autopilot-key-file, and is not heard";
+    let line = "autopilot: signs with another key than that of --autopilot-key-file; its frames are ignored";
     let (ended, believed) = tells(Some(ONE), Some(OTHER), line);
     assert!(!believed);
-    assert!(has(&ended, "frames refused by their signatures"));
+    assert!(has(&ended, "frames rejected because of their signatures"));
     assert!(!has(&ended, "autopilot: found"), "{ended:?}");
 }

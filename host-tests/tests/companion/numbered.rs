@@ -28,13 +28,13 @@ fn a_drone_keeps_its_number_when_its_place_in_the_chain_changes() {
     }
     drop(second);
     third.line("lost: no sign of life from relay 2 upstream");
-    let line = third.line("formed anew: ");
-    let said = " s  relay 3  formed anew: 2 relays, this one at place 2, view ";
+    let line = third.line("view accepted: ");
+    let said = " s  relay 3  view accepted: 2 relays, this relay at place 2, view ";
     assert!(line.contains(said), "{line}");
     let said = until(&socket, |said| said["relay"]["relays"] == 2);
     assert_eq!(said["relay"]["index"], 3, "{said:#}");
     assert_eq!(said["relay"]["place"], 2, "{said:#}");
-    let line = first.line("\"event\":\"formed anew\"");
+    let line = first.line("\"event\":\"view accepted\"");
     let said: Value = serde_json::from_str(&line).unwrap();
     assert_eq!((&said["index"], &said["place"]), (&1.into(), &1.into()));
 }

@@ -28,7 +28,7 @@ pub(crate) fn write(path: &Path, text: &str) {
 fn two_that_know_where_they_are_make_room_for_each_other() {
     let mut free = Chain::start(2, QUIET, &[]);
     for relay in &mut free.relays {
-        relay.line("unguarded: no --positions, nothing keeps drones apart on their way");
+        relay.line("unguarded: no --positions: drones are not kept apart while they move");
     }
     let expected = free.settled();
     drop(free);
@@ -45,7 +45,8 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
     // The drones are always at their latest setpoints.
     let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
     for relay in &mut chain.relays {
-        let line = relay.line("guarded: setpoints keep drones apart on their way, by --positions");
+        let line =
+            relay.line("guarded: setpoints keep drones apart while they move, by --positions");
         assert!(!line.contains("unguarded"), "{line}");
         assert!(!relay.has_said("setpoint: "), "nobody knows where it is");
     }

@@ -124,7 +124,12 @@ fn a_bad_key_or_epoch_is_named() {
             1,
             "text: must hold a number within 0 to 4294967294",
         ),
-        ("key", "last", 1, "last: there is no epoch after that"),
+        (
+            "key",
+            "last",
+            1,
+            "last: is the largest epoch, and a start needs a larger one",
+        ),
         ("key", "no/folder", 1, "folder: cannot be written"),
     ] {
         let options = files.options(key, epoch);

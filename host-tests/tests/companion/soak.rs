@@ -1,4 +1,4 @@
-//! Soak test of three companions on one channel with repeated faults, for a minute or `COMPANION_SECONDS`.
+//! Soak test of three companions on one channel. Faults repeat for a minute or `COMPANION_SECONDS`.
 
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};

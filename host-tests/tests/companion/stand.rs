@@ -161,7 +161,7 @@ fn three_relays_know_what_both_stations_measure() {
             &field.path(&format!("positions{}", index + 1)),
             &heard(&scene, index + 1),
         );
-        let line = relay.line("believed: interferer ");
+        let line = relay.line("estimate: interferer ");
         let at = line.split("at the receiver ").nth(1).unwrap();
         let at: f64 = at.trim_end_matches(" W").parse().unwrap();
         assert!((at / rx_w - 1.0).abs() < 0.05, "{line}");

@@ -87,7 +87,7 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
         format!("from local port {}", ports.local),
     );
     unanswered.is_said(&[
-        "autopilot: nobody answers at ",
+        "autopilot: no answer at ",
         &at,
         &local,
         "connection refused",
@@ -121,7 +121,7 @@ fn a_udp_port_that_does_not_answer_is_said_once() {
     let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
     let local = format!("from local port {}", ports.local);
     unanswered.is_said(&[
-        "autopilot: nobody answers at ",
+        "autopilot: no answer at ",
         &local,
         "keeps the first address and port",
         "udp:HOST:PORT@LOCAL",
@@ -136,7 +136,7 @@ fn a_tty_that_does_not_answer_is_said_once() {
     let pty = Pty::new();
     let path = pty.path().to_str().unwrap();
     let mut unanswered = Unanswered::start(path);
-    unanswered.is_said(&["autopilot: nobody answers at ", path, "115200 bit/s", "TX"]);
+    unanswered.is_said(&["autopilot: no answer at ", path, "115200 bit/s", "TX"]);
     unanswered.is_said_once();
 }
 

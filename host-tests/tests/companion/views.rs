@@ -67,7 +67,7 @@ fn stored(file: &Path) -> ViewRecord {
     ViewRecord::from_bytes(&bytes[..ViewRecord::LENGTH]).unwrap()
 }
 
-const STANDS_BY: &str = "stands by: what it has said in votes before this start; before another flight remove its --view-file";
+const STANDS_BY: &str = "restored: votes of before this start, from --view-file; before another flight remove that file";
 
 /// Kills all relays in a view of two; restarted, three fly, and no view number is used twice.
 #[test]
@@ -77,7 +77,7 @@ fn three_that_are_started_again_stand_by_what_they_said() {
     let mut relays: Vec<Relay> = (1..=3).map(|index| channel.start(index)).collect();
     for (relay, place) in relays.iter_mut().zip(&expected) {
         relay.settles_at(*place);
-        assert!(!relay.has_said("stands by: "));
+        assert!(!relay.has_said("restored: "));
     }
     drop(relays.pop());
     let of_two = simulated(&Scenario::default(), 2);

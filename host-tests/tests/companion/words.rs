@@ -117,10 +117,10 @@ fn frames_that_are_refused_say_why() {
         };
         let mut first = start(["--index", "1", "--downstream", wire.tty(0)], &one);
         let second = start(["--index", "2", "--upstream", wire.tty(1)], &other);
-        let line = first.line("not taken: ");
+        let line = first.line("rejected: ");
         assert!(line.contains(why), "{line}");
         std::thread::sleep(std::time::Duration::from_secs(3));
-        assert!(first.lines_with("not taken: ").is_empty(), "once");
+        assert!(first.lines_with("rejected: ").is_empty(), "once");
         second.signal(Signal::TERM);
     }
 }
@@ -174,7 +174,7 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
         &other,
         "nothing was heard; is --tty /dev/pts/",
     );
-    relay.line("not taken: ");
+    relay.line("rejected: ");
     upload_fails(
         &files,
         wire.tty(1),
@@ -182,7 +182,7 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
         &tx,
         "are --network 1, --baud 115200, --end and --key-file right?",
     );
-    assert!(relay.line("not taken: ").contains("have a wrong tag"));
+    assert!(relay.line("rejected: ").contains("have a wrong tag"));
 }
 
 /// Checks the reasons on a channel, where the ground station receives the relays' frames.

@@ -29,7 +29,7 @@ fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     with / without
 }
 
-/// Returns E[exp(-y u)] of a Beta distribution by the series of e^-y 1F1(beta; alpha + beta; y), y to 500.
+/// Returns E[exp(-y u)] of a Beta distribution by the series of e^-y 1F1(beta; alpha + beta. Y), y to 500.
 fn beta_mgf_series(alpha: f64, beta: f64, y: f64) -> f64 {
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 0..3_000 {

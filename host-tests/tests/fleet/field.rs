@@ -47,7 +47,7 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
     link
 }
 
-/// Returns the fewest relays on a grid, with hops up to `longer` grid steps too long; 0 if more than `most`.
+/// Returns the fewest relays on a grid, with hops up to `longer` grid steps too long. 0 if more than `most`.
 fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> usize {
     const STEPS: usize = 4000;
     let (d, relay) = (link.distance_m, link.relays[0]);

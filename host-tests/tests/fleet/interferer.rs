@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::Link;
 
 use super::{ROUNDING, count, round};
 
-/// Returns the mission of `link` and its relays' profiles by index; further relays are like the last one.
+/// Returns the mission of `link` and its relays' profiles by index. Further relays are like the last one.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
     let common = mission.config().common;
@@ -30,7 +30,7 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// Returns the fewest relays that meet `target` in f64, by trying each number; 0 if `most` are not enough.
+/// Returns the fewest relays that meet `target` in f64, by trying each number. 0 if `most` are not enough.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;

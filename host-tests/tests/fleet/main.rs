@@ -1,4 +1,4 @@
-//! Number of relays for a target, compared with independent counts; `COUNT` and `SEED` select scenarios.
+//! Number of relays for a target, compared with independent counts. `COUNT` and `SEED` select scenarios.
 
 mod field;
 mod interferer;

@@ -46,7 +46,7 @@ fn one_that_comes_back_between_two_that_closed_up_gets_its_place() {
     }
 }
 
-/// Checks two neighbours in each other's position: all drones stay, because others do not know of the swap.
+/// Checks two neighbours in each other's position. All drones stay, because others do not know of the swap.
 #[test]
 fn while_two_are_in_the_wrong_order_all_stay() {
     for first in 0..7 {

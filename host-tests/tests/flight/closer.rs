@@ -15,7 +15,7 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Flies 200 random scenes with lateral room and counts those with neighbours closer along x, and failures.
+/// Flies 200 random scenes with lateral room. Counts failures and the scenes with neighbours closer along x.
 #[test]
 fn drones_get_to_places_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));

@@ -1,4 +1,4 @@
-//! Guarded drones with realistic dynamics; `COUNT` and `SEED` select other faults, a failure names its seed.
+//! Guarded drones with realistic dynamics. `COUNT` and `SEED` select other faults, a failure names its seed.
 
 mod anywhere;
 mod between;
@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::GuardConfig;
 use uav_relay::Instant;
 use uav_relay_sim::simulator::drones::FlightSpec;
-use uav_relay_sim::simulator::outcome::{Outcome, Turning};
+use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 const SEPARATION_M: f64 = 10.0;
@@ -60,7 +60,7 @@ fn together(outcome: &Outcome) -> Option<Instant> {
         .moments
         .iter()
         .filter_map(|moment| match moment.what {
-            Turning::Reformed { view: to, .. } if to == view => Some(moment.at),
+            TimelineEvent::Reformed { view: to, .. } if to == view => Some(moment.at),
             _ => None,
         });
     all.then(|| came.max().unwrap_or(Instant::ZERO))

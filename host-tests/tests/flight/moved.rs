@@ -11,7 +11,7 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// Noise and hovering error of the drones, and the permitted shortfall of the separation, m, as in `fleet`.
+/// Noise and hovering error of the drones, m, and the permitted shortfall of the separation. As in `fleet`.
 const NOISE_M: f64 = 0.3;
 const HOVER_M: f64 = 1.5;
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);

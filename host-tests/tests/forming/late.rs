@@ -5,7 +5,7 @@ use uav_relay::{Adjust, Local, Method, Settings};
 
 use crate::hand::{Chain, LOW, WIDE};
 
-/// Delays a leader's first pass beyond its reboot and an agreement by Algorithm 2: no relay may follow it.
+/// Delays a leader's first pass beyond its reboot and an agreement by Algorithm 2. No relay may follow it.
 #[test]
 fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {

@@ -157,7 +157,7 @@ fn relay() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns an offer of the next version, the paper's mission with another interferer position, from `side`.
+/// Returns an offer of the next version from `side`. It is the paper's mission with another interferer position.
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
@@ -196,7 +196,7 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns the last of four guarded relays: it receives its position, two views, a fence and late frames.
+/// Returns the last of four guarded relays. It receives its position, two views, a fence and late frames.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];

@@ -27,7 +27,7 @@ pub(crate) enum What {
     Back(usize, Side, usize),
     Forget(usize, Side),
     Speed(usize, f64),
-    /// The pilot takes control, the guard is informed, the pilot moves the drone aside and gives control back.
+    /// Control by the pilot, who moves the drone aside and gives control back. The guard is informed of both.
     Take(usize),
     Hears(usize),
     Aside(usize, (usize, bool, f64)),
@@ -77,7 +77,7 @@ pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     plan
 }
 
-/// Plans reboots, silences and removals; of three relays in a row at most one falls silent or is removed.
+/// Plans reboots, silences and removals. Of three relays in a row at most one falls silent or is removed.
 pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     let mut plan = Vec::new();
     let mut left_out = 0;
@@ -143,7 +143,7 @@ pub(crate) fn pilots(
     plan
 }
 
-/// Plans the silence of relay `k`, the link of its neighbours past it, and its return unless it is `gone`.
+/// Plans the silence of relay `k`, and the link of its neighbours past it. The relay returns unless it is `gone`.
 pub(crate) fn around(
     rng: &mut ChaCha8Rng,
     plan: &mut Vec<(f64, What)>,

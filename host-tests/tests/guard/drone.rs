@@ -250,7 +250,7 @@ impl Drone {
         }
     }
 
-    /// Returns the ranges of x, y and altitude in which the drone can be from now on without further messages.
+    /// Returns the ranges of x, y and altitude open to the drone without further messages.
     pub(crate) fn stretch(&self) -> [(f64, f64); 3] {
         let stop = self.body.stops_at(self.acceleration);
         [0, 1, 2].map(|part| {

@@ -1,4 +1,4 @@
-//! All drones, the medium between them, and the distance check at every step.
+//! Drones, the medium between them, and the distance check at every step.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -93,7 +93,7 @@ fn known_optima_are_found() {
     }
 }
 
-/// Checks two levels near the axis, where flying as far as possible on each level is worse by a quarter.
+/// Checks two levels near the axis. The chain that flies as far as possible on each level is worse by a quarter.
 #[test]
 fn the_best_of_two_levels_is_beaten() {
     let relay = Station {

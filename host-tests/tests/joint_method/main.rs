@@ -15,7 +15,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 mod own;
 
-/// Returns a chain that chooses altitudes within `corridor`; `None` if a relay would reject the numbers.
+/// Returns a chain that chooses altitudes within `corridor`. `None` if a relay would reject the numbers.
 fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     let (mission, profiles) = of_link(link, 1e-4)?;
     let mut setup = Setup::new(with_room(mission.config(), corridor)?);
@@ -107,7 +107,7 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     results
 }
 
-/// Returns the scenario of the figures: X = 500, Y = 150, altitudes of 20 m to 300 m, 4 m of separation.
+/// Returns the scenario of the figures. X = 500, Y = 150, altitudes of 20 m to 300 m, 4 m of separation.
 fn close_by(relays: usize) -> (Link, Corridor) {
     let link = Link {
         y_i: 150.0,
@@ -208,7 +208,7 @@ fn a_chain_of_any_length_needs_one_round_trip() {
     }
 }
 
-/// Checks that a relay that fails during the computation is reported lost by both neighbours afterwards.
+/// Stops a relay during the computation: afterwards both neighbours report it as lost.
 #[test]
 fn who_fails_while_all_solve_is_missed() {
     let (link, corridor) = roomy(50, 500.0, 150.0, 280.0, 300.0);
@@ -270,7 +270,7 @@ fn random_chains_come_near_the_joint_optimum() {
     assert!(best <= 1.0 + 1e-5, "{best}");
 }
 
-/// Checks binding separations: the optimum may need relays that stay back, which the farthest chain lacks.
+/// Checks binding separations. The optimum may need relays that stay back, which the farthest chain lacks.
 #[test]
 fn crowded_chains_are_safe_and_seldom_far_from_the_joint_optimum() {
     let count = count(60);

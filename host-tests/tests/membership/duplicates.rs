@@ -13,7 +13,7 @@ const STEP_MS: u64 = 10;
 /// Time limit for one duplicate to give up its setpoint after it has received the other, ms.
 const LIMIT_MS: u64 = 2_000;
 
-/// Time limit for two setpoints at duplicates that receive each other, ms: a settled chain sends few frames.
+/// Time limit for two setpoints at duplicates that receive each other, ms. A settled chain sends few frames.
 const HEARD_MS: u64 = 10_000;
 
 /// Time limit for duplicates that do not receive each other, ms: several claims in a row may be lost.
@@ -37,7 +37,7 @@ enum Medium {
 }
 
 impl Medium {
-    /// Returns the port at which drone `receiver` receives a frame that `sender` sends through `port`, if any.
+    /// Returns the port at which drone `receiver` receives a frame of `sender`, if any. `port` is the port of the sender.
     fn carries(self, sender: u16, port: Port, receiver: u16) -> Option<Port> {
         match port {
             Port::Shared => Some(Port::Shared),

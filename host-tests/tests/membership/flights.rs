@@ -1,4 +1,4 @@
-//! Flights with a guard: no two drones come nearer than the separation, whatever is lost, late or silent.
+//! Flights with a guard. No two drones come nearer than the separation, whatever is lost, late or silent.
 
 use host_tests::flights::{eight_apart, exact};
 use rand::{RngExt, SeedableRng};

@@ -10,7 +10,7 @@ use super::*;
 
 /// Returns the time from the last loss to the settled chain, and the sweeps since.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
-    let lost = |what| matches!(what, Turning::Lost(_));
+    let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome
         .moments
         .iter()

@@ -10,7 +10,7 @@ use host_tests::fixtures::mission;
 use host_tests::flights::{go_on_until, seconds};
 use uav_relay::{Duration, Instant, Mission};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome, Turning};
+use uav_relay_sim::simulator::outcome::{Ending, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 /// Returns the paper's chain of `relays` on one radio channel.
@@ -76,7 +76,7 @@ fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
 
 /// Returns how often a relay accepted a new view.
 fn views(outcome: &Outcome, relay: u16) -> usize {
-    let reformed = |what| matches!(what, Turning::Reformed { .. });
+    let reformed = |what| matches!(what, TimelineEvent::Reformed { .. });
     outcome
         .moments
         .iter()

@@ -4,7 +4,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Returns the part that continues after a split behind relay `after`: the majority, or the leader's half.
+/// Returns the part that continues after a split behind relay `after`. The majority, or the leader's half.
 fn goes_on(after: u16) -> Vec<u16> {
     if after >= 4 {
         (1..=after).collect()

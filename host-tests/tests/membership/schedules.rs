@@ -12,7 +12,7 @@ use super::*;
 /// Time limit to a settled chain, while frames are lost and corrupted: twenty times `dead_after`.
 const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// Draws a fault schedule for eight relays: loss up to 50 %, corruption up to 20 %, up to three relays lost.
+/// Draws a fault schedule for eight relays. Loss up to 50 %, corruption up to 20 %, up to three relays lost.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = paper(8);
     setup.profiles = own_profiles(rng);

@@ -14,7 +14,7 @@ use super::seal::{Taken, refused, taken};
 use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
-/// Most frames of one drain: a pass, busy, decision, two for a renewal, and per side a heartbeat and a hello.
+/// Maximum number of frames per drain. A pass, busy, decision, two for a renewal, and per side a heartbeat and a hello.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
 /// Observed state of one relay since it was switched on.
@@ -330,7 +330,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks questions after `probe_after` of silence, and losses after enough of them or the longest lease.
+    /// Checks questions after `probe_after` of silence. Losses follow enough of them, or the longest lease.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {

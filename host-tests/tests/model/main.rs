@@ -1,4 +1,4 @@
-//! Model test of the protocol: random operations on real relays, compared with a plain model of the permitted behaviour.
+//! Model test of the protocol. Random operations on real relays, compared with a plain model of the permitted behaviour.
 //!
 //! | file | content |
 //! | --- | --- |

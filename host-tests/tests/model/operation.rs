@@ -48,7 +48,7 @@ pub(crate) enum Operation {
 /// Seed increment that raises the number of a leader's first pass by 64, the smallest distance.
 const NEXT_LIFE: u32 = 54_336;
 
-/// Draws a relay's seed: any, or one that makes a leader's pass numbers close to those of an earlier life.
+/// Draws a relay's seed. Any, or one that makes a leader's pass numbers close to those of an earlier life.
 pub(crate) fn seeds() -> impl Strategy<Value = u32> {
     prop_oneof![any::<u32>(), (0..4_u32).prop_map(|life| life * NEXT_LIFE)]
 }

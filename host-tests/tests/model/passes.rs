@@ -20,7 +20,7 @@ const FIRST: u16 = 64;
 /// Window of numbers behind a pass that count as over; a restarted leader may also skip that many.
 const NEAR: u16 = 32;
 
-/// Returns a view's contribution to the mission digest: its lower half plus its byte-swapped upper half.
+/// Returns a view's contribution to the mission digest. Its lower half plus its byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
@@ -103,7 +103,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay takes part in the first pass of its view for a second time, after a reboot.
+    /// Returns true if the relay repeats the first pass of its view after a reboot.
     pub(crate) fn begins_anew(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))

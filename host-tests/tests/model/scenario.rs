@@ -1,4 +1,4 @@
-//! Missions of the model test: 2 to 6 relays, every method, drawn like those of the random placement tests.
+//! Missions of the model test. 2 to 6 relays, every method, drawn like those of the random placement tests.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -21,7 +21,7 @@ pub(crate) struct Signs {
     pub(crate) perhaps: Instant,
     /// Reception time of the last possible sign of life.
     pub(crate) last: Instant,
-    /// Questions since the last certain sign, since the last possible one, and the most before a certain one.
+    /// Questions since the last certain sign and since the last possible one. The third number is the most before a certain one.
     pub(crate) open: usize,
     pub(crate) perhaps_open: usize,
     pub(crate) most_open: usize,

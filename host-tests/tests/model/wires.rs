@@ -12,7 +12,7 @@ use super::seal::Seal;
 /// Time of flight of an undisturbed frame.
 pub(crate) const FLIGHT: Duration = Duration::from_millis(5);
 
-/// Most frames in flight on one line: further ones are lost.
+/// Maximum number of frames in flight on one line: further ones are lost.
 const ROOM: usize = 12;
 
 /// Number of frames of a line that an attacker records.

@@ -60,7 +60,7 @@ pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     refined.fold(0.0, f64::max)
 }
 
-/// Returns the best chains with relay k on `grids[k - 1]`, one for each of `parts` segments for relay 1.
+/// Returns the best chains with relay k on `grids[k - 1]`. There is one for each of `parts` segments for relay 1.
 fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
     let d = scene.distance_m;
     let (mut worth, mut ways) = (at_last(scene, h, &grids[grids.len() - 1]), Vec::new());

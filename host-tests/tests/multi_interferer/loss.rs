@@ -1,4 +1,4 @@
-//! SIR lost by placing a chain with the hypothetical interferer; `COUNT` scenes of each kind (30 if unset).
+//! SIR lost by placing a chain with the hypothetical interferer. `COUNT` scenes of each kind (30 if unset).
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,4 @@
-//! Several interferers: sum, hypothetical interferer, best chain and polishing, compared with references.
+//! Several interferers. Sum, hypothetical interferer, best chain and polishing, compared with references.
 //!
 //! Random tests use the environment variable `SEED`, which each prints.
 

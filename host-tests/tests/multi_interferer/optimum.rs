@@ -143,7 +143,7 @@ fn crowded_and_long_chains_are_placed() {
     assert!(found.sir > 40.0, "more than a hundred relays reach");
 }
 
-/// Checks the best common altitudes of the paper's scenario: interferer at 150 m, 20 m to 300 m, 4 m apart.
+/// Checks the best common altitudes of the paper's scenario. Interferer at 150 m, 20 m to 300 m, 4 m apart.
 #[test]
 fn known_best_common_altitudes_are_found() {
     for (n, sir, altitude_m) in [

@@ -1,4 +1,4 @@
-//! Emulated drones with an autopilot at USART1: they fly to the agreed position while the pilot permits it.
+//! Emulated drones with an autopilot at USART1. They fly to the agreed position while the pilot permits it.
 
 use std::io::{ErrorKind, Read as _};
 
@@ -91,11 +91,14 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     // In the air under the pilot's control a PX4 receives its own position, an ArduCopter no target.
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     vehicle.until("readiness", |vehicle| {
-        let ready = |text: &String| text == "relay: ready, its mode may be chosen";
+        let ready = |text: &String| text == "relay: ready, choose the mode";
         vehicle.texts.iter().any(ready)
     });
     vehicle.run(1_000);
-    said(&mut fleet, "autopilot: in the air, not flown by the relay");
+    said(
+        &mut fleet,
+        "autopilot: in the air, not controlled by the relay",
+    );
     assert_eq!(vehicle.told.is_empty(), kind == Kind::ArduCopter);
     for told in &vehicle.told {
         assert!(apart(told.place, from) < 0.1, "{told:?}");
@@ -112,13 +115,13 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     });
     vehicle.run(2_000);
     assert!(apart(vehicle.place, to) < 1.0, "{:?}", vehicle.place);
-    said(&mut fleet, "autopilot: flies to the relay's setpoints");
+    said(&mut fleet, "autopilot: setpoint control engaged");
     for pair in vehicle.told.windows(2) {
         // At 5 m/s no step is longer than half a second.
         let step = apart(pair[0].place, pair[1].place);
         assert!(step <= 2.6, "{pair:?}");
     }
-    let flies = |text: &String| text == "relay: flies to its place";
+    let flies = |text: &String| text == "relay: engaged, flies to position";
     assert!(vehicle.texts.iter().any(flies), "{:?}", vehicle.texts);
 
     // The pilot takes control again.
@@ -161,7 +164,7 @@ fn a_drone_without_sites_tells_nobody() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
     said(
         &mut fleet,
-        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way",
+        "no sites: no autopilot is controlled, and drones are not kept apart while they move",
     );
     fleet.places();
     let mut port = &fleet.autopilots[0];

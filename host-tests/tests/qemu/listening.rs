@@ -118,7 +118,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
         .collect();
 
     // The pilots fly the drones, which measure; there is no estimate yet.
-    let in_air = "autopilot: in the air, not flown by the relay";
+    let in_air = "autopilot: in the air, not controlled by the relay";
     together(&mut fleet, &mut vehicles, "flight by the pilots", |lines| {
         (1..=RELAYS).all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == drone);
@@ -137,7 +137,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
         }
     }
     fleet.listen();
-    let found = |line: &Line| line.text.starts_with("believed: interferer");
+    let found = |line: &Line| line.text.starts_with("estimate: interferer");
     assert!(!fleet.lines.iter().any(found), "all is heard before");
 
     // The pilots give control to the relays, and the leader collects the measurements.
@@ -157,7 +157,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
     let expected = [source.power_w, source.x_m, source.y_m].map(f32::to_bits);
     for drone in 1..=RELAYS {
         let believed = fleet.of_drone(drone).filter(|line| found(line)).last();
-        let said = believed.unwrap().after("believed: interferer").unwrap();
+        let said = believed.unwrap().after("estimate: interferer").unwrap();
         for bits in expected {
             assert!(said.contains(&format!("(0x{bits:08x})")), "{said}");
         }

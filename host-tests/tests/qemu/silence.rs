@@ -12,7 +12,7 @@ use crate::fleet::{Fleet, Image, OF_THE_CHIP};
 use crate::log::Line;
 use crate::methods::field;
 
-/// Tolerance for delays of this machine, in microseconds of the drones' clock, which runs 10.5 times too fast.
+/// Tolerance for delays of this machine, µs of the drones' clock. That clock runs 10.5 times too fast.
 ///
 /// `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
 const SLACK: u64 = 525_000;
@@ -122,7 +122,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: method unknown, or not for a field",
         "configuration refused: byte 15 is neither 0 nor 1",
         "configuration refused: rounds or altitudes of adjust",
-        "configuration refused: samples or most interference",
+        "configuration refused: samples or i_max_w",
         "configuration refused: too many points of the field",
         "configuration refused: bytes behind the last point are not 0",
         "configuration refused: interferer and field at once",

@@ -140,9 +140,9 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
         vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     }
     three.until("flight by the pilots", |three| {
-        (1..=3)
-            .all(|drone| three.has_logged(drone, "autopilot: in the air, not flown by the relay"))
-            && three.mavsdk.target().is_some()
+        (1..=3).all(|drone| {
+            three.has_logged(drone, "autopilot: in the air, not controlled by the relay")
+        }) && three.mavsdk.target().is_some()
     });
     assert!(three.others.iter().all(|vehicle| vehicle.told.is_empty()));
 
@@ -155,8 +155,8 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
         let places = three.places();
         places.is_some_and(|places| places.iter().zip(&to).all(|(at, to)| apart(*at, *to) < 1.0))
     });
-    assert!(three.mavsdk.reads("relay: flies to its place"));
-    let flies = |text: &String| text == "relay: flies to its place";
+    assert!(three.mavsdk.reads("relay: engaged, flies to position"));
+    let flies = |text: &String| text == "relay: engaged, flies to position";
     assert!(
         three
             .others
@@ -170,7 +170,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
         let released = |text: &String| text.starts_with("relay: released");
         three.others[0].texts.iter().any(released)
     });
-    assert!(!three.mavsdk.reads("relay: released, holds its place"));
+    assert!(!three.mavsdk.reads("relay: released, holds position"));
     let places = three.places().unwrap();
     for (at, to) in [(places[0], to[0]), (places[2], to[2])] {
         assert!(apart(at, to) < 1.0, "{at:?}, {to:?}");

@@ -178,9 +178,9 @@ impl Vehicle {
         self.granted && now >= self.elsewhere_until
     }
 
-    /// Reads an operator text: when the relay asks for another mode first, the pilot chooses one for a while.
+    /// Reads an operator text. When the relay asks for another mode first, the pilot chooses one for a while.
     fn reads(&mut self, text: String) {
-        if self.granted && text == "relay: waits, take another mode first" {
+        if self.granted && text == "relay: waits, change the mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;
         }
         self.texts.push(text);

@@ -21,7 +21,7 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Starts all relays of `mission` with the settings of each index from 1; `None` where they are refused.
+    /// Starts all relays of `mission` with the settings of each index from 1. `None` where they are refused.
     pub(crate) fn new(
         mission: Mission,
         now: Instant,

@@ -1,4 +1,4 @@
-//! Measured powers at drones' positions: for any inputs the chain agrees, also after the sensors recover.
+//! Measured powers at drones' positions. For any inputs the chain agrees, also after the sensors recover.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,4 @@
-//! Positions, control and clocks of guarded relays: numbers stay finite, and with true inputs the chain agrees.
+//! Positions, control and clocks of guarded relays. Numbers stay finite, and with true inputs the chain agrees.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

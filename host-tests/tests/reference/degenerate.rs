@@ -94,7 +94,7 @@ fn degenerate_reaches_are_right() {
     assert_eq!(base.chain_sir(&[1.0]), 0.0);
 }
 
-/// Checks that the farthest position of relay 1 may be too close to the interferer for relay 2's altitude.
+/// Moves relay 1 as far as possible: it may be too close to the interferer for relay 2's altitude.
 #[test]
 fn going_farthest_is_not_best_at_different_altitudes() {
     let link = Link {

@@ -112,7 +112,7 @@ fn single_hops_match_the_file() {
     }
 }
 
-/// Checks different values of eta and `mu_los`, which are equal in the file, with SIRs worked out by hand.
+/// Checks different values of eta and `mu_los` with SIRs worked out by hand. The two are equal in the file.
 #[test]
 fn each_hop_uses_its_own_path_loss() {
     let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Station {

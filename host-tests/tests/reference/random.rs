@@ -160,7 +160,7 @@ fn greedy_and_exact_agree_at_a_common_altitude() {
     );
 }
 
-/// Checks that the sets hold only reachable positions: the chain traced back through them meets its target.
+/// Checks that the sets hold only reachable positions. The chain traced back through them meets its target.
 #[test]
 fn placements_meet_their_target() {
     let style = Style {

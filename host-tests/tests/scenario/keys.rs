@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Scalar key: path, file with `@` for the value, a value below, both limits, one above, the stated range.
+/// Scalar key of the table. Path, file with `@` for the value, a value below, both limits, one above, the stated range.
 struct Row {
     key: &'static str,
     file: String,

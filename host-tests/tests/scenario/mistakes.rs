@@ -164,7 +164,7 @@ fn keys_that_contradict_each_other_are_refused() {
         &twice,
         Problem::DuplicateRelay,
         &[
-            "relay[1].index = 3 is taken",
+            "relay[1].index = 3 is already used",
             "1 to 1000",
             "one [[relay]] only",
         ],

@@ -42,7 +42,7 @@ fn a_power_is_said_once() {
     ] {
         let text = small("").replace(key, &format!("{key}\n{other}"));
         let name = |pair: &str| pair.split(' ').next().unwrap().to_owned();
-        let both = format!("{table}.{key} beside {other} says the same twice");
+        let both = format!("{table}.{key} beside {other} is given twice");
         let allowed = format!("{} or {}, not both", name(key), name(other));
         refused(&text, Problem::SaidTwice, &[&both, &allowed]);
     }

@@ -1,4 +1,4 @@
-//! Search for an unknown interferer in random scenes; `COUNT` sets the scenes of each row, `SEED` the first.
+//! Search for an unknown interferer in random scenes. `COUNT` sets the scenes of each row, `SEED` the first.
 
 mod ends;
 mod following;

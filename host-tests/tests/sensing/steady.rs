@@ -1,10 +1,10 @@
-//! Stability: no activity in a static world, equal estimates at all relays, and no use of a broken sensor.
+//! Stability. No activity in a static world, equal estimates at all relays, and no use of a broken sensor.
 
 use rayon::prelude::*;
 use uav_relay::{Duration, Instant, Interference};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::Turning;
+use uav_relay_sim::simulator::outcome::TimelineEvent;
 use uav_relay_sim::simulator::sky::{Broken, Says};
 
 use uav_relay_tools::listening::found::quantile;
@@ -101,14 +101,12 @@ fn a_broken_sensor_is_named_and_left_out() {
                     since: Instant::from_millis(since_s * 1_000),
                 }];
                 let outcome = run(setup).unwrap();
-                let named = outcome
-                    .moments
-                    .iter()
-                    .any(|moment| moment.what == Turning::Off && moment.other == Some(broken));
-                let wrong = outcome
-                    .moments
-                    .iter()
-                    .any(|moment| moment.what == Turning::Off && moment.other != Some(broken));
+                let named = outcome.moments.iter().any(|moment| {
+                    moment.what == TimelineEvent::SensorOff && moment.other == Some(broken)
+                });
+                let wrong = outcome.moments.iter().any(|moment| {
+                    moment.what == TimelineEvent::SensorOff && moment.other != Some(broken)
+                });
                 let last = outcome.stands.last().unwrap();
                 let share = wild
                     .scene()

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use uav_relay::{Instant, Interference, Wiring};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Outcome, Turning};
+use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::sky::{Broken, Says};
 
@@ -12,7 +12,7 @@ use uav_relay_tools::listening::wild::Wild;
 
 use crate::count;
 
-/// Faults of a sensor, with constant values of a 10 W interferer at 500 m, a receiver's noise, and zero.
+/// Simulated sensor faults. Constant values are those of a 10 W interferer at 500 m, a receiver's noise, and zero.
 const KINDS: [(&str, Says); 7] = [
     ("0.1 times", Says::Times(0.1)),
     ("0.5 times", Says::Times(0.5)),
@@ -41,7 +41,10 @@ fn share(wild: &Wild, outcome: &Outcome) -> f64 {
 
 /// Returns the nodes reported as wrong, each once.
 fn named(outcome: &Outcome) -> Vec<u16> {
-    let off = outcome.moments.iter().filter(|it| it.what == Turning::Off);
+    let off = outcome
+        .moments
+        .iter()
+        .filter(|it| it.what == TimelineEvent::SensorOff);
     let mut named: Vec<u16> = off.filter_map(|it| it.other).collect();
     named.sort_unstable();
     named.dedup();

@@ -25,7 +25,7 @@ fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     driver.channel.stats().pin
 }
 
-/// Checks every byte against the edges; the pin may stay high for `late` after the last byte of a burst.
+/// Checks every byte against the edges. The pin may stay high for `late` after the last byte of a burst.
 fn check(bench: &Bench, late: u64, name: &str) {
     let mut edges = bench.edges.iter();
     assert_eq!(

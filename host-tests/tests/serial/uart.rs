@@ -1,4 +1,4 @@
-//! Half-duplex UART with transmission times, and its driver-enable pin: every byte and edge is recorded.
+//! Half-duplex UART with transmission times, and its driver-enable pin. Every byte and edge is recorded.
 
 use std::cell::RefCell;
 use std::convert::Infallible;

@@ -52,9 +52,7 @@ fn what_happened_stands_in_a_strip_below_that_is_there_only_then() {
         assert!(height > SIZE.1);
         let texts = all(&document, "text", "event");
         assert_eq!(texts.len(), 2 * shown);
-        assert!(
-            has_text(&document, "1.000 s") && has_text(&document, "What happened, not to scale:")
-        );
+        assert!(has_text(&document, "1.000 s") && has_text(&document, "Events, not to scale:"));
         if count > 8 {
             assert!(has_text(&document, &format!("{} more", count - 7)));
         }

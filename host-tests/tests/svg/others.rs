@@ -15,7 +15,7 @@ fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
     let [before] = all(&document, "path", "before").try_into().unwrap();
     assert_eq!(
         tip(&before),
-        "interferer of the mission before: 30 W, x = 200 m, y = -100 m"
+        "interferer of the previous mission: 30 W, x = 200 m, y = -100 m"
     );
     let [words] = all(&document, "text", "faint").try_into().unwrap();
     assert_eq!(words.text(), Some("before"));
@@ -68,10 +68,7 @@ fn what_is_believed_is_drawn_beside_what_is_true() {
         let document = Document::parse(&svg).unwrap();
         let [believed] = all(&document, "path", "before").try_into().unwrap();
         let tip = tip(&believed);
-        assert!(
-            tip.starts_with("interferer that the relays believe in: 30 W"),
-            "{tip}"
-        );
+        assert!(tip.starts_with("estimated interferer: 30 W"), "{tip}");
         assert_eq!(all(&document, "path", "source").len(), 1 + 1);
     }
 }

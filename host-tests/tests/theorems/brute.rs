@@ -67,7 +67,8 @@ impl Scene {
     }
 }
 
-/// Returns the maximum of `f` over `range` and its position, by samples, denser at `near`, and golden section.
+/// Returns the maximum of `f` over `range` and its position. Samples are denser at `near`; a golden-section search refines the
+/// best.
 fn along(range: (f64, f64), near: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     let (low, high) = range;
     let mut at = vec![low, high];

@@ -1,4 +1,4 @@
-//! Values of an independent program, counterexamples to the printed theorems, and degenerate interferers.
+//! Known values: of an independent program, counterexamples to the printed theorems, degenerate cases.
 
 use uav_relay::planning::single::theorems;
 use uav_relay_oracle::cases;

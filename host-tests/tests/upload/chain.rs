@@ -23,7 +23,7 @@ fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     // A renewal in transit at the time of the proposal, and its retransmission, are stale at each relay at most once.
     let most = refused(&before) + u32::from(setup.mission.relays());
     assert!(refused(&outcome) <= most, "{}", refused(&outcome));
-    let settled = |moment: &&Moment| moment.what == Turning::Converged;
+    let settled = |moment: &&Moment| moment.what == TimelineEvent::Converged;
     let last = outcome.moments.iter().rfind(settled).unwrap();
     let took = last.at.since(AT).as_micros() / 1_000;
     (took, outcome.bytes - before.bytes)
@@ -134,7 +134,7 @@ fn a_newer_version_overtakes_an_older_one() {
             setup.deadline = seconds(200);
             let outcome = run(setup.clone()).unwrap();
             judge(&setup, &outcome, 2, two).unwrap_or_else(|what| panic!("{ms} {other:?}: {what}"));
-            let cut = |moment: &Moment| moment.what == Turning::Cut;
+            let cut = |moment: &Moment| moment.what == TimelineEvent::NoQuorum;
             assert!(!outcome.moments.iter().any(cut), "{ms} {other:?}");
         }
     }
@@ -187,7 +187,7 @@ fn an_infeasible_mission_is_followed_by_a_feasible_one() {
     ];
     setup.deadline = seconds(200);
     let outcome = run(setup.clone()).unwrap();
-    let given_up = |moment: &Moment| moment.what == Turning::Infeasible;
+    let given_up = |moment: &Moment| moment.what == TimelineEvent::Infeasible;
     assert!(outcome.moments.iter().any(given_up));
     judge(&setup, &outcome, 2, good).unwrap();
 }
@@ -200,7 +200,7 @@ fn an_upload_in_the_midst_of_forming_anew_is_not_forgotten() {
     setup.kills = vec![(3, AT)];
     setup.deadline = seconds(200);
     let calm = run(setup.clone()).unwrap();
-    let formed = |moment: &&Moment| matches!(moment.what, Turning::Reformed { .. });
+    let formed = |moment: &&Moment| matches!(moment.what, TimelineEvent::Reformed { .. });
     let at = calm.moments.iter().find(formed).unwrap().at;
     for ms in (0..600).step_by(10) {
         for end in [Side::Upstream, Side::Downstream] {

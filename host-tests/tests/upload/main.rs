@@ -15,7 +15,7 @@ use host_tests::fixtures::mission;
 use host_tests::flights::{bad_day, eight_apart, exact, own_profiles, seconds};
 use uav_relay::{Instant, Interference, Interferer, Mission, MissionConfig, Side, Upload};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, Turning};
+use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::{Setup, UploadSpec};
 
 /// Returns `base` with another interferer position.
@@ -69,10 +69,10 @@ fn judge(
     let mut holders: BTreeMap<u16, BTreeSet<u16>> = BTreeMap::new();
     for moment in &outcome.moments {
         match moment.what {
-            Turning::Uploaded(version) => {
+            TimelineEvent::Uploaded(version) => {
                 holders.entry(version).or_default().insert(moment.relay);
             }
-            Turning::Reformed {
+            TimelineEvent::Reformed {
                 view,
                 version,
                 relays,

@@ -24,7 +24,7 @@ fn drawn(base: &Mission, rng: &mut ChaCha8Rng) -> MissionConfig {
     config
 }
 
-/// Draws one to three uploads, up to three losses, frame loss up to 50 %, and relays that forget the upload.
+/// Draws one to three uploads, up to three losses, frame loss up to 50 %. Relays may forget the upload.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let shared = rng.random_bool(0.8);
     let base = mission(8);

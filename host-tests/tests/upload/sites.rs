@@ -44,7 +44,7 @@ fn sited(relays: u16, shared: bool) -> (Mission, Setup) {
     (base, setup)
 }
 
-/// Checks a run like [`judge`], and that all relays use the mission's sites, `None` for the loaded ones.
+/// Checks a run like [`judge`], and that all relays use the mission's sites. `None` stands for the loaded ones.
 fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), String> {
     let spec = setup
         .uploads

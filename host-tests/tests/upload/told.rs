@@ -202,7 +202,7 @@ fn an_upload_outside_the_geofence_is_refused_by_every_relay_and_the_ground_is_to
     }
 }
 
-/// Checks a relay with its own altitude, whose geofence is wider only for that: it decides like the others.
+/// Checks a relay with its own altitude, whose geofence is wider only for that. It decides like the others.
 #[test]
 fn a_relay_with_an_altitude_of_its_own_refuses_what_the_others_refuse() {
     let base = at_120(3, Band::at(120.0));

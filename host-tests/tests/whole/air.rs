@@ -1,4 +1,4 @@
-//! Event-driven medium on the public interface of `Relay`, with one-way links and reboots with stored votes.
+//! Event-driven medium on the public interface of `Relay`. It has one-way links, and reboots with stored votes.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -470,7 +470,7 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest group of relays that fly one agreement and are all members of its view.
+    /// Returns the size of the largest group of relays that fly one agreement. All are members of its view.
     fn flying(&self) -> usize {
         let holds = |seen: &&Seen| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding

@@ -1,4 +1,4 @@
-//! Single faults: a one-way link, a flapping link, a relay with another mission, an epoch that goes back.
+//! Single faults: a one-way or flapping link, a relay with another mission, an epoch that goes back.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -123,7 +123,7 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks a relay and its copy: one loses its setpoint within 2 s; the chain is whole once one is removed.
+/// Checks a relay and its copy: one loses its setpoint within 2 s. The chain is whole once one is removed.
 ///
 /// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
 #[test]
@@ -221,7 +221,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Flies chains with clock steps of up to ten hours, half of them with a relay isolated for three minutes.
+/// Flies chains with clock steps of up to ten hours. In half of them a relay is isolated for three minutes.
 ///
 /// Returns the number of schedules, those that recovered late, and those with two chains at once.
 fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {

@@ -92,7 +92,7 @@ fn a_chain_has_up_to_a_thousand_relays() {
     }
 }
 
-/// Checks that a proposed view names a node of a chain and a number above 0, while other views may be any.
+/// Checks that a proposed view names a node of a chain and a number above 0. Other views may be any.
 #[test]
 fn a_view_is_named_by_a_relay_that_may_propose_it() {
     let fits = |said: &Said, at: usize, view: u32| {

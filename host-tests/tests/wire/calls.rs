@@ -9,7 +9,7 @@ use super::receive::{counted, relay};
 
 use super::votes::*;
 
-/// Checks the middle of a part without a quorum: it holds, returns the decision, and requests nothing more.
+/// Checks the middle of a part without a quorum. It holds, returns the decision, and requests nothing more.
 #[test]
 fn a_part_that_is_cut_off_stops_calling() {
     let mut relay = relay(4, 8, Wiring::Pair);
@@ -125,7 +125,7 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
     }
 }
 
-/// Checks that a view number far ahead is approached in steps, because it could be the last possible one.
+/// Checks that a view number far ahead is approached in steps. It could be the last possible one.
 #[test]
 fn a_view_far_ahead_is_reached_step_by_step() {
     let now = Instant::ZERO;

@@ -1,4 +1,4 @@
-//! Second codec, written from the rules in `FORMAT.md` without the crate's code or postcard; CRC and COBS are of other crates.
+//! Second codec, written from the rules in `FORMAT.md` without the crate's code or postcard. CRC and COBS are of other crates.
 //!
 //! | file | content |
 //! | --- | --- |

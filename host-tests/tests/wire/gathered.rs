@@ -209,7 +209,7 @@ fn a_gathering_with_a_seat_of_its_receiver_is_stale() {
     }
 }
 
-/// Checks rosters of another pass, after other relays, incomplete, beyond the chain, or with duplicates.
+/// Checks invalid rosters: another pass, other relays, incomplete, beyond the chain, duplicates.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let now = Instant::ZERO;

@@ -202,7 +202,7 @@ impl Offer {
         low_half(&[&digest.to_le_bytes()[..], &body[SITES..]].concat())
     }
 
-    /// Converts to the crate's message, and checks each number in it, since only the crate can construct it.
+    /// Converts to the crate's message. Checks each number in it, since only the crate can construct it.
     pub(crate) fn message(&self) -> Message {
         let upload = Upload::decode(&self.kept()).unwrap();
         let config = upload.config();

@@ -84,7 +84,7 @@ fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
     }
 }
 
-/// Checks that a pending pass is held while the neighbour has chosen another node, and repeated afterwards.
+/// Checks that a pending pass is held while the neighbour has chosen another node. The pass is repeated afterwards.
 #[test]
 fn a_pass_waits_for_a_neighbour_that_takes_another() {
     let now = Instant::ZERO;

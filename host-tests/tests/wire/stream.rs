@@ -27,7 +27,7 @@ fn deframed(stream: &[u8]) -> Vec<Outcome> {
     out
 }
 
-/// Returns the result by the rules for the bytes between two delimiters, of which there is at least one.
+/// Returns the result by the rules. `stuffed` are the bytes between two delimiters, at least one.
 pub(crate) fn unstuffed(mut stuffed: &[u8]) -> Outcome {
     let mut plain = Vec::new();
     let mut whole = true;

@@ -1,4 +1,4 @@
-//! Host tools: the planner, the provisioning of drones, flash images, and the figures that are published.
+//! Host tools: planner, provisioning of drones, flash images, and published figures.
 //!
 //! | module | content |
 //! | --- | --- |

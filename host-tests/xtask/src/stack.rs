@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Function {
     /// Linker name.
     pub name: String,
-    /// Size of its own frame, bytes.
+    /// Size of the function's own stack frame, bytes.
     pub frame: u64,
     /// Addresses of functions that it calls or jumps to.
     pub calls: BTreeSet<u64>,

@@ -1,35 +1,35 @@
-//! A drone so far from its line that it has no place along it: how far it is, and when the firmware is told.
+//! Detection of a drone so far from its line that it has no place along it.
 //!
-//! Sites with latitude and longitude swapped are places on earth like any other, and nothing else looks wrong.
+//! Sites with latitude and longitude swapped are valid places, and nothing else shows the mistake.
 //!
-//! | a position | what follows |
+//! | position | effect |
 //! | --- | --- |
-//! | near the line | the next one that is not is told on the ground, too |
-//! | off the line, on the ground | it is told once |
-//! | off the line, in the air | it is told, at most once in 10 s |
+//! | near the line | re-arms the report on the ground |
+//! | off the line, on the ground | reported once |
+//! | off the line, in the air | reported at most once in 10 s |
 
 use crate::flight::axis::Axis;
 use crate::geodetic::Geodetic;
 use crate::time::{Duration, Instant};
 
-/// Least time from one event to the next.
+/// Minimum time between two events.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// A position older than this is none.
+/// Maximum age of a position that is used.
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// A drone that has no place along its line.
+/// Position of a drone that has no place along its line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OffLine {
-    /// Where the autopilot says that it is.
+    /// Position that the autopilot reports.
     pub at: Geodetic,
-    /// The distance along the ground from there to the nearest point of the line, m.
+    /// Distance along the ground to the nearest point of the line, m.
     pub away_m: u32,
 }
 
 impl OffLine {
-    /// The drone at `at`, by a line that is `axis`; `None` for a place that is not on earth. Constant work.
+    /// Returns the distance of a drone at `at` from the line `axis`. `None` for a place that is not on earth. Constant work.
     pub fn new(at: Geodetic, axis: &Axis) -> Option<Self> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -41,17 +41,17 @@ impl OffLine {
     }
 }
 
-/// The positions off the line.
+/// Positions off the line.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Astray {
     newest: Option<(Instant, Geodetic)>,
     told_at: Option<Instant>,
-    /// True once it was told on the ground.
+    /// True once it was reported on the ground.
     told_on_ground: bool,
 }
 
 impl Astray {
-    /// Takes a position off the line; returns true if it is to be told.
+    /// Records a position off the line; returns true if it has to be reported.
     pub(super) fn hear(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.told_on_ground;
@@ -64,13 +64,13 @@ impl Astray {
         true
     }
 
-    /// Takes note of a position near the line.
+    /// Records a position near the line.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.told_on_ground = false;
     }
 
-    /// Returns the newest position, if it was off the line.
+    /// Returns the newest position if it was off the line.
     pub(super) fn newest(&self, now: Instant) -> Option<Geodetic> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         fresh.map(|(_, at)| at)

@@ -1,68 +1,70 @@
-//! The carrot: the target that the autopilot is given, on its way from where the drone is to the setpoint, no faster than allowed.
+//! Carrot: the target sent to the autopilot. It moves from the drone's position to the setpoint within the allowed speed.
 //!
-//! It starts at the drone's own position and gains speed by the acceleration a. At the distance s from the setpoint it is no faster than
-//! k s near the setpoint and sqrt(2 a (s - a / 2 k^2)) farther away, where it loses speed by a. Near its end it loses less and less: a PX4
-//! that follows a target which stops by a constant a flies past it.
+//! The carrot starts at the drone's position and accelerates by a. At the distance s from the setpoint its speed is at most k s
+//! near the setpoint, and sqrt(2 a (s - a / 2 k^2)) farther away, where it decelerates by a. Near the end the deceleration falls: a
+//! PX4 overshoots a target that stops with a constant deceleration.
 //!
-//! An autopilot that is behind its target catches up: it flies faster than the target by its lag times its gain, which is about 1 /s, and by more while it gains speed. So the
-//! carrot is slower than allowed by that much, and the drone is not faster than allowed.
+//! An autopilot that lags behind its target catches up. It flies faster than the target by its lag times its gain, which is about 1
+//! /s, and by more while it accelerates. The carrot is therefore slower than allowed by that much, and the drone stays within the
+//! allowed speed.
 
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// Nearer than this to the setpoint it is there, m.
+/// Distance from the setpoint below which the carrot has arrived, m.
 const THERE_M: f32 = 0.01;
 
-/// How fast it slows down near the setpoint, 1/s, and the least speed there, m/s.
+/// Deceleration rate near the setpoint, 1/s, and the minimum speed there, m/s.
 const END_PER_S: f32 = 0.5;
 const END_SPEED_M_S: f32 = 0.2;
 
-/// How fast autopilots catch up with a target that they lag behind, 1/s.
+/// Rate at which autopilots catch up with a target, 1/s.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// The part of the speed that the carrot has at most: the rest is for a drone that gains speed and overshoots.
+/// Fraction of the speed limit that the carrot uses. The rest is for a drone that accelerates and overshoots.
 const CARROT_PART: f32 = 0.96;
 
-/// How fast it gets near its greatest speed, 1/s: without a corner, since a drone that gains speed goes on doing so for a moment.
+/// Rate of approach to the maximum speed, 1/s. The approach is smooth, since an accelerating drone goes on accelerating for a
+/// moment.
 const TOP_PER_S: f32 = 0.5;
 
-/// The least part of the speed that is left to a carrot whose drone lags behind: it is never stuck.
+/// Minimum fraction of the speed for a carrot whose drone lags behind, so that it never stops for good.
 const LEAST_PART: f32 = 0.1;
 
-/// How fast it loses speed that leads elsewhere than to a new setpoint, as a multiple of its acceleration. It has lost it within
-/// [`Pace::stopping_time`], where the drone would fly past a carrot that turns at once and come back.
+/// Deceleration of the velocity away from a new setpoint, as a multiple of the acceleration. That velocity is gone within
+/// [`Pace::stopping_time`]. A drone would overshoot a carrot that turns at once, and come back.
 const TURN_PART: f32 = 2.0;
 
-/// The way that may be left of a target that counts as stopped, m. Its drone, which is behind, has up to 0.5 m left.
+/// Remaining distance at which the target counts as stopped, m. The drone, which lags behind, then has up to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
-/// The time from a new setpoint until the drone acts on it: 0.2 s to the flight controller, and 1 s by which it is behind its target.
+/// Time from a new setpoint until the drone reacts. 0.2 s to the flight controller, and 1 s of lag behind its target.
 const BEHIND_MS: u64 = 1_200;
 
-/// The time in which the speed near the end halves, ms: ln 2 / k.
+/// Half-life of the speed near the end, ms: ln 2 / k.
 const HALVES_MS: u64 = 1_387;
 
-/// The most times that the speed halves before the drone has stopped: from 20 m to go at the greatest acceleration.
+/// Maximum number of half-lives until the drone has stopped. The drone starts 20 m away at the maximum acceleration.
 const MOST_HALVES: u32 = 8;
 
-/// A position older than this is none.
+/// Maximum age of a position that is used.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
-/// The longest step: after a gap it goes on from where it is.
+/// Maximum time step. After a longer gap the carrot continues from its position.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 
-/// How targets move.
+/// Speed limit and acceleration of targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pace {
-    /// The greatest speed, m/s: 0.1 to 20.
+    /// Maximum speed, m/s: 0.1 to 20.
     pub speed_m_s: f32,
-    /// How fast that changes, m/s²: 0.1 to 5.
+    /// Acceleration, m/s²: 0.1 to 5.
     pub acceleration_m_s2: f32,
 }
 
 impl Default for Pace {
-    /// 5 m/s and 1 m/s².
+    /// Creates the default: 5 m/s and 1 m/s².
     fn default() -> Self {
         Self {
             speed_m_s: 5.0,
@@ -72,7 +74,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default acceleration with that greatest speed, m/s: 0.1 to 20, or 0 for the default's.
+    /// Returns the default acceleration with that maximum speed, m/s. 0.1 to 20, or 0 for the default speed.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {
@@ -81,7 +83,7 @@ impl Pace {
         pace
     }
 
-    /// Returns the greatest speed at that distance from the place where it stops.
+    /// Returns the maximum speed at that distance from the place where the carrot stops.
     fn speed_before_m_s(self, left_m: f32) -> f32 {
         let a = self.acceleration_m_s2;
         // Here the two parts meet, both at the speed a / k.
@@ -93,7 +95,7 @@ impl Pace {
         }
     }
 
-    /// Returns the distance in which it stops from that speed, m.
+    /// Returns the stopping distance from that speed, m.
     fn stopping_m(self, speed_m_s: f32) -> f32 {
         let a = self.acceleration_m_s2;
         if speed_m_s > a / END_PER_S {
@@ -103,10 +105,10 @@ impl Pace {
         }
     }
 
-    /// Returns the time from a new setpoint until a drone has stopped that flew elsewhere at the greatest speed: for
+    /// Returns the stopping time, from a new setpoint, of a drone at maximum speed elsewhere. It is meant for
     /// [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag). 9.8 s for the default.
     ///
-    /// The target loses speed by the acceleration a down to a / k, and from there with its way to go, of which at most 0.25 m is left
+    /// The target decelerates by a down to a / k, and from there in proportion to the remaining distance, which is at most 0.25 m
     /// after this time. At most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
@@ -130,24 +132,24 @@ impl Pace {
         Duration::from_millis(time_ms)
     }
 
-    /// Returns true if both are in their ranges.
+    /// Returns true if both values are within their ranges.
     pub fn is_valid(self) -> bool {
         (0.1..=20.0).contains(&self.speed_m_s) && (0.1..=5.0).contains(&self.acceleration_m_s2)
     }
 }
 
-/// A target on its way.
+/// Moving target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Carrot {
     pub(super) place: Placement,
-    /// Along x, y and up, m/s.
+    /// Velocity along x, y and up, m/s.
     pub(super) velocity_m_s: [f32; 3],
     stands: bool,
     moved_at: Instant,
 }
 
 impl Carrot {
-    /// One that stands where the drone is.
+    /// Creates a standing target at the drone's position.
     pub(super) const fn at(place: Placement, now: Instant) -> Self {
         Self {
             place,
@@ -157,12 +159,12 @@ impl Carrot {
         }
     }
 
-    /// Whether it stands still.
+    /// Returns true if the target stands still.
     pub(super) const fn stands(&self) -> bool {
         self.stands
     }
 
-    /// Returns where it would be `ago` before it moved last, at its velocity.
+    /// Returns the position `ago` before the last step, extrapolated by the velocity.
     fn before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -173,7 +175,7 @@ impl Carrot {
         }
     }
 
-    /// Returns where it stops when it loses speed from now on, which is not beyond `setpoint`.
+    /// Returns the position where the target stops if it decelerates from now on, not beyond `setpoint`.
     pub(super) fn stop(&self, setpoint: Placement, pace: Pace) -> Placement {
         let to = self.way_to(setpoint);
         let left = length(to);
@@ -194,7 +196,7 @@ impl Carrot {
         way(self.place, setpoint)
     }
 
-    /// Moves on toward `setpoint` until `now`. The drone was at `drone`, so long ago, if that is known.
+    /// Advances the target toward `setpoint` until `now`. `drone` is the drone's position and its age, if known.
     pub(super) fn advance(
         &mut self,
         now: Instant,
@@ -209,7 +211,7 @@ impl Carrot {
         let left = length(to);
         let a = pace.acceleration_m_s2;
         let turn = TURN_PART * a * dt;
-        // A new setpoint may be to the side of where it goes, or behind: it loses the speed that leads elsewhere first.
+        // A new setpoint may be to the side or behind. The velocity in other directions is reduced first.
         let ahead = to.map(|part| part / left.max(THERE_M));
         let toward = dot(self.velocity_m_s, ahead);
         let [x, y, up] = self.velocity_m_s;
@@ -224,7 +226,7 @@ impl Carrot {
             *self = Self::at(setpoint, now);
             return;
         }
-        // A drone that is ahead of the carrot does not catch up: the carrot would swing with it.
+        // A drone ahead of the carrot has no lag to catch up: with a negative lag the carrot would oscillate with the drone.
         let behind = |(place, ago)| dot(way(place, self.before(ago)), to) / left;
         let lag_m = drone.map_or(0.0, behind).max(0.0);
         let most = (CARROT_PART * pace.speed_m_s - CATCH_UP_PER_S * lag_m)
@@ -289,7 +291,7 @@ mod tests {
     use crate::place::Placement;
     use crate::time::{Duration, Instant};
 
-    /// The way of a carrot, every 100 ms, until it stands: places and speeds.
+    /// Returns the positions and speeds of a carrot, every 100 ms, until it stands.
     fn fly(from: Placement, to: Placement, pace: Pace) -> Vec<(Placement, f32), 512> {
         let mut carrot = Carrot::at(from, Instant::ZERO);
         let mut way = Vec::new();
@@ -376,7 +378,7 @@ mod tests {
         }
     }
 
-    /// At every moment of a flight: by its own acceleration, and never past the setpoint.
+    /// Checks at every moment of a flight that the deceleration is within its limit. The setpoint is never overshot.
     #[test]
     fn it_stops_gently_wherever_it_is_withdrawn() {
         let to = Placement::on_line(60.0, 20.0);
@@ -414,7 +416,7 @@ mod tests {
         );
     }
 
-    /// A setpoint in any other direction is reached without a jump of the velocity, and the old direction is left within 3 s.
+    /// Checks setpoints in every other direction. The velocity does not jump, and the old direction is left within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

@@ -1,12 +1,12 @@
-//! The operator's command to clear lost relays: COMMAND_LONG 31010 (MAV_CMD_USER_1), answered by COMMAND_ACK.
+//! The operator's command to clear lost relays: COMMAND_LONG 31010, answered by COMMAND_ACK.
 //!
-//! The guard keeps clear of a relay that fell silent, because its drone may still hover. Only a person can know that it has landed. The guard
-//! frees all of one side at once, so a command has to name every relay that is lost there.
+//! The guard keeps clear of a silent relay, because its drone may still hover, and only a person can know that it has landed. The
+//! guard clears all relays of one side at once, so a command has to name every lost relay of that side.
 //!
 //! | command to this system and component | result |
 //! | --- | --- |
 //! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
-//! | the same again, numbered as a repetition | accepted, and nothing else |
+//! | the same command, marked as a repetition | accepted, without an effect |
 //! | any other numbers | denied: [`AutopilotEvent::ClearRefused`] |
 
 use heapless::Vec;
@@ -16,31 +16,31 @@ use crate::event::Event;
 use crate::flight::mavlink::frame::Address;
 use crate::side::Side;
 
-/// MAV_CMD_USER_1.
+/// Command number, MAV_CMD_USER_1.
 pub(super) const CLEAR_LOST: u16 = 31_010;
 
-/// `MAV_RESULT`.
+/// Values of `MAV_RESULT`.
 const ACCEPTED: u8 = 0;
 const DENIED: u8 = 2;
 
-/// The relays that are lost on one side.
+/// Lost relays of one side.
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
-    /// True once more relays are lost than a command can name.
+    /// True if more relays are lost than a command can name.
     is_full: bool,
 }
 
-/// The lost relays of both sides, and the answer to the last command.
+/// Lost relays of both sides, and the answer to the last command.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// The last command that was accepted.
+    /// Last accepted command.
     accepted: Option<(Address, RelayNumbers)>,
-    /// The answer that is due: to whom, and its `MAV_RESULT`.
+    /// Pending answer: its receiver, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// The side that the relay is to clear.
+    /// Side that the relay has to clear.
     cleared: Option<Side>,
 }
 
@@ -52,7 +52,7 @@ impl Clearance {
         }
     }
 
-    /// Takes an event of the relay.
+    /// Updates the lost relays by an event of the relay.
     pub(super) fn hear(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { side, node } => {
@@ -68,7 +68,7 @@ impl Clearance {
         }
     }
 
-    /// Takes a command with these parameters; returns the event for the firmware.
+    /// Processes a command with these parameters; returns the event for the firmware.
     pub(super) fn command(
         &mut self,
         from: Address,
@@ -97,19 +97,19 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Removes the answer that is due.
+    /// Removes the pending answer.
     pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
         self.answer.take()
     }
 
-    /// Removes the side that the relay is to clear.
+    /// Removes the side that the relay has to clear.
     pub(super) const fn take_cleared(&mut self) -> Option<Side> {
         self.cleared.take()
     }
 }
 
 impl LostSide {
-    /// Returns true if these are all relays that are lost here, and one is.
+    /// Returns true if these are exactly the lost relays of this side, and at least one.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
@@ -120,7 +120,7 @@ impl LostSide {
     }
 }
 
-/// Returns the number of a relay that a parameter gives, 0 for anything else.
+/// Returns the relay number in a parameter; 0 for an invalid one.
 fn number(parameter: f32) -> u16 {
     #[expect(
         clippy::cast_possible_truncation,
@@ -191,11 +191,11 @@ mod tests {
         assert_eq!(event, Some(cleared));
         assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
         assert_eq!(clearance.take_cleared(), Some(side));
-        // The answer was lost: the same once more does nothing else.
+        // The answer was lost: the repeated command has no further effect.
         assert_eq!(clearance.command(FROM, named, true), None);
         assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
         assert_eq!(clearance.take_cleared(), None);
-        // A new command of that kind names nobody who is lost.
+        // A new command of that kind names no lost relay.
         let event = clearance.command(FROM, named, false);
         assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
     }

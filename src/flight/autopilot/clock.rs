@@ -1,24 +1,25 @@
-//! The autopilot's clock on the relay's clock: when a position was measured. The relay's own clock, as the autopilot is told of it.
+//! Conversion between the autopilot's clock and the relay's. It gives measurement times of positions, and the time sent to the
+//! autopilot.
 
 use crate::time::{Duration, Instant};
 
-/// A clock that goes back by more than this has begun anew.
+/// Backward step of the autopilot's clock that shows a restart.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// The anchor is the least delay of the last one to two of these.
+/// Half of the window of the anchor, which is the minimum delay of the last one to two halves.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Messages in each of them at least, so that a gap and the burst after it do not move the anchor.
+/// Minimum number of messages in each half. A gap and the burst after it then do not move the anchor.
 const LEAST: u8 = 8;
 
-/// The clocks drift apart by less than one part in 2^10, or the anchor lags behind by what they drift in two halves.
+/// Assumed maximum drift of the clocks: one part in 2^10. With more drift the anchor lags behind by the drift of two halves.
 const DRIFT: u32 = 10;
 
-/// Differences between the relay's clock and the autopilot's, µs. The least of them belongs to the message with the least delay.
+/// Minimum difference between the relay's clock and the autopilot's, µs. It is that of the message with the minimum delay.
 ///
-/// A message can be late since the link is slow, and it can seem to be late since the autopilot's clock has lost time. An anchor that
-/// is never renewed takes the second for the first for good. One that is renewed within seconds, from 4 s to 8 s of messages, leaves a
-/// late message late for that long.
+/// A message can be late because the link is slow, and it can seem late because the autopilot's clock has lost time. An anchor that
+/// is never renewed takes the second for the first for good. An anchor that is renewed within 4 s to 8 s of messages corrects this,
+/// and a late message then counts as late for that long.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
     known: Option<Known>,
@@ -26,7 +27,7 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    /// The least difference in the half before this one, and in this one.
+    /// Minimum difference in the previous half, and in the present one.
     least: [i64; 2],
     since: Instant,
     messages: u8,
@@ -35,8 +36,8 @@ struct Known {
 }
 
 impl RemoteClock {
-    /// Takes a message that came at `now` and was made `boot_ms` after the autopilot began. Returns when it was made, or `None` where the
-    /// autopilot has begun anew.
+    /// Returns the time at which a message was created, on the relay's clock. The message arrived at `now` and was created
+    /// `boot_ms` after the autopilot's start. Returns `None` if the autopilot has restarted.
     pub(super) fn hear(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
         let said = i64::from(boot_ms) * 1_000;
         let difference = now.as_micros().cast_signed().saturating_sub(said);
@@ -53,7 +54,7 @@ impl RemoteClock {
             self.hear(now, boot_ms);
             return None;
         }
-        // Messages come in order: a clock that goes back has lost time, and the link is no slower for that.
+        // Messages arrive in order: a clock that goes back has lost time, and the link is not slower for that.
         let lost = back.max(0);
         let drifted = (now.since(before).as_micros() >> DRIFT).cast_signed();
         if now.since(known.since) >= HALF && known.messages >= LEAST {
@@ -75,8 +76,8 @@ impl RemoteClock {
     }
 }
 
-/// Milliseconds, which wrap after 49 days as the autopilot's do. In two steps that the target has an instruction for: a division of 64 bits
-/// is a kilobyte of flash.
+/// Returns milliseconds, which wrap after 49 days as the autopilot's do. The division has two steps with instructions of the
+/// target: a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -93,7 +94,8 @@ mod tests {
         Instant::from_millis(ms)
     }
 
-    /// How late each message of a flight seems, ms: `said` gives the autopilot's clock at a time, `delay` the link's delay.
+    /// Returns the apparent age of each message of a flight, ms. `said` gives the autopilot's clock at a time, `delay` the link's
+    /// delay.
     fn ages(said: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();
@@ -114,7 +116,7 @@ mod tests {
         assert_eq!(clock.hear(at(10_200), 700), Some(at(10_200)));
         let late = clock.hear(at(10_480), 900).expect("no restart");
         assert_eq!(at(10_480).since(late).as_micros() / 1_000, 79, "80 ms late");
-        // A quicker one shows that all before were late.
+        // A faster message shows that all earlier ones were late.
         assert_eq!(clock.hear(at(10_550), 1_100), Some(at(10_550)));
         let late = clock.hear(at(10_800), 1_300).expect("no restart");
         assert_eq!(at(10_800).since(late).as_micros() / 1_000, 49, "50 ms late");
@@ -131,7 +133,7 @@ mod tests {
         }
     }
 
-    /// A simulator on a loaded machine.
+    /// Checks a simulator on a loaded machine.
     #[test]
     fn a_clock_that_runs_one_percent_slow_is_never_blind() {
         let ages = ages(|ms| ms - ms / 100, |_| 5);
@@ -148,7 +150,7 @@ mod tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20), "{ages:?}");
     }
 
-    /// So the link is not believed at first.
+    /// Checks that a link with a growing delay is not trusted at first.
     #[test]
     fn a_delay_that_grows_is_late_at_first() {
         let ages = ages(|ms| ms, |ms| if ms < 20_000 { 5 } else { 1_500 });
@@ -156,7 +158,7 @@ mod tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// What a cable has kept for 7 s comes at once: the first of it is as old as it is.
+    /// Checks messages that a cable delivers at once after 7 s: the age of the first one is 7 s.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;

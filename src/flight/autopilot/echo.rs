@@ -1,39 +1,40 @@
-//! Echoes (TIMESYNC): how old what the autopilot says may be, by the link itself and not by anybody's clock.
+//! Echoes (TIMESYNC): upper bound of a message's age, by the link itself and without a common clock.
 //!
-//! A cable, a radio or a router may keep bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose time. So the
-//! link sends its own time twice a second and the autopilot sends it back. Bytes stay in order: whatever comes after an answer was said
-//! after the question, and is no older than the question.
+//! A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose
+//! time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in order: a message
+//! received after an answer was sent after the question, so it is not older than the question.
 //!
-//! A question has a tag, drawn at each start of the companion: an answer that a cable kept since before a restart is not of this link.
+//! A question has a tag, drawn at each start of the companion. An answer buffered since before a restart therefore does not count.
 //!
-//! An autopilot that has answered no question within [`GIVES_UP`] of the first has no echoes; the ages of its positions are all that is known
-//! then. Until then a link that has just begun is taken for late. An autopilot that has answered once is late whenever it does not.
+//! An autopilot that has not answered within [`GIVES_UP`] of the first question does not support echoes. Then only the time stamps
+//! of its positions show their ages. Until then a link that has just started counts as late. An autopilot that has answered once
+//! counts as late whenever it does not answer.
 
 use crate::time::{Duration, Instant};
 
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// The link is late when the newest question that was answered is older than this.
+/// Maximum age of the newest answered question; beyond it the link counts as late.
 const LATE: Duration = Duration::from_millis(1_500);
 
 const GIVES_UP: Duration = Duration::from_millis(10_000);
 
-/// An answer to a question older than this is not of this link.
+/// Maximum age of a question whose answer counts.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Low bits of a question that hold the link's tag; the higher ones hold µs, for 200 days. The autopilot only sends them back.
+/// Low bits of a question that hold the link's tag. The higher bits hold µs, for 200 days. The autopilot only returns them.
 const SHIFT: u32 = 20;
 const TAG: u32 = 0xA_52A5;
 
-/// Questions and answers.
+/// Questions and answers of a link.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
     /// Low bits of every question.
     tag: u32,
     due: Option<Instant>,
-    /// When the first question was asked.
+    /// Time of the first question.
     begun_at: Option<Instant>,
-    /// When the newest question that was answered was asked.
+    /// Time of the newest answered question.
     asked_at: Option<Instant>,
 }
 
@@ -62,7 +63,7 @@ impl Echo {
         };
     }
 
-    /// Returns the question to ask at `now`.
+    /// Returns the question to send at `now`.
     pub(super) fn take(&mut self, now: Instant) -> Option<u64> {
         if self.due.is_some_and(|due| due > now) {
             return None;
@@ -72,7 +73,7 @@ impl Echo {
         Some(now.as_micros() << SHIFT | u64::from(self.tag))
     }
 
-    /// Takes an answer.
+    /// Processes an answer.
     pub(super) fn hear(&mut self, now: Instant, question: u64) {
         let asked_at = Instant::from_micros(question >> SHIFT);
         let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
@@ -81,12 +82,12 @@ impl Echo {
         }
     }
 
-    /// Returns the earliest time at which what comes now was said, if that is known.
+    /// Returns the earliest time at which a message received now was sent, if that is known.
     pub(super) const fn floor(&self) -> Option<Instant> {
         self.asked_at
     }
 
-    /// Returns true while what comes may be too old to rely on.
+    /// Returns true while messages may be too old to rely on.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         match (self.asked_at, self.begun_at) {
             (Some(at), _) => now.since(at) >= LATE,
@@ -95,7 +96,7 @@ impl Echo {
         }
     }
 
-    /// Returns the next time at which there is something to ask or to notice.
+    /// Returns the time of the next question or check.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let late = self.asked_at.map(|at| at + LATE).filter(|at| *at > now);
         let all = [self.due, late, self.begun_at.map(|at| at + GIVES_UP)];

@@ -1,4 +1,4 @@
-//! Events that the firmware is told of.
+//! Events for the firmware.
 
 use super::astray::OffLine;
 use super::kind::Kind;
@@ -8,10 +8,10 @@ use super::trust::Mistrust;
 use crate::flight::mavlink::frame::Address;
 use crate::side::Side;
 
-/// Relays that one command can name.
+/// Maximum number of relays that one command can name.
 pub(super) const MOST: usize = 7;
 
-/// Numbers of relays that a command names, 0 for none.
+/// Relays named in a command, 0 for none.
 pub type RelayNumbers = [u16; MOST];
 
 /// An event of the link to an autopilot.
@@ -19,66 +19,66 @@ pub type RelayNumbers = [u16; MOST];
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum AutopilotEvent {
-    /// An autopilot has been heard for the first time.
+    /// First message of an autopilot.
     Found(Kind),
-    /// The autopilot was switched off and on.
+    /// Restart of the autopilot.
     Restarted,
-    /// The state has changed: see [`State`].
+    /// Change of the state: see [`State`].
     State(State),
-    /// The drone is not flown by the relay any more. It comes together with [`State::Standby`], or up to 1.3 s later where the cause may be a
-    /// fence.
+    /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
+    /// cause may be a fence.
     Released(Release),
-    /// The drone cannot be engaged, or is not though it is in the companion's mode.
+    /// Reason for which the drone cannot be engaged, or is not engaged in the companion's mode.
     Waits(WaitReason),
-    /// The drone can be engaged: the pilot may choose the mode.
+    /// Readiness: the pilot may choose the mode.
     Ready,
-    /// The autopilot says that it flies elsewhere than it was told, for 3 s: the place is outside its own fence, or another companion talks
-    /// to it.
+    /// Refused target: for 3 s the autopilot has reported another target than it was sent. The position is outside its own fence,
+    /// or another companion controls it.
     Refused,
-    /// The autopilot says that it is outside of its fence.
+    /// Report of the autopilot that it is outside of its fence.
     FenceBreached,
-    /// The drone is so far from its line that it has no place along it: are these the sites of this flight? It is told once on the ground and
-    /// at most once in 10 s in the air.
+    /// Drone so far from its line that it has no place along it. Check that these are the sites of this flight. Reported once on
+    /// the ground and at most once in 10 s in the air.
     OffLine(OffLine),
-    /// The operator has cleared all relays that are lost on one side, by a command over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared)
-    /// has it for the relay.
+    /// Command of the operator over MAVLink that clears all lost relays of one side.
+    /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
     LostCleared {
-        /// The side.
+        /// Side whose relays are cleared.
         side: Side,
-        /// Numbers of the relays, and zeros.
+        /// Numbers of the relays, padded with zeros.
         relays: RelayNumbers,
-        /// The sender of the command.
+        /// Sender of the command.
         from: Address,
     },
-    /// The operator's command to clear lost relays was denied: it does not name exactly the relays that are lost on one side.
+    /// Denied command of the operator to clear lost relays. It does not name exactly the lost relays of one side.
     ClearRefused {
-        /// Numbers of the relays that it names, and zeros.
+        /// Numbers of the relays that it names, padded with zeros.
         relays: RelayNumbers,
-        /// The sender of the command.
+        /// Sender of the command.
         from: Address,
     },
-    /// The signatures of the two do not fit.
+    /// Mismatch of the signatures of autopilot and link.
     Mistrusted(Mistrust),
 }
 
-/// Events that have not been taken.
+/// Pending events.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Events {
     pub(super) found: Option<Kind>,
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`].
+    /// Either [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`].
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
-    /// [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
+    /// Either [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
     pub(super) clearance: Option<AutopilotEvent>,
 }
 
 impl Events {
-    /// Removes the next one.
+    /// Removes the next event.
     pub(super) fn take(&mut self) -> Option<AutopilotEvent> {
         if let Some(kind) = self.found.take() {
             return Some(AutopilotEvent::Found(kind));

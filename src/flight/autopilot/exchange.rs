@@ -1,4 +1,4 @@
-//! Exchange with the relay: what the two hand each other in one turn of a main loop, and in which order.
+//! Exchange of data between the link and the relay in each turn of a main loop, in a fixed order.
 
 use super::link::Autopilot;
 use super::vehicle::Position;
@@ -9,7 +9,7 @@ use crate::time::Instant;
 use crate::wire::upload::UPLOAD;
 
 impl Autopilot {
-    /// Exchanges data with the relay of the same drone, in both directions, and handles the link's timeouts.
+    /// Exchanges data with the relay of the same drone and handles the link's timeouts. Data go in both directions.
     ///
     /// | step | from | to | data | why at this point |
     /// | --- | --- | --- | --- | --- |

@@ -1,9 +1,9 @@
-//! Whose autopilot it is: PX4 or ArduCopter.
+//! Kind of autopilot: PX4 or ArduCopter.
 
-/// `MAV_TYPE` of what can hover and is flown by ArduCopter: with other vehicles the same number is another mode.
+/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
 const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 
-/// Whose autopilot it is.
+/// Kind of autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Kind {
@@ -14,7 +14,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// By `MAV_AUTOPILOT` and `MAV_TYPE`.
+    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`.
     pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
         match autopilot {
             12 => Some(Self::Px4),

@@ -1,4 +1,4 @@
-//! The link to one autopilot: what it says, who flies by that, and what it is told.
+//! Link to one autopilot: its reports, the resulting control state, and the targets sent to it.
 
 use super::astray::{Astray, OffLine};
 use super::carrot::{Carrot, Pace};
@@ -29,30 +29,30 @@ use crate::pointing::Bearing;
 use crate::side::Side;
 use crate::time::{Duration, Instant, MonotonicClock};
 
-/// An onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
+/// Component number of an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// The system to send as before the autopilot has said its own: the one that autopilots have unless told otherwise.
+/// Sender's system number before the autopilot's is known: the default of autopilots.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// A target is sent this much too late: a PX4 may be in its failsafe meanwhile.
+/// Delay of a target after which a PX4 may be in its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// How long positions have to come before the link is blind no more; longer where it was blind a short time ago.
+/// Time of regular positions after which a blind link recovers. It is longer if the link was blind a short time ago.
 const RECOVERY: Duration = Duration::from_millis(1_000);
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// An ArduCopter that changes its mode since its fence was breached says so of the fence within this time.
+/// Time within which an ArduCopter reports its fence after a mode change caused by a breach.
 const FENCE_TOLD: Duration = Duration::from_millis(1_300);
 
-/// A reason to wait is told once it has held for so long, and so long after another one.
+/// Time after which a new reason to wait is reported, and the minimum time since the last report.
 const SETTLED: Duration = Duration::from_millis(1_000);
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// A reason of the guard is told once it has lasted for this time.
+/// Time after which a reason of the guard is reported.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// The link to one autopilot.
@@ -66,7 +66,7 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Sites of the line that the link was created with.
+    /// Sites of the line with which the link was created.
     pub(super) loaded: Sites,
     pace: Pace,
     clock: MonotonicClock,
@@ -79,31 +79,31 @@ pub struct Autopilot {
     setpoint: Option<Placement>,
     look: Option<Bearing>,
     target: Option<Target>,
-    /// Where the carrot stops after the setpoint was withdrawn.
+    /// Stopping position of the carrot after the setpoint was withdrawn.
     stop: Option<Placement>,
-    /// When the link became blind, and since when positions come again.
+    /// Time at which the link became blind, and time since which positions are received again.
     blind_at: Option<Instant>,
     located_at: Option<Instant>,
-    /// How long positions have to come.
+    /// Time of regular positions that ends the blind state.
     recovery: Duration,
-    /// A release that is not told yet, and when it is.
+    /// Release that has not been reported, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Why the drone cannot be engaged, and since when; the reason that was told last, and when.
+    /// Reason for which the drone cannot be engaged, and its start. Then the last reported reason, and its time.
     wait: (Option<WaitReason>, Instant),
     told_wait: Option<(Option<WaitReason>, Instant)>,
-    /// False while the relay is not to be engaged.
+    /// False while the relay must not be engaged.
     ready: bool,
-    /// The guard's reasons to hold the relay back that the operator has been told, upstream and downstream.
+    /// Reasons of the guard that were reported to the operator, upstream and downstream.
     hold: [Option<HoldReason>; 2],
-    /// The newest of these reasons, and the time since which they are the same.
+    /// Newest reasons of the guard, and the time since which they are unchanged.
     newest_hold: ([Option<HoldReason>; 2], Instant),
-    /// True from a new view until its positions are agreed on.
+    /// True from a new view until its positions are agreed.
     is_new_view: bool,
     report: Report,
     position: Option<Position>,
     astray: Astray,
     clearance: Clearance,
-    /// What a radio has heard where the drone was, W.
+    /// Noise reported by a SiK radio, and the drone's position, W.
     noise: RadioNoise,
     events: Events,
     sequence: u8,
@@ -111,7 +111,7 @@ pub struct Autopilot {
 }
 
 impl Autopilot {
-    /// The link to the autopilot of a drone that flies along `axis`, at most as fast as `pace` says.
+    /// Creates the link to the autopilot of a drone that flies along `axis` within `pace`.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
             loaded: axis.sites(),
@@ -149,13 +149,14 @@ impl Autopilot {
         }
     }
 
-    /// Sets a number that differs from one start of the companion to the next: a chip's random number, the relay's seed. Without it, answers that
-    /// a cable kept since before a restart may pass for answers to this link, and with them a choice of the mode that was made then.
+    /// Sets a number that differs at each start of the companion: a chip's random number, the relay's seed. Without it, answers
+    /// buffered in a cable since before a restart may be taken for answers to this link, and so may a choice of the mode made
+    /// before.
     pub const fn set_seed(&mut self, seed: u32) {
         self.vehicle.echo.seed(seed);
     }
 
-    /// Bytes from the autopilot, any number of them.
+    /// Processes bytes from the autopilot, any number of them.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let now = self.clock.advance(now);
         for byte in bytes {
@@ -167,7 +168,7 @@ impl Autopilot {
                 let heard = self.vehicle.hear(now, &received, &self.axis);
                 if self.vehicle.is_breached && !was_breached {
                     self.events.breached = true;
-                    let text = ["relay: the autopilot's fence is breached", ""];
+                    let text = ["relay: autopilot fence breached", ""];
                     self.report.tell(Line::warning(Topic::Fence, text));
                 }
                 if heard != VehicleUpdate::Nothing {
@@ -178,7 +179,7 @@ impl Autopilot {
         }
     }
 
-    /// Takes an operator's command to this companion, from anybody whom the link believes.
+    /// Processes an operator's command to this companion, from any sender whose frames are accepted.
     fn obey(&mut self, received: &Received) {
         let Some(Incoming::CommandLong {
             command: CLEAR_LOST,
@@ -197,7 +198,7 @@ impl Autopilot {
             .command(received.from, parameters, is_repeated);
         let line = match event {
             Some(AutopilotEvent::LostCleared { .. }) => {
-                Line::info(Topic::Clearance, "relay: lost relays are cleared")
+                Line::info(Topic::Clearance, "relay: lost relays cleared")
             }
             Some(_) => {
                 let text = ["relay: denied, name all lost relays of one side", ""];
@@ -242,9 +243,9 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// The drone flies along `axis` from now on: between the sites of a new mission. Call it when `Relay::sites` has changed, before the next
-    /// [`handle_setpoint`](Self::handle_setpoint). The drone stays where it is until a setpoint is given: what was given before is of the
-    /// other line. Constant work; the same line again has no effect.
+    /// Sets the line on which the drone flies: between the sites of a new mission. Call it when `Relay::sites` has changed, before
+    /// the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its position until the next setpoint, because the
+    /// present one belongs to the previous line. Constant work; the same line again has no effect.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
         if axis == self.axis {
@@ -254,7 +255,7 @@ impl Autopilot {
         let moved = |place| before.point(place).and_then(|point| axis.place(point));
         self.vehicle.move_places(moved);
         (self.setpoint, self.look, self.stop) = (None, None, None);
-        // It was measured before the relay knew of the line.
+        // The position was measured before the relay knew the line.
         self.position = None;
         self.astray = Astray::default();
         self.target = self.target.and_then(|target| {
@@ -266,7 +267,8 @@ impl Autopilot {
         }
     }
 
-    /// Where to fly: what `Relay::setpoint` says; `None` to hold the place, and so is one that is not finite or not near the line.
+    /// Sets the setpoint, from `Relay::setpoint`. `None`, or a setpoint that is not finite or not near the line, holds the
+    /// position.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
@@ -283,24 +285,26 @@ impl Autopilot {
         }
     }
 
-    /// Which way to look, as a directional antenna needs it; `None` leaves that to the autopilot, and so does an azimuth that is none.
+    /// Sets the heading that a directional antenna needs. `None`, or an invalid azimuth, leaves the heading to the autopilot.
     pub fn handle_bearing(&mut self, look: Option<Bearing>) {
         self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// The numbers that an operator may plot once a second: the SIR of the hop to this relay in decibels, and its place in the chain.
+    /// Sets the numbers sent to the operator once a second. They are the SIR of the hop to this relay, in decibels, and its place
+    /// along the chain.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Sets whether the relay is ready to be engaged; true at the start. While it is false, a PX4 in [`State::Standby`] is streamed nothing,
-    /// so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an ArduCopter takes GUIDED all the same.
+    /// Sets whether the relay may be engaged; true at the start. While it is false, a PX4 in [`State::Standby`] receives no
+    /// targets, so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an ArduCopter accepts GUIDED
+    /// all the same.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
         if before != ready && self.state == State::Standby {
-            // Streamed anew, if at all, and by a PX4 only after another heartbeat: one that took OFFBOARD while nothing was streamed is in
-            // its failsafe.
+            // Targets are sent anew, if at all, and by a PX4 only after another heartbeat: a PX4 that entered OFFBOARD without
+            // targets is in its failsafe.
             self.target = None;
             if self.vehicle.kind() == Some(Kind::Px4) {
                 self.vehicle.unchoose();
@@ -309,8 +313,9 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Tells the operator why the guard holds the relay back, upstream and downstream, while the drone is engaged or in [`State::Standby`]. A
-    /// change is told once it has lasted for 3 s, because reasons come and go while an agreement spreads. Equal lines are at least 10 s apart.
+    /// Reports the guard's reasons to hold the relay back to the operator, upstream and downstream. They are sent while the drone
+    /// is engaged or in [`State::Standby`]. A change is reported once it has lasted for 3 s, because reasons come and go while an
+    /// agreement spreads. Equal lines are at least 10 s apart.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -332,14 +337,15 @@ impl Autopilot {
         }
     }
 
-    /// Queues a line for the operator to read, of at most 50 bytes; returns true if there was room for it, which there is for three. Equal
-    /// lines are sent at least 10 s apart.
+    /// Queues a text of at most 50 bytes for the operator; returns true if there was room. Three texts fit. Equal texts are sent at
+    /// least 10 s apart.
     pub fn say(&mut self, text: &str) -> bool {
         self.report.say(text)
     }
 
-    /// Takes an event of the relay: the operator reads of those that matter in flight. Of a new view that is one line, on a drone that is
-    /// engaged: what keeps another one from its place is told by [`handle_hold`](Self::handle_hold) and by the reasons not to engage it.
+    /// Processes an event of the relay; events that matter in flight are sent to the operator as a text. A new view is one line, on
+    /// an engaged drone. Reasons that keep a drone from its place are reported by [`handle_hold`](Self::handle_hold) and as reasons
+    /// not to engage it.
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.hear(event);
         match event {
@@ -347,7 +353,7 @@ impl Autopilot {
             Event::Converged => {
                 let is_new = core::mem::take(&mut self.is_new_view);
                 if is_new && self.state == State::Engaged && self.hold == [None; 2] {
-                    let line = Line::info(Topic::Relay, "relay: flies to a new place");
+                    let line = Line::info(Topic::Relay, "relay: flies to new position");
                     self.report.tell(line);
                 }
             }
@@ -358,14 +364,14 @@ impl Autopilot {
         }
     }
 
-    /// Does what is due at `now`. Constant work.
+    /// Handles the timers due at `now`. Constant work.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.streams.handle_timeout(now);
         self.review(now);
     }
 
-    /// Updates the state by what is known at `now`.
+    /// Updates the state from the observations at `now`.
     fn review(&mut self, now: Instant) {
         self.vehicle.review_choice(now);
         let before = self.state;
@@ -380,24 +386,24 @@ impl Autopilot {
         self.events.state = Some(self.state);
         self.located_at = None;
         self.target = match self.state {
-            // It begins where the drone is, which may have drifted while it was blind.
+            // The target starts at the drone's position, which may have drifted while the link was blind.
             State::Engaged => self.at_own_place(now),
             State::Blind => self.target,
             State::Silent | State::Grounded | State::Standby => None,
         };
         self.stop = None;
         let line = match (before, self.state) {
-            (State::Blind, State::Engaged) => "relay: position is back",
+            (State::Blind, State::Engaged) => "relay: position restored",
             (_, State::Engaged) => {
                 self.streams.renew();
-                "relay: flies to its place"
+                "relay: engaged, flies to position"
             }
             (_, State::Blind) => {
                 self.blind_at = Some(now);
                 if self.vehicle.echo.is_late(now) {
-                    "relay: link is late, keeps its last target"
+                    "relay: link delayed, keeps last target"
                 } else {
-                    "relay: no position, keeps its last target"
+                    "relay: no position, keeps last target"
                 }
             }
             (State::Engaged | State::Blind, State::Standby) => {
@@ -415,7 +421,7 @@ impl Autopilot {
         self.report.tell(Line::info(Topic::Control, line));
     }
 
-    /// Tells a release once its cause is clear.
+    /// Reports a release once its cause is known.
     fn review_release(&mut self, now: Instant) {
         let Some((mut release, until)) = self.release else {
             return;
@@ -433,7 +439,8 @@ impl Autopilot {
         self.report.tell(line);
     }
 
-    /// Keeps a blind link blind until positions have come for a while, so that it does not change its mind with every other position.
+    /// Keeps a blind link blind until positions are regular for a while. The state then does not alternate with every other
+    /// position.
     fn recover(&mut self, now: Instant, observed: &mut Observed) {
         if self.state != State::Blind {
             self.located_at = None;
@@ -449,7 +456,7 @@ impl Autopilot {
             .is_some_and(|at| now.since(at) >= self.recovery);
     }
 
-    /// The release that has just happened.
+    /// Returns the release that has just happened.
     fn release(&self) -> Release {
         let vehicle = &self.vehicle;
         let mode = vehicle.mode().unwrap_or(FlightMode::Other);
@@ -465,7 +472,7 @@ impl Autopilot {
         Release { cause, mode }
     }
 
-    /// Why the pilot cannot engage the drone now.
+    /// Returns the reason for which the pilot cannot engage the drone now.
     fn wait_reason(&self, now: Instant) -> Option<WaitReason> {
         let vehicle = &self.vehicle;
         let is_px4 = vehicle.kind() == Some(Kind::Px4);
@@ -486,7 +493,7 @@ impl Autopilot {
         }
     }
 
-    /// Tells the firmware and the operator why the drone cannot be engaged, once that has held for a moment.
+    /// Reports the reason for which the drone cannot be engaged, once it has lasted for a moment.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
             self.told_wait = None;
@@ -508,14 +515,14 @@ impl Autopilot {
             ),
             None => (
                 AutopilotEvent::Ready,
-                Line::info(Topic::Wait, "relay: ready, its mode may be chosen"),
+                Line::info(Topic::Wait, "relay: ready, choose the mode"),
             ),
         };
         self.events.waits = Some(event);
         self.report.tell(line);
     }
 
-    /// When the reason to wait is to be told, if it has not been.
+    /// Returns the time at which the reason to wait is reported; `None` if it has been.
     fn wait_told_at(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -534,18 +541,18 @@ impl Autopilot {
         Some(Target::at(position.place, now))
     }
 
-    /// The next frame to send. Call until there is none.
+    /// Returns the next frame to send. Call it until it returns `None`.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
         let now = self.clock.advance(now);
         if now == Instant::from_micros(u64::MAX) {
-            // The clock stands still there, and what is due then stays due.
+            // The signing clock stands still there, and frames that are due stay due.
             return None;
         }
         let frame = self.next_frame(now)?;
         Some(self.trust.sign(now, frame))
     }
 
-    /// The same without a signature.
+    /// Returns the next frame without its signature.
     fn next_frame(&mut self, now: Instant) -> Option<FrameBytes> {
         if let Some((to, result)) = self.clearance.take_answer() {
             let command = CLEAR_LOST;
@@ -584,7 +591,7 @@ impl Autopilot {
         Some(frame)
     }
 
-    /// Returns the target that is due.
+    /// Returns the due target.
     fn next_target(&mut self, now: Instant) -> Option<FrameBytes> {
         let kind = self.vehicle.kind()?;
         let is_overdue = |target: Target| now.since(target.due) > OVERDUE;
@@ -595,7 +602,7 @@ impl Autopilot {
             return None;
         }
         if self.state == State::Standby && kind == Kind::Px4 {
-            // The present place, so that the mode can be taken.
+            // The present position, so that the mode can be entered.
             let due = self.target.map_or(now, |target| target.due);
             if due > now {
                 return None;
@@ -627,7 +634,7 @@ impl Autopilot {
         self.told(now, &target.carrot)
     }
 
-    /// The frame that tells the autopilot to fly there.
+    /// Returns the frame that sets the autopilot's target.
     fn told(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;
@@ -649,7 +656,7 @@ impl Autopilot {
         message.encode(self.own(), self.peer(), sequence)
     }
 
-    /// It is a part of the vehicle: it has the system of its autopilot.
+    /// Returns the address of this component. It has the system number of its autopilot, since it is a part of the vehicle.
     fn own(&self) -> Address {
         Address {
             component: COMPONENT,
@@ -668,32 +675,32 @@ impl Autopilot {
         millis(now.since(self.began).as_micros())
     }
 
-    /// The next place where the drone was, and when: for `Relay::handle_position`. Of several since the last call the newest.
+    /// Returns the newest measured position since the last call. It has its time, and is meant for `Relay::handle_position`.
     pub fn poll_position(&mut self) -> Option<Position> {
         let position = self.position.take()?;
         let at = self.clock.external(position.at);
         Some(Position { at, ..position })
     }
 
-    /// How far from its line the drone is, while it is too far to have a place along it; `None` where it has one, or none was heard of for 3 s.
-    /// Constant work.
+    /// Returns the distance of a drone that is too far from its line to have a place along it. `None` if it has one, or without a
+    /// position for 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.astray.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)
     }
 
-    /// What a SiK radio has heard between frames, by its RADIO_STATUS, and where the drone was in the air: for `Relay::handle_sample`. Of
-    /// several since the last call the newest; without the feature `sensing` none.
+    /// Returns the noise measured by a SiK radio (RADIO_STATUS), with the drone's position. It is meant for `Relay::handle_sample`.
+    /// It is the newest measurement in the air since the last call; without the feature `sensing` there is none.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
     }
 
-    /// Returns the side whose lost relays the operator has cleared: for `Relay::clear_lost`. It is returned once.
+    /// Returns the side whose lost relays the operator has cleared, once: for `Relay::clear_lost`.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
         self.clearance.take_cleared()
     }
 
-    /// The next event.
+    /// Returns the next event.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
         let hears = self.streams.hears();
         let mistrusted = || {
@@ -703,7 +710,7 @@ impl Autopilot {
         self.events.take().or_else(mistrusted)
     }
 
-    /// When to call [`handle_timeout`](Self::handle_timeout) at the latest.
+    /// Returns the latest time of the next [`handle_timeout`](Self::handle_timeout) call.
     pub fn poll_timeout(&self, now: Instant) -> Instant {
         let now = self.clock.internal(now);
         let target = self.target.map(|target| target.due);
@@ -722,29 +729,29 @@ impl Autopilot {
         self.clock.external(due)
     }
 
-    /// Who flies.
+    /// Returns the control state.
     pub const fn state(&self) -> State {
         self.state
     }
 
-    /// Whether the relay's setpoint is flown.
+    /// Returns true if the drone flies to the relay's setpoint.
     pub const fn is_flown(&self) -> bool {
         self.state.is_flown()
     }
 
-    /// What came from the autopilot, whole and hurt.
+    /// Returns the counts of intact and broken messages from the autopilot.
     pub const fn counters(&self) -> Counters {
         self.parser.counters()
     }
 
-    /// Has the link sign what it says, and take nothing but what is signed with that key; RADIO_STATUS apart. The autopilot's is set by a
-    /// ground station (SETUP_SIGNING).
+    /// Signs all frames with this key, and accepts only frames signed with it and RADIO_STATUS. A ground station sets the
+    /// autopilot's key (SETUP_SIGNING).
     #[cfg(feature = "mavlink-signing")]
     pub const fn sign(&mut self, signing: Signing) {
         self.trust.sign_with(signing);
     }
 
-    /// Whole frames that were not taken, because of their signatures.
+    /// Returns the number of intact frames that were rejected because of their signatures.
     pub const fn refused(&self) -> u32 {
         self.trust.refused()
     }

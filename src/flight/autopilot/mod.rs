@@ -1,25 +1,25 @@
-//! A PX4 or ArduCopter over a serial port: it is told where to fly, and tells where it is. Sans-IO.
+//! Link to a PX4 or ArduCopter over a serial port: sends targets, receives positions. Sans-IO.
 //!
-//! | file | one idea |
+//! | file | content |
 //! | --- | --- |
-//! | `link` | the link: bytes, setpoints and the time in; frames, places and events out |
-//! | [`state`] | who flies: the table of states |
-//! | `kind` | whose autopilot it is: PX4 or ArduCopter |
-//! | `vehicle` | what the autopilot has said of itself, and what its radio hears |
-//! | `clock` | the autopilot's clock, on the relay's; the relay's own |
-//! | `echo` | how late the link is |
-//! | `mode` | flight modes, why the drone was released, why it cannot be engaged|
-//! | `event` | events that the firmware is told of |
-//! | `exchange` | what the link and the relay hand each other in one turn |
-//! | `streams` | the messages that it is asked for |
-//! | `target` | what it is told to fly to, and how often |
-//! | [`carrot`] | the target on its way to the setpoint |
+//! | `link` | the link: bytes, setpoints and time in; frames, positions and events out |
+//! | [`state`] | control states: the state table |
+//! | `kind` | PX4 or ArduCopter |
+//! | `vehicle` | reports of the autopilot, and the noise that its radio measures |
+//! | `clock` | conversion between the clocks of autopilot and relay |
+//! | `echo` | delay of the link |
+//! | `mode` | flight modes, causes of a release, reasons to wait |
+//! | `event` | events for the firmware |
+//! | `exchange` | exchange between link and relay in one turn |
+//! | `streams` | requests for messages |
+//! | `target` | target of the autopilot, and its repetition |
+//! | [`carrot`] | motion of the target to the setpoint |
 //! | `astray` | a drone that is far from its line |
 //! | `clearance` | the operator's command to clear lost relays |
-//! | `report` | what the operator reads |
-//! | [`trust`] | whom it believes: signatures |
+//! | `report` | texts and numbers for the operator |
+//! | [`trust`] | signatures |
 //!
-//! It never arms, takes off, lands or changes the mode. What it sends as a target is finite and near the mission's line.
+//! The link never arms, takes off, lands or changes the mode. Every target is finite and near the mission's line.
 
 mod astray;
 pub mod carrot;

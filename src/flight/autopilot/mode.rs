@@ -2,22 +2,22 @@
 
 use super::kind::Kind;
 
-/// What the autopilot is doing.
+/// Flight mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FlightMode {
-    /// OFFBOARD or GUIDED: the relay may say where to fly.
+    /// OFFBOARD or GUIDED: the relay sets the target.
     Companion,
-    /// A mode that is flown with the sticks.
+    /// Mode in which the pilot steers with the sticks.
     Sticks,
-    /// It holds its place: Hold, LOITER.
+    /// Hold or LOITER: the drone holds its position.
     Hold,
-    /// It stops and holds its place: BRAKE.
+    /// BRAKE: the drone stops and holds its position.
     Brake,
-    /// It returns: RTL, SMART_RTL.
+    /// RTL or SMART_RTL: the drone returns.
     Return,
-    /// It lands.
+    /// Landing mode.
     Land,
     /// Another mode: a mission, a take-off.
     Other,
@@ -48,7 +48,7 @@ impl FlightMode {
     }
 }
 
-/// Why the drone is not flown by the relay any more.
+/// Reason for which the relay no longer controls the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -59,17 +59,17 @@ pub enum ReleaseCause {
     Failsafe,
     /// The autopilot's fence was breached.
     Fence,
-    /// The link was interrupted or late: a PX4 may be in its failsafe, which a stream of targets would end.
+    /// Interrupted or late link. A PX4 may be in its failsafe, which a stream of targets would end.
     Link,
 }
 
-/// A release: its cause, and the mode that the autopilot has now.
+/// Release of control: its cause, and the present mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Release {
-    /// Why.
+    /// Cause of the release.
     pub cause: ReleaseCause,
-    /// What the autopilot does now.
+    /// Present mode of the autopilot.
     pub mode: FlightMode,
 }
 
@@ -78,8 +78,8 @@ impl Release {
     pub(super) const fn text(self) -> [&'static str; 2] {
         let mode = match self.mode {
             FlightMode::Companion => "relay: released",
-            FlightMode::Sticks => "relay: released to the sticks",
-            FlightMode::Hold => "relay: released, holds its place",
+            FlightMode::Sticks => "relay: released, manual mode",
+            FlightMode::Hold => "relay: released, holds position",
             FlightMode::Brake => "relay: released, BRAKE",
             FlightMode::Return => "relay: released, returns (RTL)",
             FlightMode::Land => "relay: released, lands",
@@ -95,20 +95,20 @@ impl Release {
     }
 }
 
-/// Why the pilot cannot engage the drone, or why the mode was found but not used.
+/// Reason for which the pilot cannot engage the drone, or for which the granted mode was not used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WaitReason {
     /// The autopilot is in its failsafe. It ends when the pilot chooses a mode.
     Failsafe,
-    /// Bytes from the autopilot come late.
+    /// Bytes from the autopilot arrive late.
     Link,
-    /// OFFBOARD or GUIDED was not chosen before this link: another mode has to be chosen first.
+    /// OFFBOARD or GUIDED was chosen before this link started. Another mode has to be chosen first.
     Found,
-    /// No mode that the pilot has chosen was seen yet.
+    /// No mode chosen by the pilot was observed yet.
     Unseen,
-    /// There is no position, or none near the line.
+    /// No position is known, or none near the line.
     Position,
     /// The relay is not ready ([`handle_ready`](super::Autopilot::handle_ready)).
     NotReady,
@@ -118,12 +118,12 @@ impl WaitReason {
     /// Returns the line for the operator.
     pub(super) const fn text(self) -> &'static str {
         match self {
-            Self::Failsafe => "relay: waits, the autopilot is in a failsafe",
-            Self::Link => "relay: waits, the autopilot's link is late",
-            Self::Found => "relay: waits, take another mode first",
-            Self::Unseen => "relay: waits, no mode was chosen yet",
+            Self::Failsafe => "relay: waits, autopilot in failsafe",
+            Self::Link => "relay: waits, autopilot link delayed",
+            Self::Found => "relay: waits, change the mode first",
+            Self::Unseen => "relay: waits, no mode change seen",
             Self::Position => "relay: waits, no position near the line",
-            Self::NotReady => "relay: waits, not in order with its neighbours",
+            Self::NotReady => "relay: waits, out of order",
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Lines and numbers that an operator reads on a ground station.
+//! Texts and numbers for the operator, shown by a ground station.
 //!
-//! A line is sent at most once in [`SPACING`], and at most [`RECENT`] different lines are. A line that has to wait is replaced by a newer
-//! line of the same [`Topic`], so the last line that an operator reads on a topic is true.
+//! Equal lines are sent at most once per [`SPACING`], and within it at most [`RECENT`] different lines. A waiting line is replaced
+//! by a newer line of the same [`Topic`], so the last line on a topic is always current.
 
 use heapless::{Deque, String, Vec};
 
@@ -12,37 +12,37 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Least time between two equal lines.
+/// Minimum time between two equal lines.
 const SPACING: Duration = Duration::from_millis(10_000);
 
-/// Different lines that are sent within [`SPACING`] at most.
+/// Maximum number of different lines sent within [`SPACING`].
 const RECENT: usize = 16;
 
 /// Capacity of the queue of the link's own lines, and of the queue of the firmware's lines.
 const LINES: usize = 6;
 const TEXTS: usize = 3;
 
-/// From one round of numbers to the next.
+/// Interval between two rounds of numbers.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// What a line is about. A newer line replaces a waiting one of its topic.
+/// Topic of a line. A newer line replaces a waiting one of its topic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Who flies the drone.
+    /// Control of the drone.
     Control,
-    /// Why the mode cannot be taken.
+    /// Reason for which the mode is not used.
     Wait,
-    /// Why the drone does not go toward the neighbour upstream.
+    /// Reason for which the guard holds the drone back, upstream.
     Upstream,
-    /// Why the drone does not go toward the neighbour downstream.
+    /// Reason for which the guard holds the drone back, downstream.
     Downstream,
-    /// An event of the relay.
+    /// Event of the relay.
     Relay,
-    /// The autopilot's fence.
+    /// Fence of the autopilot.
     Fence,
-    /// The operator's command to clear lost relays.
+    /// Command of the operator to clear lost relays.
     Clearance,
 }
 
@@ -50,7 +50,7 @@ impl Topic {
     const COUNT: usize = 7;
 }
 
-/// A line, in two parts.
+/// Line of text, in two parts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Line {
     topic: Topic,
@@ -75,47 +75,47 @@ impl Line {
         }
     }
 
-    /// Returns the line for a change of the reason why the guard holds the relay back on that side.
+    /// Returns the line for a new reason of the guard to hold the relay back on that side.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
-            Side::Upstream => (Topic::Upstream, " the drone before"),
+            Side::Upstream => (Topic::Upstream, " the previous drone"),
             Side::Downstream => (Topic::Downstream, " the next drone"),
         };
         let what = match reason {
-            Some(HoldReason::Unheard) => "relay: waits, has not heard",
+            Some(HoldReason::Unheard) => "relay: waits, no position from",
             Some(HoldReason::Order) => "relay: waits, wrong order with",
-            Some(HoldReason::Close) => "relay: waits, may not yet near",
-            Some(HoldReason::Lost) => "relay: waits, has lost",
-            Some(HoldReason::NotFlown) => "relay: waits for engagement of",
-            Some(HoldReason::Pending) => "relay: waits, no room yet from",
-            Some(HoldReason::Halted) => "relay: halts, wrong order beyond",
+            Some(HoldReason::Close) => "relay: waits, too close to",
+            Some(HoldReason::Lost) => "relay: waits, lost relay near",
+            Some(HoldReason::NotFlown) => "relay: waits, not engaged:",
+            Some(HoldReason::Pending) => "relay: waits for room from",
+            Some(HoldReason::Halted) => "relay: halts, wrong order past",
             None => "relay: no longer waits for",
         };
         Self::warning(topic, [what, whom])
     }
 
-    /// Returns the line for an event of the relay, if operators are told of it.
+    /// Returns the line for an event of the relay; `None` for events that operators do not read.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
-            Event::Infeasible => "relay: no places meet any target",
-            Event::NeighbourLost { .. } => "relay: a neighbour is lost",
-            Event::NoQuorum => "relay: too few others, holds its place",
-            Event::LeaseLapsed => "relay: not certain of the others, holds",
-            Event::Adopted => "relay: a new mission was adopted",
-            Event::UploadRefused { .. } => "relay: refused a mission: line or geofence",
-            Event::IndexTaken { .. } => "relay: its number is used twice",
+            Event::Infeasible => "relay: no target SIR can be met",
+            Event::NeighbourLost { .. } => "relay: neighbour lost",
+            Event::NoQuorum => "relay: no quorum, holds position",
+            Event::LeaseLapsed => "relay: lease expired, holds position",
+            Event::Adopted => "relay: new mission adopted",
+            Event::UploadRefused { .. } => "relay: mission rejected: line or geofence",
+            Event::IndexTaken { .. } => "relay: duplicate relay number",
             _ => return None,
         };
         Some(Self::info(Topic::Relay, text))
     }
 
-    /// FNV-1a.
+    /// Returns the line's FNV-1a hash.
     fn hash(&self) -> u32 {
         hash(self.text)
     }
 }
 
-/// FNV-1a over both parts.
+/// Returns the FNV-1a hash of both parts.
 fn hash(text: [&str; 2]) -> u32 {
     let bytes = text.into_iter().flat_map(str::bytes);
     bytes.fold(0x811C_9DC5, |hash, byte| {
@@ -123,23 +123,23 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
-/// Lines and numbers that have not been sent yet.
+/// Pending lines and numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the lines that were sent, and the earliest time at which each may be sent again.
+    /// Hashes of the sent lines, and the earliest time at which each may be sent again.
     recent: Vec<(u32, Instant), RECENT>,
-    /// The newest line that was sent on each topic.
+    /// Newest line sent on each topic.
     told: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
-    /// How many of the values have been sent in this round.
+    /// Number of values sent in this round.
     sent: usize,
     again_at: Option<Instant>,
 }
 
 impl Report {
-    /// Queues a line. A full queue loses its oldest line.
+    /// Queues a line. A full queue drops its oldest line.
     pub(super) fn tell(&mut self, line: Line) {
         let newest = self.lines.iter().rfind(|other| other.topic == line.topic);
         if newest == Some(&line) {
@@ -148,11 +148,11 @@ impl Report {
         if self.lines.is_full() {
             self.lines.remove(0);
         }
-        // There is room for it.
+        // The queue has room for it.
         let _ = self.lines.push(line);
     }
 
-    /// Queues a line of the firmware; returns true if there was room for it or it waits already.
+    /// Queues a line of the firmware; returns true if it was queued or is already waiting.
     pub(super) fn say(&mut self, text: &str) -> bool {
         let mut line = String::new();
         for character in text.chars() {
@@ -163,14 +163,14 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line of that hash may be sent at `now`, and marks it as sent.
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent.
     fn passes(&mut self, now: Instant, hash: u32) -> bool {
         self.recent.retain(|(_, until)| *until > now);
         self.recent.iter().all(|(of, _)| *of != hash)
             && self.recent.push((hash, now + SPACING)).is_ok()
     }
 
-    /// Removes a line; unlike `Vec::remove`, without a panic where there is none.
+    /// Removes a line; unlike `Vec::remove`, without a panic if there is none.
     fn remove_line(&mut self, at: usize) {
         let mut index = 0;
         self.lines.retain(|_| {
@@ -210,13 +210,13 @@ impl Report {
             if self.passes(now, hash([&text, ""])) {
                 return Some((severity::INFO, text));
             }
-            // There is room for it.
+            // The queue has room for it.
             let _ = self.texts.push_back(text);
         }
         None
     }
 
-    /// Sets the numbers that are sent from now on.
+    /// Sets the numbers to send.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -228,7 +228,7 @@ impl Report {
         }
     }
 
-    /// Returns the next of them, encoded by `encode`.
+    /// Returns the next number, encoded by `encode`.
     pub(super) fn take<T>(
         &mut self,
         now: Instant,

@@ -1,59 +1,60 @@
 //! States of the link to an autopilot.
 //!
-//! | state | what is sent | leaves it |
+//! | state | messages sent | next state |
 //! | --- | --- | --- |
-//! | `Silent` | HEARTBEAT | the autopilot is heard: `Grounded` |
-//! | `Grounded` | and requests for messages, TIMESYNC | silent 3 s: `Silent`; armed and in the air: `Standby` |
-//! | `Standby` | and, to a PX4 once a mode was chosen and the relay is ready, the present position as a target | silent: `Silent`; on the ground or disarmed: `Grounded`; mode granted after a mode was chosen, position known: `Engaged` |
-//! | `Engaged` | and the target, on its way to the setpoint | silent: `Silent`; on the ground or disarmed: `Grounded`; another mode, or the choice is forgotten: `Standby`; no position for 1 s, or the link of an ArduCopter late: `Blind` |
-//! | `Blind` | and the last target, frozen | as `Engaged`; position known for 1 s, or for 10 s after it was blind in the last minute: `Engaged`, from the drone's own place |
+//! | `Silent` | HEARTBEAT | autopilot received: `Grounded` |
+//! | `Grounded` | also requests for messages, TIMESYNC | nothing received for 3 s: `Silent`; armed and in the air: `Standby` |
+//! | `Standby` | also, to a PX4 once a mode was chosen and the relay is ready, the present position as a target | nothing received: `Silent`; on the ground or disarmed: `Grounded`; mode granted after a mode was chosen, position known: `Engaged` |
+//! | `Engaged` | also the target, on its way to the setpoint | nothing received: `Silent`; on the ground or disarmed: `Grounded`; another mode, or the choice was cleared: `Standby`; no position for 1 s, or the link of an ArduCopter late: `Blind` |
+//! | `Blind` | also the last target, frozen | as `Engaged`; position known for 1 s, or for 10 s if it was blind in the last minute: `Engaged`, from the drone's own position |
 //!
-//! *A mode was chosen* is an observation of this link, which no memory of an earlier one replaces:
+//! *A mode was chosen* is an observation of this link. It is not stored across restarts:
 //!
-//! | autopilot | it is set by a heartbeat that is not late, in a mode | it is forgotten at |
+//! | autopilot | set by a heartbeat that is not late, in a mode | cleared at |
 //! | --- | --- | --- |
-//! | PX4 | other than OFFBOARD, `system_status` ACTIVE (4) | start, restart, disarming; `system_status` CRITICAL (5) or above; nothing heard for 0.8 s; no echo of the last 1.5 s; a position that comes 1 s late; a target that is sent 0.6 s late |
+//! | PX4 | other than OFFBOARD, `system_status` ACTIVE (4) | start, restart, disarming; `system_status` CRITICAL (5) or above; nothing received for 0.8 s; no echo of the last 1.5 s; a position that arrives 1 s late; a target that is sent 0.6 s late |
 //! | ArduCopter | other than GUIDED, not CRITICAL | start, restart, disarming; no heartbeat for 3 s |
 //!
-//! So a link that finds OFFBOARD or GUIDED granted engages nothing and streams nothing: the pilot chooses another mode first, and is told so.
-//! A PX4's failsafe is ended by the pilot's choice of a mode alone. Nothing else changes a state: no setpoint, no message of a neighbour.
+//! A link that finds OFFBOARD or GUIDED granted therefore engages nothing and sends no targets. The pilot has to choose another
+//! mode first, and is told so. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
+//! and no message of a neighbour.
 
-/// Who flies.
+/// Control state of the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
-    /// No autopilot is heard.
+    /// No autopilot is received.
     #[default]
     Silent,
     /// The drone is on the ground, or not armed.
     Grounded,
-    /// It is in the air, and somebody else flies it.
+    /// Drone in the air that is not controlled by the relay.
     Standby,
-    /// It flies to the relay's setpoint.
+    /// Controlled by the relay: the drone flies to its setpoint.
     Engaged,
-    /// It would, but nobody knows where it is: it keeps the last target.
+    /// Controlled by the relay without a known position: the last target is kept.
     Blind,
 }
 
-/// What the state follows from.
+/// Observations that determine the state.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "what is seen of an autopilot, each for itself"
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Observed {
-    /// The autopilot was heard within 3 s.
+    /// True if the autopilot was received within 3 s.
     pub(super) there: bool,
-    /// Armed, and in the air.
+    /// True if the drone is armed and in the air.
     pub(super) flying: bool,
-    /// The mode lets a companion say where to fly, and the pilot has chosen it before this link.
+    /// True if the pilot has chosen the mode in which a companion sets the target. The choice was made since this link started.
     pub(super) granted: bool,
-    /// The position is known.
+    /// True if the position is known.
     pub(super) located: bool,
 }
 
 impl State {
-    /// The state after `observed`.
+    /// Returns the state after `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
             there,
@@ -64,7 +65,7 @@ impl State {
         match self {
             _ if !there => Self::Silent,
             _ if !flying => Self::Grounded,
-            // One step at a time: each state sends what it has to before the next.
+            // One transition per call: each state sends its messages before the next one.
             Self::Silent => Self::Grounded,
             Self::Grounded => Self::Standby,
             _ if !granted => Self::Standby,
@@ -74,7 +75,7 @@ impl State {
         }
     }
 
-    /// Whether the relay's setpoint is flown.
+    /// Returns true if the drone flies to the relay's setpoint.
     pub const fn is_flown(self) -> bool {
         matches!(self, Self::Engaged)
     }

@@ -1,35 +1,36 @@
-//! Messages that the autopilot is asked for (SET_MESSAGE_INTERVAL). It is asked again when they come too seldom: another ground station may
-//! have changed their rate. It is asked no more for what it has said it does not send, or what never comes.
+//! Requests for messages of the autopilot (SET_MESSAGE_INTERVAL). A request is repeated when the message arrives too seldom, since
+//! another ground station may have changed its rate. Messages that the autopilot has denied, or that never arrive, are not
+//! requested any more.
 //!
-//! One request is under way at a time, so that an answer (COMMAND_ACK), which does not say for which message it is, belongs to that request.
+//! One request is outstanding at a time: an answer (COMMAND_ACK) does not name the message, so it belongs to that request.
 
 use super::kind::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Messages are counted for so long before the autopilot is asked again.
+/// Time for which messages are counted before requests are repeated.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
-/// An answer to a request comes within this time, or not at all.
+/// Maximum time until the answer to a request.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Requests in vain for a message that never came, before no more are sent; for one without which nothing is flown, before they are sent
-/// every 16 windows.
+/// Unanswered requests for a message before they end. For a message without which the drone cannot fly they are repeated every 16
+/// windows instead.
 const IN_VAIN: u8 = 4;
 const SELDOM: u8 = 16;
 
-/// Requests without any answer after which the autopilot does not hear the link.
+/// Requests without any answer after which the autopilot does not receive the link.
 const UNANSWERED: u8 = 2;
 
-/// `MAV_RESULT`: the answers after which another request is of no use.
+/// Values of `MAV_RESULT` after which another request has no use.
 const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 
-/// A message, and how often it is to come.
+/// Requested message and its interval.
 struct Asked {
     id: u32,
     interval: Duration,
-    /// False for a message that nothing depends on: of a fence, and of a target, which only an ArduCopter sends, and only while it flies to
-    /// one.
+    /// False for a message that the link can do without. These are the fence, and the target, which only an ArduCopter reports and
+    /// only while it flies to one.
     is_vital: bool,
 }
 
@@ -56,22 +57,22 @@ const ASKED: [Asked; 4] = [
     },
 ];
 
-/// One message's rate.
+/// State of the request for one message.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     asks: bool,
     came: u32,
-    /// Windows in a row in which the message did not come though it was asked for.
+    /// Consecutive windows without the message, though it was requested.
     in_vain: u8,
     is_denied: bool,
 }
 
-/// The messages, and the answers to requests.
+/// Requests for all messages, and the answers.
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
     all: [Stream; ASKED.len()],
     since: Instant,
-    /// Index and time of the request under way.
+    /// Index and time of the outstanding request.
     under_way: Option<(usize, Instant)>,
     unanswered: u8,
     is_answered: bool,
@@ -103,7 +104,7 @@ impl Streams {
         }
     }
 
-    /// Takes the answer to a request.
+    /// Processes the answer to a request.
     pub(super) fn answer(&mut self, result: u8) {
         self.is_answered = true;
         if let Some((which, _)) = self.under_way.take()
@@ -114,7 +115,7 @@ impl Streams {
         }
     }
 
-    /// Returns whether the autopilot hears the link, once that is known.
+    /// Returns true if the autopilot answers requests, false if it does not; `None` while that is unknown.
     pub(super) const fn hears(&self) -> Option<bool> {
         if self.is_answered {
             Some(true)
@@ -125,7 +126,7 @@ impl Streams {
         }
     }
 
-    /// Asks again for what came less than half as often as asked.
+    /// Schedules requests for messages that arrived less than half as often as requested.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         let passed = now.since(self.since);
         if passed < WINDOW {
@@ -149,7 +150,7 @@ impl Streams {
         self.since = now;
     }
 
-    /// Asks anew for what the autopilot flies to: it comes only in the companion's mode.
+    /// Requests the reported target again: an ArduCopter sends it only in the companion's mode.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(ASKED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;
@@ -167,7 +168,7 @@ impl Streams {
             .map_or(window, |at| at.min(window))
     }
 
-    /// Returns the next message to ask for, and µs from one to the next.
+    /// Returns the next message to request, and its interval in µs.
     pub(super) fn take(&mut self, now: Instant, kind: Kind) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.under_way {
             if now.since(at) < ANSWER {

@@ -1,4 +1,4 @@
-//! What the autopilot is told to fly to: when it is told, and whether it flies there.
+//! Target of the autopilot: the times at which it is sent, and the comparison with the reported target.
 
 use super::carrot::Carrot;
 use super::kind::Kind;
@@ -7,44 +7,46 @@ use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// From one target to the next while it moves, and while it stands. A PX4 leaves its mode when it hears none for a second.
+/// Intervals between two targets, while it moves and while it stands. A PX4 leaves its mode after a second without a target.
 const MOVING: Duration = Duration::from_millis(100);
 const STANDING: Duration = Duration::from_millis(200);
 
-/// An ArduCopter is told a place again until it has said that it flies there: repetition makes it wobble.
+/// Interval between repetitions to an ArduCopter until it has reported the target. More frequent repetition makes it wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// An ArduCopter says twice a second what it flies to. As many times in a row elsewhere, and it was told for as long: that is an event.
+/// Consecutive reports of another target before an event is raised. An ArduCopter reports its target twice a second; the target
+/// must also have been sent for as long.
 const REFUSED_AFTER: u8 = 6;
 const TOLD_FOR: Duration = Duration::from_millis(3_000);
 
-/// How far what an ArduCopter says it flies to may be from the carrot: standing, 1e-7 degrees; moving, m, and s at the carrot's speed.
+/// Tolerance between the reported target of an ArduCopter and the carrot. Standing: 1e-7 degrees; moving: m, and s at the carrot's
+/// speed.
 const TAKEN_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
 
-/// A place is told so often to an autopilot that never says what it flies to.
+/// Number of repetitions of a standing target to an autopilot that never reports its target.
 const UNCONFIRMED: u8 = 10;
 
-/// What the autopilot is given to fly to.
+/// Target that is sent to the autopilot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// How often it has been told the place where it ends.
+    /// Number of times that the final position has been sent.
     told: u8,
-    /// True once the autopilot has said that it flies there.
+    /// True once the autopilot has reported this target.
     is_taken: bool,
-    /// Since when targets are told.
+    /// Time since which targets are sent.
     since: Instant,
-    /// How often in a row the autopilot has said that it flies elsewhere.
+    /// Number of consecutive reports of another target.
     elsewhere: u8,
-    /// True once the autopilot has said where it flies to.
+    /// True once the autopilot has reported any target.
     is_said: bool,
 }
 
 impl Target {
-    /// One that stands there, and has not been told.
+    /// Creates a standing target that has not been sent.
     pub(super) const fn at(place: Placement, now: Instant) -> Self {
         Self {
             carrot: Carrot::at(place, now),
@@ -57,16 +59,16 @@ impl Target {
         }
     }
 
-    /// It is to end elsewhere, which has not been told.
+    /// Restarts the counts after a change of the final position, which has not been sent.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.told = 0;
         self.is_taken = false;
     }
 
-    /// Takes what the autopilot says it flies to. Returns true where it has been told long enough and flies elsewhere, once.
+    /// Compares the autopilot's reported target. Returns true, once, if it differs although the target was sent long enough.
     ///
-    /// While the target moves, what the autopilot flies to may be behind it by the time between two messages.
+    /// While the target moves, the report may lag behind it by the time between two messages.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
         self.is_said = true;
         let Some(point) = axis.point(self.carrot.place) else {
@@ -89,7 +91,7 @@ impl Target {
             let off = |a: f32, b: f32| (a - b).abs() <= within;
             off(said.x_m, self.carrot.place.x_m) && off(said.y_m, self.carrot.place.y_m)
         });
-        // A standing target is taken exactly, or not.
+        // A standing target is reported exactly, or not at all.
         if is_there || is_near && self.told == 0 {
             self.elsewhere = 0;
             return false;
@@ -102,12 +104,12 @@ impl Target {
         before < REFUSED_AFTER && self.elsewhere >= REFUSED_AFTER
     }
 
-    /// It is told, as the drone's own place.
+    /// Records that the drone's own position was sent as the target.
     pub(super) fn tell_own_place(&mut self, now: Instant) {
         self.due = now + STANDING;
     }
 
-    /// It is due: whether it is told now. The next time follows from whether it stands.
+    /// Returns true if the due target has to be sent now. The next time depends on whether it stands.
     pub(super) fn tell(&mut self, now: Instant, kind: Kind) -> bool {
         let stands = self.carrot.stands();
         self.due = now

@@ -1,8 +1,8 @@
-//! Whom the link believes: anybody, or with a key those that sign with it.
+//! Signature policy of the link. Without a key it accepts every frame, with a key only frames signed with it.
 //!
-//! A link with a key takes what is signed with it and is new, and signs what it says. It takes no other, but RADIO_STATUS: a SiK radio
-//! cannot sign. An autopilot with a key ignores whoever has none, in silence, so the firmware is told of what does not fit, each kind
-//! once: three heartbeats of an autopilot in a row tell that it is no accident.
+//! A link with a key signs its frames and accepts frames that are signed with the key and are new, and unsigned RADIO_STATUS: a SiK
+//! radio cannot sign. An autopilot with a key ignores unsigned frames silently, so the firmware is told of each kind of mismatch,
+//! once. A mismatch is reported after three consecutive heartbeats of an autopilot.
 
 use super::kind::Kind;
 use super::vehicle::AUTOPILOT;
@@ -12,30 +12,30 @@ use crate::flight::mavlink::outgoing::FrameBytes;
 use crate::flight::mavlink::signing::{Flaw, Signing};
 use crate::time::Instant;
 
-/// So many heartbeats in a row are no accident.
+/// Consecutive mismatches before a mismatch is reported.
 const IN_A_ROW: u8 = 3;
 
-/// Why an autopilot and the link do not believe each other.
+/// Mismatch between the signatures of an autopilot and of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// The autopilot signs, the link has no key, and no request of the link was answered: the autopilot seems to ignore what is not signed.
+    /// Signed autopilot, link without a key, no request answered. The autopilot seems to ignore unsigned frames.
     NoKey,
-    /// The autopilot signs, the link has no key, and the autopilot answers the link's requests all the same.
+    /// Signed autopilot, link without a key, requests answered all the same.
     SignsOnly,
-    /// The link has a key, and the autopilot does not sign: it is not heard.
+    /// Link with a key, unsigned autopilot, whose frames are therefore ignored.
     Unsigned,
-    /// They have different keys.
+    /// Different keys of autopilot and link.
     OtherKey,
-    /// The autopilot's frames are of the past: its clock has gone back, or somebody plays what was recorded.
+    /// Old frames of the autopilot: its clock has gone back, or a recording is replayed.
     Old,
 }
 
 impl Mistrust {
     const ALL: [Self; 4] = [Self::NoKey, Self::Unsigned, Self::OtherKey, Self::Old];
 
-    /// A bit of its own.
+    /// Returns the bit of this kind.
     const fn bit(self) -> u8 {
         1 << self as u8
     }
@@ -52,21 +52,21 @@ impl From<Flaw> for Mistrust {
     }
 }
 
-/// The key, and what came that does not fit.
+/// Key of the link, and the mismatches found.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// What was wrong with an autopilot's last heartbeat, and with how many in a row.
+    /// Kind of mismatch of the last heartbeats, and their number in a row.
     row: Option<(Mistrust, u8)>,
-    /// Bits of what is to be told, and of what has been found.
+    /// Bits of pending reports, and of kinds already found.
     due: u8,
     found: u8,
 }
 
 impl Trust {
-    /// The next message of what has come that is to be taken.
+    /// Returns the next received message that is accepted.
     pub(super) fn next_received(&mut self, now: Instant, parser: &mut Parser) -> Option<Received> {
         loop {
             let taken = parser.next_frame(|received, frame| {
@@ -78,7 +78,7 @@ impl Trust {
         }
     }
 
-    /// Whether a frame counts.
+    /// Returns true if the frame is accepted.
     fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {
@@ -108,7 +108,7 @@ impl Trust {
             return (true, no_key(received));
         };
         match received.message {
-            // It says nothing, or comes from what cannot sign.
+            // The frame is no heartbeat, or its sender cannot sign.
             None | Some(Incoming::RadioStatus { .. }) => (true, None),
             Some(_) => match signing.check(now, received, frame) {
                 Ok(()) => (true, None),
@@ -123,18 +123,18 @@ impl Trust {
         (true, no_key(received))
     }
 
-    /// With a key from now on.
+    /// Signs and checks with this key from now on.
     #[cfg(feature = "mavlink-signing")]
     pub(super) const fn sign_with(&mut self, signing: Signing) {
         self.signing = Some(signing);
     }
 
-    /// How many frames were not taken.
+    /// Returns the number of rejected frames.
     pub(super) const fn refused(&self) -> u32 {
         self.refused
     }
 
-    /// The frame as it is to be sent.
+    /// Returns the frame with a signature, if the link has a key.
     pub(super) fn sign(&mut self, now: Instant, frame: FrameBytes) -> FrameBytes {
         #[cfg(feature = "mavlink-signing")]
         if let Some(signing) = &mut self.signing {
@@ -145,7 +145,7 @@ impl Trust {
         frame
     }
 
-    /// Returns what the firmware is to be told next. `hears` says whether the autopilot answers requests, once that is known.
+    /// Returns the next mismatch to report. `hears` is true if the autopilot answers requests, `None` while that is unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL
@@ -163,7 +163,7 @@ fn no_key(received: &Received) -> Option<Mistrust> {
     received.is_signed.then_some(Mistrust::NoKey)
 }
 
-/// Whether an autopilot says that it is there.
+/// Returns true for a heartbeat of an autopilot.
 fn is_heartbeat(received: &Received) -> bool {
     let of_autopilot = |message| matches!(message, Incoming::Heartbeat { kind, autopilot, .. } if Kind::of(autopilot, kind).is_some());
     received.from.component == AUTOPILOT && received.message.is_some_and(of_autopilot)

@@ -14,68 +14,68 @@ use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// An autopilot that has said nothing for so long is gone.
+/// Silence after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// A position older than this is none.
+/// Maximum age of a position that is used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// A PX4 that hears no target for a second is in its failsafe. A target is sent every 0.2 s, so a link that was interrupted for longer than
-/// this may have been the cause of one.
+/// Silence of the link that may have caused a failsafe of a PX4. A PX4 enters its failsafe after a second without a target, and a
+/// target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
-/// A position is said within this time after it was measured.
+/// Maximum time between the measurement of a position and its message.
 const MEASURED: Duration = Duration::from_millis(300);
 
-/// The component that is the autopilot.
+/// Component number of the autopilot.
 pub(super) const AUTOPILOT: u8 = 1;
 
-/// `MAV_MODE_FLAG`.
+/// Flags of `MAV_MODE_FLAG`.
 const CUSTOM_MODE: u8 = 1;
 const ARMED: u8 = 128;
 
-/// `MAV_LANDED_STATE`.
+/// Values of `MAV_LANDED_STATE`.
 const IN_AIR: u8 = 2;
 const LANDING: u8 = 4;
 
-/// `MAV_STATE`: what a PX4 says outside of a failsafe, and in one.
+/// Values of `MAV_STATE`: a PX4 outside of a failsafe, and in one.
 const ACTIVE: u8 = 4;
 const CRITICAL: u8 = 5;
 
-/// Where the drone was, and when.
+/// Measured position of the drone, and its time.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Position {
-    /// When it was there, on the relay's clock.
+    /// Time of the measurement, on the relay's clock.
     pub at: Instant,
-    /// Where, as the mission has it.
+    /// Position in the mission's coordinates.
     pub place: Placement,
-    /// Toward north, east and down, m/s.
+    /// Velocity toward north, east and down, m/s.
     pub velocity_m_s: [f32; 3],
 }
 
-/// What became of a message.
+/// Result of a received message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum VehicleUpdate {
-    /// Not from the autopilot, or of no use.
+    /// Message of another sender, or without new information.
     Nothing,
-    /// It is there, for the first time.
+    /// First message of an autopilot.
     Found,
-    /// It was switched off and on.
+    /// Restart of the autopilot.
     Restarted,
-    /// Something is known that was not.
+    /// New information that changes the state.
     News,
-    /// Where the drone is.
+    /// Position of the drone.
     Position(Position),
-    /// Where the drone is, too far from the line to have a place along it.
+    /// Position of the drone, too far from the line for a place along it.
     OffLine(Geodetic),
-    /// Where the drone flies to.
+    /// Target that the autopilot reports.
     Target(i32, i32),
-    /// It has answered a request to send a message: with its `MAV_RESULT`.
+    /// Answer to a request for a message, with its `MAV_RESULT`.
     Answer(u8),
 }
 
-/// The autopilot, as far as it is known.
+/// Known state of the autopilot.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "observations that are independent of each other"
@@ -84,28 +84,29 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// When its last message of any kind came.
+    /// Time of the last message of any kind.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the mode is OFFBOARD or GUIDED.
     granted: bool,
-    /// `MAV_STATE`.
+    /// Last `MAV_STATE`.
     status: u8,
     /// True once the mode may be granted: see [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
-    /// True while it is outside of its fence.
+    /// True while the drone is outside of the autopilot's fence.
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// When the last position was measured, wherever it was.
+    /// Measurement time of the last position, near the line or not.
     told_at: Option<Instant>,
     position: Option<Position>,
 }
 
 impl Vehicle {
-    /// Takes a message. Whoever was the first to say that it is an autopilot is the one, for good: another vehicle may be heard through it.
+    /// Processes a message. The first sender that identifies itself as an autopilot is kept for good, since other vehicles may be
+    /// received through it.
     pub(super) fn hear(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
@@ -128,7 +129,7 @@ impl Vehicle {
         if self.address() != Some(from) {
             return VehicleUpdate::Nothing;
         }
-        // A gap counts though nobody looked meanwhile.
+        // A gap counts even if no timeout was handled meanwhile.
         self.review_choice(now);
         self.frame_at = Some(now);
         let heard = self.take(now, message, axis);
@@ -149,7 +150,7 @@ impl Vehicle {
                 let says_mode = base_mode & CUSTOM_MODE != 0;
                 self.granted = says_mode && self.mode() == Some(FlightMode::Companion);
                 let is_armed = base_mode & ARMED != 0;
-                // A flight has ended, and a PX4 that landed by itself is in OFFBOARD again.
+                // A flight has ended. A PX4 that landed by itself is in OFFBOARD again.
                 self.chosen &= is_armed || !self.armed;
                 self.armed = is_armed;
                 if says_mode && !self.granted && !self.is_late(now) {
@@ -159,7 +160,7 @@ impl Vehicle {
                     };
                 }
                 self.review_choice(now);
-                // Whether it is in the air is said anew after each take-off.
+                // The landed state has to be reported again after each take-off.
                 self.in_air &= self.armed;
                 VehicleUpdate::News
             }
@@ -182,7 +183,7 @@ impl Vehicle {
                     self.restart();
                     return VehicleUpdate::Restarted;
                 };
-                // It was said after the question of the last echo, and measured shortly before it was said.
+                // The message was sent after the question of the last echo, and the position was measured shortly before that.
                 let floor = self.echo.floor().map(|at| {
                     Instant::from_micros(at.as_micros().saturating_sub(MEASURED.as_micros()))
                 });
@@ -197,7 +198,7 @@ impl Vehicle {
                     amsl_mm,
                 };
                 let Some(place) = axis.place(point) else {
-                    // Before it has a fix it says 0, 0, which is near no line worth flying.
+                    // Without a fix the position is 0, 0, which is near no line worth flying.
                     return if (lat_e7, lon_e7) != (0, 0) && point.is_valid() {
                         VehicleUpdate::OffLine(point)
                     } else {
@@ -219,7 +220,7 @@ impl Vehicle {
                 self.is_breached = is_breached;
                 VehicleUpdate::News
             }
-            // A question of its own has no time of its own in it.
+            // A question of the autopilot contains no time of this link.
             Incoming::TimeSync {
                 answered: 1..,
                 asked,
@@ -235,12 +236,12 @@ impl Vehicle {
         }
     }
 
-    /// Forgets the pilot's choice of a mode where the autopilot may have changed the mode by itself since, or may do so.
+    /// Clears the pilot's choice of a mode if the autopilot may change the mode by itself. It may also have done so before.
     ///
-    /// A PX4 in its failsafe resumes OFFBOARD by itself once it hears targets. In OFFBOARD it is in its failsafe after a second without one.
-    /// So a PX4 is streamed targets only after it has shown a mode other than OFFBOARD outside of a failsafe, since the link began, since
-    /// the last failsafe, and since the last time that the link was interrupted or late. An ArduCopter changes into no GUIDED by itself:
-    /// it is enough that another mode was seen since the link began and since the last silence.
+    /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its failsafe after a
+    /// second without one. A PX4 is therefore sent targets only after it has reported a mode other than OFFBOARD outside of a
+    /// failsafe: since the link started, since the last failsafe, and since the link was last interrupted or late. An ArduCopter
+    /// does not change to GUIDED by itself. There another mode since the start of the link and since the last silence is enough.
     pub(super) fn review_choice(&mut self, now: Instant) {
         let before = |at: Option<Instant>, limit| at.is_some_and(|at| now.since(at) < limit);
         self.chosen &= match self.kind() {
@@ -255,17 +256,17 @@ impl Vehicle {
         };
     }
 
-    /// Forgets the pilot's choice: targets were not sent when they should have been.
+    /// Clears the pilot's choice, because targets were not sent in time.
     pub(super) const fn unchoose(&mut self) {
         self.chosen = false;
     }
 
-    /// Returns true if what the autopilot says may be older than it seems.
+    /// Returns true if messages of the autopilot may be older than they seem.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         self.echo.is_late(now) || self.told_at.is_none_or(|at| now.since(at) >= STALE)
     }
 
-    /// Returns true once a time stamp of the autopilot was heard.
+    /// Returns true once a time stamp of the autopilot was received.
     pub(super) const fn is_told(&self) -> bool {
         self.told_at.is_some()
     }
@@ -287,7 +288,7 @@ impl Vehicle {
         Some(FlightMode::of(self.kind()?, self.mode))
     }
 
-    /// It was switched off and on: what it said before is void.
+    /// Discards all reports of an autopilot that has restarted.
     fn restart(&mut self) {
         self.heard_at = None;
         self.granted = false;
@@ -300,7 +301,7 @@ impl Vehicle {
         self.position = None;
     }
 
-    /// Places are along another line.
+    /// Converts the positions to another line.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -316,13 +317,13 @@ impl Vehicle {
         self.known.map(|(_, kind)| kind)
     }
 
-    /// Where the drone is, if that is known by now.
+    /// Returns the drone's position if it is known and recent.
     pub(super) fn position(&self, now: Instant) -> Option<Position> {
         self.position
             .filter(|position| now.since(position.at) < STALE && !self.echo.is_late(now))
     }
 
-    /// What the state follows from.
+    /// Returns the observations that determine the state.
     pub(super) fn observed(&self, now: Instant) -> Observed {
         Observed {
             there: self.heard_at.is_some_and(|at| now.since(at) < SILENT),
@@ -332,13 +333,13 @@ impl Vehicle {
         }
     }
 
-    /// Where the drone is, if that is known by now and it is in the air.
+    /// Returns the drone's position if it is known, recent, and in the air.
     pub(super) fn place_in_air(&self, now: Instant) -> Option<Placement> {
         let position = self.position(now)?;
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// When what is known is too old, unless it is said again.
+    /// Returns the time at which the known values expire without new messages.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -351,17 +352,17 @@ impl Vehicle {
     }
 }
 
-/// Whether this crate was built to make anything of it.
+/// True if this crate was built with the feature `sensing`.
 const SENSING: bool = cfg!(feature = "sensing");
 
-/// The newest that nobody has taken.
+/// Newest noise measurement that was not taken yet.
 #[derive(Clone, Debug)]
 pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
 impl RadioNoise {
     pub(super) const NONE: Self = Self(None);
 
-    /// Takes what was received, if it is of that.
+    /// Records the noise of a RADIO_STATUS message.
     pub(super) fn hear(&mut self, now: Instant, received: &Received, vehicle: &Vehicle) {
         if SENSING && let Some(Incoming::RadioStatus { noise, .. }) = received.message {
             let heard = vehicle.place_in_air(now).zip(noise_w(noise));
@@ -369,7 +370,7 @@ impl RadioNoise {
         }
     }
 
-    /// Hands it in.
+    /// Removes the measurement, for the relay.
     pub(super) fn take(&mut self) -> Option<Sample> {
         let (at, power_w) = self.0.take()?;
         Some(Sample::Heard { at, power_w })

@@ -34,7 +34,7 @@ pub const MAX_FRAME: usize = HEADER + MAX_PAYLOAD + CHECKSUM + SIGNATURE;
 /// Incompatible flag of a signed frame.
 pub const SIGNED: u8 = 1;
 
-/// Bitwise CRC: a table would be a kilobyte of flash, and a link to an autopilot carries only some ten kilobytes a second.
+/// Bitwise CRC. A table would take a kilobyte of flash, and a link to an autopilot carries only some ten kilobytes a second.
 static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 
 /// Sender or addressee of a message.
@@ -115,7 +115,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that are read or written, and then messages whose payload may contain frames, which are skipped as a whole.
+/// Messages that are read or written, and messages whose payload may contain frames. The latter are skipped as a whole.
 const TABLE: [Known; 26] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::GLOBAL_POSITION_INT, 104, 28),

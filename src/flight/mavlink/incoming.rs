@@ -1,4 +1,4 @@
-//! Received messages, from the autopilot and from ground stations behind it, and the parser of their frames from a byte stream.
+//! Received messages and the parser of their byte stream. Senders are the autopilot and ground stations behind it.
 //!
 //! After an invalid frame the parser continues with the byte after its first one, so no valid frame behind it is lost. A frame
 //! must have the id of a known message, so few false starts occur in noise and in other messages.
@@ -241,7 +241,7 @@ pub struct Received {
 pub struct Counters {
     /// Valid frames.
     pub frames: u32,
-    /// Known messages with a wrong checksum or unknown incompatible flags: corrupted frames, sometimes other bytes.
+    /// Known messages with a wrong checksum or unknown incompatible flags. Corrupted frames, sometimes other bytes.
     pub broken: u32,
 }
 

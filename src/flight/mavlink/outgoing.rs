@@ -81,7 +81,8 @@ pub enum Outgoing<'a> {
     },
 }
 
-/// `type_mask` of a target: ignored position (bits 0 to 2), velocity (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
+/// Bits of `type_mask` in a target, which mark ignored values. Position (bits 0 to 2), velocity (3 to 5), acceleration (6 to 8),
+/// yaw (10), yaw rate (11).
 mod mask {
     pub(super) const VELOCITY: u16 = 0b11_1000;
     pub(super) const ACCELERATION: u16 = 0b1_1100_0000;

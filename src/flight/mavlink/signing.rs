@@ -118,7 +118,8 @@ impl Signing {
         }
     }
 
-    /// Advances the timestamp to `now`, by at most about an hour per call, because a 64-bit division is a kilobyte of flash.
+    /// Advances the timestamp to `now`, by at most about an hour per call. An exact step would need a 64-bit division, which takes
+    /// a kilobyte of flash.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;

@@ -70,7 +70,7 @@ fn a_start_outside_the_box_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Two relays 1 m apart, with an error of 1 m per report, are not in order, unless they may pass each other.
+/// Two relays 1 m apart, with an error of 1 m per report are out of order. They are in order if they may pass each other.
 #[test]
 fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
@@ -108,7 +108,8 @@ fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     }
 }
 
-/// Two neighbours may each be in order with the relay between them by the error of the reports, but not with each other.
+/// Two neighbours may each be in order with the relay between them by the error of the reports. They need not be in order with each
+/// other.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -131,7 +132,7 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     }
 }
 
-/// A relay on its way that receives a halt stops where it was last reported, and continues when the halt ends or expires.
+/// A relay on its way that receives a halt stops where it was last reported. It continues when the halt ends or expires.
 #[test]
 fn a_relay_that_halts_on_its_way_stops_there() {
     for forgotten in [false, true] {
@@ -170,7 +171,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// A relay that halts on its way into the geofence stops outside: the nearest position inside may be a neighbour's.
+/// A relay that halts on its way into the geofence stops outside. The nearest position inside may be a neighbour's.
 #[test]
 fn a_relay_that_halts_outside_the_box_stops_there() {
     let mut one = One {
@@ -320,8 +321,8 @@ fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// A relay that started beside a silent one moves away to the separation, then across, and stays so far away until the silent one
-/// is cleared; meanwhile it reports the reason.
+/// A relay that started beside a silent one moves away to the separation, then across. It stays so far away until the silent one is
+/// cleared, and reports the reason meanwhile.
 #[test]
 fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     let mut one = One {
@@ -355,7 +356,7 @@ fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
 
-/// A relay out of order with a neighbour that becomes silent stays, and halts the others, until that one is cleared.
+/// A relay out of order with a neighbour that becomes silent stays. It halts the others until that one is cleared.
 #[test]
 fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -384,7 +385,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     }
 }
 
-/// A relay beside one that is not flown waits without halting the chain, if the positions of the two show their order.
+/// A relay beside one that is not flown waits without halting the chain. The positions of the two must show their order.
 #[test]
 fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -412,7 +413,7 @@ fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     }
 }
 
-/// The fence of an association from before a reboot may be far beyond this relay; it is not its owner's position.
+/// The fence of an association from before a reboot may be far beyond this relay. It is not its owner's position.
 #[test]
 fn an_old_fence_says_nothing_of_where_its_owner_is() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -435,7 +436,7 @@ fn an_old_fence_says_nothing_of_where_its_owner_is() {
     }
 }
 
-/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other: relay 2 sends the lower x upstream.
+/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other. Relay 2 sends the lower x upstream.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -483,8 +484,8 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Relay 1 starts beside relay 2, in order with it but for the error of the reports, after relays 2 and 3 have cleared their first fence:
-/// the next fence between these two is the separation beyond relay 1, too (rule 7).
+/// Relay 1 starts beside relay 2 after relays 2 and 3 have cleared their first fence. Relays 1 and 2 are in order but for the error
+/// of the reports. The next fence between these two is the separation beyond relay 1, too (rule 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

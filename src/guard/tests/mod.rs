@@ -459,7 +459,7 @@ fn relays_in_the_wrong_order_stay() {
     );
 }
 
-/// A restarted owner does not know its announced fence: the follower keeps it until it has exchanged messages with the new owner,
+/// A restarted owner does not know its announced fence. The follower keeps it until it has exchanged messages with the new owner,
 /// and ignores old messages afterwards.
 #[test]
 fn a_new_life_is_told_from_an_old_one() {
@@ -500,7 +500,7 @@ fn a_new_life_is_told_from_an_old_one() {
     );
 }
 
-/// A relay out of order with one neighbour grants nothing to the other one: it requests a halt, with an x that does not count.
+/// A relay out of order with one neighbour grants nothing to the other one. It requests a halt, with an x that does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

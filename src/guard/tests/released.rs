@@ -151,7 +151,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// Within the separation along x a relay moves across the line only away from the drone.
+/// Movement across the line within the separation along x is only away from the drone.
 #[test]
 fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
     for (y_m, moves) in [(-30.0, true), (30.0, false)] {
@@ -212,7 +212,7 @@ fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// The neighbour's companion restarted and was not engaged: its old association still limits this relay.
+/// The neighbour's companion restarted and was not engaged. Its old association still limits this relay.
 #[test]
 fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     let mut row = Row::new();
@@ -230,7 +230,7 @@ fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// A flown and silent neighbour makes no room: that is reported after five reminders, and not while the relay moves.
+/// A flown and silent neighbour makes no room. That is reported after five reminders, and not while the relay moves.
 #[test]
 fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
     let mut row = Row::new();
@@ -278,7 +278,8 @@ fn given_back_it_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// The release is repeated until the neighbour has started a new association, even if the pilot has given the drone back.
+/// The release is repeated until the neighbour has started a new association. That holds even if the pilot has given the drone
+/// back.
 #[test]
 fn what_is_lost_is_told_again() {
     let mut row = Row::new();
@@ -303,7 +304,7 @@ fn what_is_lost_is_told_again() {
     assert!(row.all.iter().all(|one| one.guard.is_there()));
 }
 
-/// Late messages from before the pilot took over do not bring the relay back; late releases do not send it away again.
+/// Late messages from before the pilot took over do not bring the relay back. Late releases do not send it away again.
 #[test]
 fn late_messages_say_nothing_of_who_flies() {
     let mut row = Row::new();

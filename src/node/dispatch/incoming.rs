@@ -297,7 +297,7 @@ impl Node {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` at the port `through`; received at both ports, its index is a duplicate.
+    /// Handles a frame of node `from` at the port `through`. Received at both ports, its index is a duplicate.
     pub(crate) fn hear_at_both(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

@@ -1,4 +1,4 @@
-//! Newer missions in flight, exchanged with neighbours and the ground, and measurements from the ground.
+//! Newer missions, exchanged with neighbours and the ground, and measurements from the ground.
 
 use super::Node;
 use crate::event::Event;
@@ -197,7 +197,7 @@ impl Node {
         }
     }
 
-    /// Returns the pending offer to the neighbour at `side`; without a recent hello to answer, a hello that requests one.
+    /// Returns the pending offer to the neighbour at `side`. Without a recent hello to answer, a hello that requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.holds);

@@ -42,7 +42,7 @@ struct Heard {
 }
 
 impl Heard {
-    /// Updates the record with a frame at `now`; a silence of more than `dead_after` or another node restarts it.
+    /// Updates the record with a frame at `now`. A silence of more than `dead_after` or another node restarts it.
     fn again(known: Option<Self>, distance: u16, now: Instant, settings: &Settings) -> Self {
         let since = match known {
             Some(known)
@@ -196,13 +196,13 @@ impl Damping {
         link.back = Some(Heard::again(link.back, distance, now, settings));
     }
 
-    /// Returns true if no candidate has answered since the search began at `since`, at least `probe_after` ago.
+    /// Returns true if no candidate has answered since the search began. It began at `since`, at least `probe_after` ago.
     fn is_gap(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links to those of the link that was lost last, because all of them cross the same gap.
+    /// Raises the losses of all links to those of the link that was lost last. All of them cross the same gap.
     fn share(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -247,7 +247,7 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Returns true if the candidate, heard now, has been heard for `probe_after`, and for `more` if that is longer.
+    /// Returns true if the candidate has been heard for `probe_after`, and for `more` if that is longer. It is heard now.
     pub(super) fn passes(
         &mut self,
         distance: u16,

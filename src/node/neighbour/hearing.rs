@@ -16,7 +16,7 @@ pub(super) struct InRow([u8; CANDIDATES as usize]);
 impl InRow {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts the event `so` for the node `distance` places away; returns true if it is exactly the `most`-th in a row.
+    /// Counts the event `so` for the node `distance` places away. Returns true if it is exactly the `most`-th in a row.
     pub(super) fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
@@ -53,7 +53,7 @@ impl ToldOf {
         nodes: 0,
     };
 
-    /// Returns true if the node `distance` places away has not been reported in this minute, and marks it as reported.
+    /// Returns true if the node `distance` places away has not been reported in this minute. Marks it as reported.
     pub(super) fn tell(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {
@@ -109,7 +109,7 @@ impl Hearing {
     }
 }
 
-/// Candidates with a pending hello, and those whose hello requests an answer: bit 0 is the nearest node.
+/// Candidates with a pending hello, and those whose hello requests an answer. Bit 0 is the nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     owed: u8,
@@ -134,7 +134,7 @@ impl Hellos {
         self.asks = 0x0F;
     }
 
-    /// Returns the distance of the nearest candidate with a pending hello, and true if that requests an answer.
+    /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
     pub(super) fn take(&mut self) -> Option<(u16, bool)> {
         let distance = (1..=CANDIDATES).find(|distance| self.owed & mask(*distance) != 0)?;
         let bit = mask(distance);

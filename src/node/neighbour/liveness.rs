@@ -30,12 +30,13 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, u64::from(QUESTIONS))
 }
 
-/// Returns the interval between questions while many relays of a shared channel have no agreement yet: three or more fit.
+/// Returns the interval between questions while many relays of a shared channel have no agreement yet. Three or more fit.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, 3)
 }
 
-/// Returns the round trip through the chain, shortened so that `least` intervals fit between `probe_after` and `dead_after`.
+/// Returns the round trip through the chain, or a shorter time. At least `least` intervals fit between `probe_after` and
+/// `dead_after`.
 fn paced(settings: &Settings, all: u16, least: u64) -> Duration {
     let span = settings
         .dead_after

@@ -87,7 +87,7 @@ impl Neighbours {
         self.downstream.refuse();
     }
 
-    /// Returns the next pending heartbeat: its side, node, question number, and number of the question that it answers.
+    /// Returns the next pending heartbeat. Its side, node, question number, and number of the question that it answers.
     pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

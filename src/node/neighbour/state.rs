@@ -1,4 +1,4 @@
-//! One side of a relay: selection of the neighbour, and reaction to its silence.
+//! Side of a relay: selection of the neighbour, and reaction to its silence.
 //!
 //! | state | neighbour lost | hello of the neighbour does not name this relay | hello received from another node that hears this relay | timer |
 //! | --- | --- | --- | --- | --- |
@@ -53,7 +53,7 @@ pub(crate) struct Neighbour {
     /// Selected node, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a returned node is no reason for a view: the node on its other side may be about to select it.
+    /// Time before which a returned node is no reason for a view. The node on its other side may be about to select it.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
@@ -66,7 +66,7 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes that have reported hearing this relay.
     pub(super) both_ways: Hearing,
-    /// Neighbour that each node on this side has selected toward this relay, nearest node first; 0 for none.
+    /// Neighbour that each node on this side has selected toward this relay, nearest node first. 0 for none.
     pub(super) taken_by: [u16; CANDIDATES as usize],
     /// Time of the last frame from a node that is not selected.
     near: Option<Instant>,
@@ -223,7 +223,7 @@ impl Neighbour {
         self.found != told
     }
 
-    /// Excuses the silence of a neighbour in the same view; returns true if there is one and it is not lost.
+    /// Excuses the silence of a neighbour in the same view. Returns true if there is one and it is not lost.
     pub(crate) fn excuse(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused =
             self.state == NeighbourState::Linked && self.is_agreed() && self.liveness.excuse(now);
@@ -242,8 +242,8 @@ impl Neighbour {
         self.look_at
     }
 
-    /// Handles a silence; returns true if the neighbour is lost from this moment on, which is not before `dead`. `searches` is
-    /// true if other nodes can be heard here. `asking` replaces the usual interval between questions.
+    /// Handles a silence; returns true if the neighbour is lost from now on. It is not lost before `dead`. `searches` is true if
+    /// other nodes can be heard here. `asking` replaces the usual interval between questions.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -322,7 +322,7 @@ impl Neighbour {
         self.near = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour and sends requests to all candidates.
+    /// Returns the start of the search while this side has no neighbour. It then sends requests to all candidates.
     pub(super) const fn asks_all(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -355,8 +355,8 @@ impl Neighbour {
         }
     }
 
-    /// Considers a node that has sent a hello and is not selected; returns true if it is selected from now on. The candidate
-    /// hears this relay, and has selected this relay or none.
+    /// Considers a node that has sent a hello and is not selected. Returns true if it is selected from now on. The candidate hears
+    /// this relay, and has selected this relay or none.
     pub(crate) fn consider(
         &mut self,
         candidate: Candidate,
@@ -448,7 +448,7 @@ impl Candidate {
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour is certain and differs from the one at the last decision on a proposal.
+    /// Returns true if the neighbour is certain and has changed. The comparison is with the one at the last decision on a proposal.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
@@ -559,7 +559,7 @@ const UNHEARD: u8 = 8;
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if the node `distance` places away and this relay hear each other, and the link is not held down.
+    /// Returns true if the node `distance` places away and this relay hear each other. The link is not held down.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held(now, settings);
         let known = mask(distance) & self.both_ways.recent(now, settings) & !held != 0;
@@ -576,7 +576,7 @@ impl Neighbour {
         self.is_mutual() && self.liveness.is_there() && self.distance > distance
     }
 
-    /// Records a hello of node `distance` places away: the neighbour it has selected, and whether it hears this relay.
+    /// Records a hello of node `distance` places away. The neighbour it has selected, and whether it hears this relay.
     pub(crate) fn says(
         &mut self,
         distance: u16,
@@ -593,13 +593,13 @@ impl Neighbour {
         }
     }
 
-    /// Returns the neighbour that the node `distance` places away has selected toward this relay; 0 for none.
+    /// Returns the neighbour that the node `distance` places away has selected toward this relay. 0 for none.
     pub(crate) fn taken_by(&self, distance: u16) -> u16 {
         let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` places away; `taken` is true if that is the selected node.
+    /// Records an intact frame of the node `distance` places away. `taken` is true if that is the selected node.
     pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
         self.hearing.add(distance, now, settings);
         self.damping.hear(distance, self.asks_all(), now, settings);
@@ -608,13 +608,13 @@ impl Neighbour {
         }
     }
 
-    /// Returns the nodes heard recently whose links are not held down, as a bit mask: bit 0 is the nearest one.
+    /// Returns the nodes heard recently whose links are not held down, as a bit mask. Bit 0 is the nearest one.
     pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Counts the reports of a node that it does not hear this relay; returns true at the last of [`UNHEARD`] in a row.
+    /// Counts the reports of a node that it does not hear this relay. Returns true at the last of [`UNHEARD`] in a row.
     pub(crate) fn says_it_hears(&mut self, distance: u16, heard: bool) -> bool {
         self.unheard.count(distance, !heard, UNHEARD)
     }
@@ -624,7 +624,7 @@ impl Neighbour {
         self.strangers.tell(distance, now)
     }
 
-    /// Counts a handshake that was signed with another key; returns true at the last of [`FORGED`] in a row.
+    /// Counts a handshake that was signed with another key. Returns true at the last of [`FORGED`] in a row.
     pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
@@ -648,7 +648,7 @@ impl Neighbour {
         self.liveness.answered(number)
     }
 
-    /// Returns the pending heartbeat: its node, question number, and number of the question that it answers.
+    /// Returns the pending heartbeat. Its node, question number, and number of the question that it answers.
     pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let Signs { ask, answer } = core::mem::take(&mut self.signs);
         if !(ask || answer != 0) || self.node == 0 {
@@ -663,7 +663,7 @@ impl Neighbour {
         self.hellos.owe(distance, ask);
     }
 
-    /// Returns the distance of the nearest candidate with a pending hello, and true if that requests an answer.
+    /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
     pub(crate) fn take_hello(&mut self) -> Option<(u16, bool)> {
         self.hellos.take()
     }

@@ -22,7 +22,7 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Answer, Message, Moved, Roster, Sweep, Token};
 
-/// Positions evaluated per call of [`Computation::work`] in Algorithm 2; a row of up to 24 more may be added.
+/// Positions evaluated per call of [`Computation::work`] in Algorithm 2. A row of up to 24 more may be added.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
 
 /// True with the features for the methods beyond Algorithm 1; without them their code is unreachable.
@@ -287,7 +287,7 @@ impl Computation {
         }
     }
 
-    /// Returns the completed rounds of Algorithm 2 and the SIR after the last one; `None` except at the leader.
+    /// Returns the completed rounds of Algorithm 2 and the SIR after the last one. `None` except at the leader.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
             LeaderTask::Adjusting(rounds) => Some((rounds.done(), rounds.sir)),
@@ -406,7 +406,7 @@ impl LeaderTask {
     }
 }
 
-/// Hops of the prediction per call of [`Computation::work`], 16 reaches each; in an uneven field a part of one hop.
+/// Hops of the prediction per call of [`Computation::work`], 16 reaches each. In an uneven field a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
 /// Hops per call in an even field, where a reach costs twice as much.

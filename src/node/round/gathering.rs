@@ -208,7 +208,7 @@ impl Computation {
         }
     }
 
-    /// Continues the joint solution with the known profiles; returns its target, linear SIR, when it is complete.
+    /// Continues the joint solution with the known profiles. Returns its target, linear SIR, when it is complete.
     ///
     /// Without a solution this relay keeps its configured position, and the target is 0.
     #[inline(never)]

@@ -242,7 +242,7 @@ impl Round {
         self.circulation.resend();
     }
 
-    /// Returns the pending pass and starts its retransmission timer; `None` if the next relay is not `reachable`.
+    /// Returns the pending pass and starts its retransmission timer. `None` if the next relay is not `reachable`.
     pub(crate) fn take_onward(
         &mut self,
         context: &Context<'_>,

@@ -1,4 +1,4 @@
-//! Sensing pass: it collects the relays' interference measurements, and distributes the leader's interference estimate.
+//! Sensing pass: collects measurements, and distributes the leader's estimate of the interference.
 //!
 //! | event at the leader | action |
 //! | --- | --- |

@@ -24,7 +24,7 @@ use crate::node::circulation::Stragglers;
 pub enum Phase {
     /// Idle: this relay has not received a pass yet.
     Idle,
-    /// The leader computes its first targets.
+    /// The leader is computing its first targets.
     Planning,
     /// A pass or a proposal has been forwarded, and its result is not known yet.
     Waiting,

@@ -226,7 +226,7 @@ impl Sweeping {
         self.stand = None;
     }
 
-    /// Computes a portion of the reaches, and at the last relay the verdict; returns true when all are computed.
+    /// Computes a portion of the reaches, and at the last relay the verdict. Returns true when all are computed.
     ///
     /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&mut self, link: Link<'_>) -> bool {

@@ -108,7 +108,7 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     panic!("it does not end: {all:?}");
 }
 
-/// After the result the leader awaits no reply, so no retransmission may be scheduled.
+/// Checks that the leader, which awaits no reply after the result, schedules no retransmission.
 #[test]
 #[cfg(feature = "sensing")]
 fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {

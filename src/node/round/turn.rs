@@ -170,7 +170,7 @@ impl Turning {
         }
     }
 
-    /// Returns the hops of a relay of `power_w` watts; `after` is its neighbour toward Rx, `None` for relay N.
+    /// Returns the hops of a relay of `power_w` watts. `after` is its neighbour toward Rx, `None` for relay N.
     pub(crate) fn hops(
         &self,
         mission: &Mission,
@@ -192,7 +192,7 @@ impl Turning {
         )
     }
 
-    /// Starts a search around `at` within the altitudes `band`, m; returns false if this pass moves no relay.
+    /// Starts a search around `at` within the altitudes `band`, m. Returns false if this pass moves no relay.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -200,7 +200,7 @@ impl Turning {
         self.search.is_some()
     }
 
-    /// Continues the search by at most `budget` evaluations and a row; ready with the better position, if any.
+    /// Continues the search by at most `budget` evaluations and a row. Ready with the better position, if any.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);

@@ -105,7 +105,7 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members have accepted `view`, if it is the last accepted one, because an agreement in it was received.
+    /// Records that all members have accepted `view` if it is the last accepted one. An agreement in it was received.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -122,7 +122,7 @@ impl ViewChange {
         self.proposed
     }
 
-    /// Returns this relay's place from the leader, from 1, and the number of relays, as of the last proposal.
+    /// Returns this relay's place and the number of relays, as of the last proposal. Places count from 1 at the leader.
     pub(crate) fn counted(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.place, proposed.there.max(proposed.place)))
@@ -206,7 +206,7 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on a proposal that `place` relays have forwarded; `None` if this relay has promised a later one.
+    /// Votes on a proposal that `place` relays have forwarded. `None` if this relay has promised a later one.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -575,7 +575,7 @@ impl Asking {
         }
     }
 
-    /// Requests a view after about `wait`, doubled up to three times by consecutive refusals; after `wait` if anything changes.
+    /// Requests a view after about `wait`, which consecutive refusals double up to three times. A change ends the doubling.
     pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
         self.asks = true;
         let wait = self.jitter.spread(wait);

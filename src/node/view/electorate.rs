@@ -66,7 +66,7 @@ pub(crate) struct Electorate {
 pub(crate) struct Held {
     /// Longest lease of members of this relay's view that rely on this relay.
     pub(crate) lease_left: Duration,
-    /// Accepted view, and the longest lease of members of earlier views; `None` if a member may not have accepted `view`.
+    /// Accepted view, and the longest lease of members of earlier views. `None` if a member may not have accepted `view`.
     pub(crate) view: ViewId,
     pub(crate) rest: Option<Duration>,
 }
@@ -123,8 +123,8 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on `proposal` and returns the poll with this vote; `None` if a later one, or this one, was promised before. `told`
-    /// is the poll so far (`None` at the proposer), `held` the remaining leases of other relays.
+    /// Votes on `proposal` and returns the poll with this vote. `None` if a later one, or this one, was promised before. `told` is
+    /// the poll so far (`None` at the proposer), `held` the remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -212,8 +212,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts the decision on `proposal`, unless a later one was promised; returns true if it was accepted. `view` is the
-    /// decided view, which follows `base`, or `None` for a refusal.
+    /// Accepts the decision on `proposal`, unless a later one was promised. Returns true if it was accepted. `view` is the decided
+    /// view, which follows `base`, or `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -245,8 +245,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second, at most `most`. An unknown time counts
-/// as `most`.
+/// Returns the time until positions of the next view may be used, tenths of a second, at most `most`. An unknown time counts as
+/// `most`.
 pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

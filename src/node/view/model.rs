@@ -38,7 +38,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks chains of `relays` relays with so many cuts, proposals and reboots; `heals`: every state is healed.
+/// Checks chains of `relays` relays with so many cuts, proposals and reboots. `heals`: every state is healed.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,
@@ -573,7 +573,8 @@ impl Check {
         }
     }
 
-    /// Returns true if the relays of `there` are a quorum of the newest view that they know, and of all views decided on since.
+    /// Returns true if the relays of `there` are a quorum of the newest view that they know. They must also be a quorum of all
+    /// views decided on since.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.units.len()).filter(known);
@@ -590,9 +591,9 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until all relays of `there` are in one view of them all and know it to be agreed on. Links
-    /// between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if [`MOST`] are not
-    /// enough.
+    /// Returns the number of proposals until the relays of `there` are in one view. It is a view of them all, and they know it to
+    /// be agreed on. Links between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if
+    /// [`MOST`] are not enough.
     pub(super) fn settles(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {

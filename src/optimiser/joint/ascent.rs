@@ -18,7 +18,7 @@ const RESTRAINED: f32 = 0.05;
 /// Trust region below which the ascent ends.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum slope of the slack by ln gamma, in units of D: hops of a total length D lose half of it per e-fold of the target.
+/// Minimum slope of the slack by ln gamma, in units of D. Hops of a total length D lose half of it per e-fold of the target.
 const LEAST_SLOPE: f32 = 0.3;
 
 /// Initial distance of the target above the ceiling for a repeated probe, in ln gamma.
@@ -120,7 +120,7 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the limit of the slack that counts, m.
+    /// Returns the maximum slack that is counted, m: more slack has no additional value.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
@@ -208,7 +208,7 @@ impl Ascent {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the ascent, with `turn` next, will end no higher than `sigma`; false if there is a penalty.
+    /// Returns true if the ascent, with `turn` next, will end no higher than `sigma`. False if there is a penalty.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -238,7 +238,7 @@ impl Ascent {
         }
     }
 
-    /// Returns the value of a chain that has `slack` for `sigma`; negative slack has a higher weight than positive slack.
+    /// Returns the value of a chain that has `slack` for `sigma`. Negative slack has a higher weight than positive slack.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }

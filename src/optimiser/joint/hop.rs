@@ -42,7 +42,7 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of a reach by the hop's start p (three coordinates) and by the two free coordinates w of its end.
+/// Derivatives of a reach by p and w. p is the hop's start (three coordinates), w the two free coordinates of its end.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -71,7 +71,7 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives for the hop `from` - `to`, with the dependent coordinate first in each triple. `noise` is nu,
+    /// Returns the derivatives for the hop `from` - `to`. The dependent coordinate comes first in each triple. `noise` is nu,
     /// 1/m^2. Returns [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);

@@ -1,4 +1,4 @@
-//! Joint optimum of x, y and altitude that maximises the worst SIR, by differential dynamic programming.
+//! Joint optimum of x, y and altitude for the worst SIR, by differential dynamic programming.
 //!
 //! For a target gamma every hop but the last has its maximum length. So each relay's position follows from that of the relay
 //! before it and from two free numbers within its room, its position across the line. The objective is the slack at the end, by

@@ -1,4 +1,4 @@
-//! Value function: the slack of the rest of a chain as a quadratic in the position of the relay before it.
+//! Value function: the slack of the rest of a chain. It is a quadratic in the position of the relay before that rest.
 //!
 //! The slack is the length by which the chain overshoots Rx for a target; all relays maximise it. Its first and second
 //! derivatives by a relay's position are all that the relays before need to know of those after (Bellman's principle). With the
@@ -20,15 +20,15 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative by the logarithm of the target, m.
     pub(crate) by_target: f32,
-    /// Expected gain of slack by the steps of all relays after it, m: the part proportional to the fraction of the step,
+    /// Expected gain of slack by the steps of all relays after it, m. This part is proportional to the fraction of the step.
     pub(crate) linear: f32,
-    /// and the part proportional to the square of the fraction.
+    /// Part of the expected gain that is proportional to the square of the fraction, m.
     pub(crate) square: f32,
 }
 
 impl Outlook {
-    /// Returns the slack of a last relay at `at`, m, and its derivatives; the last hop is at most `reach_m` long. The slack is
-    /// the spare length of that hop. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
+    /// Returns the slack of a last relay at `at`, m, and its derivatives. The last hop is at most `reach_m` long. The slack is the
+    /// spare length of that hop. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -51,7 +51,7 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty of a relay too close to the interferer: half `weight` near^2, with the slopes of `near`.
+    /// Subtracts the penalty of a relay too close to the interferer. Half `weight` near^2, with the slopes of `near`.
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -136,7 +136,7 @@ fn add(a: Triple, b: Triple, f: f32) -> Triple {
     sum
 }
 
-/// a + (b f + c g)
+/// Returns a + (b f + c g), for each coordinate.
 fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     let mut sum = a;
     for ((cell, b), c) in sum.iter_mut().zip(b).zip(c) {
@@ -157,11 +157,11 @@ pub(crate) struct Policy {
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature that a step is divided by, relative to the largest one; flatter directions are noise.
+/// Minimum curvature that a step is divided by, relative to the largest one. Flatter directions are noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the step within the box that maximises the quadratic of `slope` and `bend` (yy, yh, hh), made concave.
+    /// Returns the step within the box that maximises a quadratic. The quadratic has `slope` and `bend` (yy, yh, hh), made concave.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -232,7 +232,7 @@ impl Policy {
         }
     }
 
-    /// Returns the change of the free coordinates for `share` of the step, after a change of the relay before by `change`.
+    /// Returns the change of the free coordinates for `share` of the step. The relay before has moved by `change`.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;

@@ -1,4 +1,4 @@
-//! One relay of a trial chain: its position, given the hop to it, and its backward pass.
+//! Relay of a trial chain: its position, given the hop to it, and its backward pass.
 //!
 //! Positions across the line are stored in six bytes each, and are limited to the relay's room. The first and the last hop have a
 //! ceiling, and the last one a slack at Rx.
@@ -16,7 +16,7 @@ use crate::sir::{Sender, in_noise, square};
 /// Maximum fraction of the squared reach that is used.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation, so that a small violation remains above the required one.
+/// Factor on the minimum separation. With a small violation the required separation is still kept.
 pub(super) const MARGIN: f32 = 1.0005;
 
 /// Iterations of the tangent for a hop with noise.
@@ -75,8 +75,8 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position at `wanted`, or as close to it as the hop reaches, for `target` and a sender at `from_m` along x.
-    /// `None` if no hop meets the target. x is at most that of Rx.
+    /// Returns the position at `wanted`, or as close to it as the hop reaches. The hop has `target` and a sender at `from_m` along
+    /// x. `None` if no hop meets the target. x is at most that of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -99,9 +99,9 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns `wanted`, or the reachable cross-section closest to it on the line from the best cross-section in the room.
-    /// Reachable means without a step back along x; `None` if nothing is. For c > 1 the reach of a hop is a ball: its centre is
-    /// (p - m) / (c - 1) from the sender's position p, its radius sqrt(c) |p - m| / (c - 1).
+    /// Returns `wanted` or the closest reachable cross-section. It is on the line from the best cross-section in the room.
+    /// Reachable means without a step back along x; `None` if nothing is. For c > 1 the reach of a hop is a ball: its centre is (p
+    /// - m) / (c - 1) from the sender's position p, its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -114,7 +114,7 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns centre and squared radius of the reach at `x_m` or beyond for c > 1; with noise, linearised near `wanted`.
+    /// Returns centre and squared radius of the reach at `x_m` or beyond for c > 1. With noise, linearised near `wanted`.
     fn disk(
         &self,
         target: f32,
@@ -165,7 +165,7 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest reachable position on the path from the sender's cross-section to `wanted`, by bisection.
+    /// Returns the farthest reachable position toward `wanted`, by bisection. The path begins at the sender's cross-section.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.at);
         let way = |share: f32| CrossSection {
@@ -186,7 +186,7 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the cross-section for `share` of `policy`, with the sender at `from`, `change` from its nominal position.
+    /// Returns the cross-section for `share` of `policy`. The sender is at `from`, which is `change` from its nominal position.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -300,7 +300,7 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point within a circle that is closest to `wanted` on the line from `best`; `None` if there is none.
+/// Returns the point within a circle that is closest to `wanted` on the line from `best`. `None` if there is none.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -489,9 +489,9 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the violation of the minimum separation at `to` in squares, m^2, its weight, and its slope by ln gamma. A full hop
-    /// shorter than d_min ends too close to the interferer: |p' - p|^2 = q(|p' - m|^2) / c < d_min^2. With noise this is |p' -
-    /// m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// Returns the violation of the minimum separation at `to`, m^2, its weight, and its slope. The violation is in squares, the
+    /// slope is by ln gamma. A full hop shorter than d_min ends too close to the interferer: |p' - p|^2 = q(|p' - m|^2) / c <
+    /// d_min^2. With noise this is |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);

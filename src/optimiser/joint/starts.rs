@@ -1,4 +1,4 @@
-//! Initial chains of the ascents: they pass the interferer low, in an arch over it, on either side, or beyond it.
+//! Initial chains of the ascents. They pass the interferer low, in an arch over it, on either side, or beyond it.
 //!
 //! A chain is a shortest path in a metric that weights a metre by its proximity to the interferer, so there is a local optimum on
 //! each side of the interferer. The best one depends on the room, the power and the number of relays; all are tried.
@@ -18,17 +18,16 @@ pub(super) enum Start {
     Arch { aside: f32, up: f32 },
     /// Spiral about the interferer: toward a position right above or beside it, and from there to Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Arch without a minimum separation until it is judged by the sweep's rules, which let relays hold back.
+    /// Arch without a minimum separation. The sweep's rules, which let relays hold back, judge it.
     Through { aside: f32, up: f32 },
     /// Arch to the side, with altitudes interpolated between relays with a fixed altitude. Before the first and after the last of
     /// them `level`, or down to Tx and Rx.
     Held { aside: f32, level: bool },
-    /// Relays at the outer corner of the room and one minimum separation beside it, alternately; for relays without room for a
-    /// row.
+    /// Relays at the outer corner of the room and one minimum separation beside it, alternately. For relays without room for a row.
     Turns,
     /// Low, from a target so high that no hop leaps over the interferer.
     Near,
-    /// Relay 1 right above Rx, at the best altitude or lateral offset, and the others on the way down from there.
+    /// Relay 1 right above Rx, at the best altitude or lateral offset. The others are on the way down from there.
     Far,
 }
 
@@ -56,8 +55,8 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spirals: aside and up of the intermediate position, and its distance from the interferer, relative to the geometric mean of
-/// the distances of Tx and Rx.
+/// Spirals: aside and up of the intermediate position, and its distance from the interferer. The distance is relative to the
+/// geometric mean of those of Tx and Rx.
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),
@@ -70,7 +69,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Path about the interferer along which the logarithm of the distance to it changes linearly with the direction.
+/// Path about the interferer. The logarithm of the distance to it changes linearly with the direction.
 struct Way {
     to: Triple,
     angle: f32,
@@ -96,7 +95,7 @@ impl Way {
         }
     }
 
-    /// Returns the end of a hop from `here` whose length is `step` times its end's distance from the interferer.
+    /// Returns the end of a hop from `here`. Its length is `step` times its end's distance from the interferer.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -180,7 +179,7 @@ impl Start {
         })
     }
 
-    /// Returns start `number` for relays with that `room`; `None` after the last, `Some(None)` if it does not apply.
+    /// Returns start `number` for relays with that `room`. `None` after the last, `Some(None)` if it does not apply.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -251,7 +250,8 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from `sigma`, by `step` and then `growth` times as much each time, to a precision of `width`.
+    /// Creates a search downward from `sigma` to a precision of `width`. The first step is `step`, each next one `growth` times as
+    /// long.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -263,7 +263,7 @@ impl Seek {
         }
     }
 
-    /// Creates a search upward from the feasible target `sigma`, by `step` and then three times as much each time.
+    /// Creates a search upward from the feasible target `sigma`. The first step is `step`, each next one three times as long.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -275,7 +275,7 @@ impl Seek {
         }
     }
 
-    /// Records the result of a target, feasible with or without holding back; returns true if there is another to try.
+    /// Records the result of a target, feasible with or without holding back. Returns true if there is another to try.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),

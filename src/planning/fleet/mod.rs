@@ -54,7 +54,7 @@ const DEPTH: f32 = 1e-20;
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// Returns the minimum number of relays for `target` (linear SIR, above 0), at most [`Mission::MAX_RELAYS`].
+    /// Returns the minimum number of relays for `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR above 0.
     ///
     /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive count if
     /// `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay,
@@ -75,7 +75,7 @@ impl Fewest {
 }
 
 impl Most {
-    /// Returns the highest target that any number of relays meets; `None` if it is below 1e-20 of the first hop's ceiling.
+    /// Returns the highest target that any number of relays meets. `None` if it is below 1e-20 of the first hop's ceiling.
     ///
     /// With different altitudes, or a minimum separation, it is a feasible target but not certainly the highest. Work: 33 times
     /// that of [`Fewest::of`].

@@ -1,4 +1,4 @@
-//! One relay with lateral freedom: Theorems 1 and 3 with y free. Not in the paper.
+//! Relay with lateral freedom: Theorems 1 and 3 with y free, which is not in the paper.
 //!
 //! At a position (x, y, h), with c = SIR_1 / A, k = c - 1, q = X^2 + Y^2 and s the ground distance from Rx:
 //!
@@ -88,17 +88,17 @@ pub enum AsideCase {
     Touching,
     /// Maximum of SIR_1, at the lowest altitude: the first hop is the worse one even there.
     Hilltop,
-    /// Above Rx, at the lowest altitude: the first hop is the better one even there.
+    /// Position above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,
     /// Edge of the box with this free coordinate: the unlimited optimum is outside of the corridor.
     Edge(EdgeCoordinate),
-    /// Above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
+    /// Position above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level,
     /// Touching position on a vertical face of the corridor, with noise.
     Wall,
-    /// Position inside the corridor at its lowest or highest altitude, with noise; by a search without a proof of optimality.
+    /// Position inside the corridor at its lowest or highest altitude, with noise. By a search without a proof of optimality.
     Inside,
-    /// Above Rx: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Position above Rx: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned,
 }
 
@@ -118,7 +118,8 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile` in [0, D] and the lateral band, and its case; `None` in a field.
+/// Returns the optimal position of a relay with `profile`, and its case; `None` in a field. The position is in [0, D] and in the
+/// lateral band.
 ///
 /// The mission's band of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the result is
 /// outside of the corridor, at most 272 evaluations of both hops; with noise and lateral room some 13 000 more.
@@ -126,7 +127,8 @@ pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts in [0, D] and both bands, and its case; `None` in a field.
+/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. The position is in [0, D] and in
+/// both bands.
 ///
 /// Work: 48 bisection steps in f64, with noise as many for each. If the result is outside of the corridor, at most 736
 /// evaluations of both hops; with noise and lateral room some 26 000 more.
@@ -281,7 +283,7 @@ impl Plane {
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns the distance of SIR_1's maximum from Tx, relative to that of the interferer on the other side.
+    /// Returns the distance of SIR_1's maximum from Tx. It is relative to that of the interferer on the other side.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {

@@ -1,4 +1,4 @@
-//! Edges and faces of the box of a single relay: best position on an edge, and with noise inside a face.
+//! Edges and faces of the box of a single relay. Best position on an edge, and with noise inside a face.
 //!
 //! # Edge
 //!
@@ -183,7 +183,7 @@ impl Edge {
         best
     }
 
-    /// Returns the best position of the interval [`low`, `high`] without its lower end; each SIR is monotone on it.
+    /// Returns the best position of the interval [`low`, `high`] without its lower end. Each SIR is monotone on it.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -299,7 +299,7 @@ impl Slope {
     }
 }
 
-/// Returns the last t in [`low`, `high`] at which `holds` is true; it is true at `low` and changes once.
+/// Returns the last t in [`low`, `high`] at which `holds` is true. It is true at `low` and changes once.
 fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..NOISY_HALVINGS {

@@ -1,4 +1,4 @@
-//! One relay between Tx and Rx: the position that maximises the worse SIR of its two hops.
+//! Single relay between Tx and Rx: the position that maximises the worse SIR of its two hops.
 //!
 //! | fixed | file | source |
 //! | --- | --- | --- |
@@ -71,7 +71,7 @@ impl Two<'_> {
         }
     }
 
-    /// Returns the better of the two f32 positions at the crossing in [`low`, `high`], where SIR_1 falls below SIR_2.
+    /// Returns the better of the two f32 positions at the crossing. In [`low`, `high`] SIR_1 falls below SIR_2 there.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

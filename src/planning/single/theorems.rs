@@ -1,4 +1,4 @@
-//! One relay above the line from Tx to Rx and one interferer anywhere: Lemma 1, Corollary 1, and Theorems 1 to 3.
+//! Single relay above the line, and one interferer anywhere: Lemma 1, Corollary 1, and Theorems 1 to 3.
 //!
 //! # Given altitude: Corollary 1 and Theorem 1
 //!
@@ -98,7 +98,7 @@ pub enum PlaceCase {
     Hilltop = 6,
     /// x of the crossing beyond the maximum of SIR_1, for X < 0.
     BeyondHill = 7,
-    /// x = D, for X < 0: the first hop is the better one even above Rx, or SIR_1 rises over the whole range.
+    /// x = D, for X < 0: the first hop is the better one even above Rx. SIR_1 may also rise over the whole range.
     HillAboveRx = 8,
     /// x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level = 9,
@@ -120,7 +120,7 @@ impl PlaceCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case; `None` in a field.
+/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case. `None` in a field.
 ///
 /// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
@@ -166,7 +166,7 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
     })
 }
 
-/// Returns the best position at or beyond the maximum that follows the minimum of SIR_1, if that is before `end_m`.
+/// Returns the best position at or beyond the maximum after the minimum of SIR_1. The maximum must be before `end_m`.
 fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
@@ -209,7 +209,7 @@ impl AltitudeCase {
     }
 }
 
-/// Returns the optimal altitude in the mission's band for a relay of `power_w` watts at `x_m`, m in [0, D], and its case.
+/// Returns the optimal altitude in the mission's band, m, and its case. The relay has `power_w` watts and is at `x_m`, in [0, D].
 ///
 /// `None` in a field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one of Lemma 1.
 pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, AltitudeCase)> {
@@ -249,7 +249,7 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if SIR_1 rises with the altitude from the bottom of `band`, and the altitude up to which it rises.
+/// Returns true if SIR_1 rises with the altitude. It rises from the bottom of `band` up to the returned altitude.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -270,13 +270,14 @@ pub enum FreeCase {
     Lowest(PlaceCase),
     /// Highest altitude, by Theorem 1.
     Highest(PlaceCase),
-    /// Above Rx, by Theorem 2.
+    /// Position above Rx, by Theorem 2.
     AboveRx(AltitudeCase),
     /// Touching position of the level lines of both SIRs inside the box, with noise.
     Touching,
 }
 
-/// Returns the optimal position of a relay of `power_w` watts in [0, D] and the mission's band, and its case; `None` in a field.
+/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. The position is in [0, D] and the
+/// mission's band.
 ///
 /// Work: at most 190 evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
@@ -314,8 +315,8 @@ pub struct Guide {
     pub c1: f32,
     /// C_2: above it the first hop is the better one even right above Rx.
     pub c2: f32,
-    /// C_3: above it the first hop is the better one even at the minimum of SIR_1, between Tx and Rx or beyond. `None` for X <=
-    /// 0; with noise, the minimum before the maximum.
+    /// C_3: above it the first hop is the better one even at the minimum of SIR_1. The minimum is between Tx and Rx or beyond.
+    /// `None` for X <= 0; with noise, the minimum before the maximum.
     pub c3: Option<f32>,
 }
 
@@ -344,8 +345,8 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     })
 }
 
-/// Returns the altitudes, m, lower first, at which a relay of `power_w` watts at `x_m` has SIR_1 = SIR_2: the paper's h^- and
-/// h^+.
+/// Returns the altitudes at which SIR_1 = SIR_2, m, lower first: the paper's h^- and h^+. The relay has `power_w` watts and is at
+/// `x_m`.
 ///
 /// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's band. `None` for each that does not
 /// exist, and for both in a field. Constant work.

@@ -1,4 +1,4 @@
-//! One relay without a known interferer: noise only, or a field of interference.
+//! Single relay without a known interferer: noise only, or a field of interference.
 //!
 //! # Noise only
 //!
@@ -110,7 +110,7 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     Some(best)
 }
 
-/// Returns the extrema of E(SIR_1), rising, for a linear Upsilon: the roots of b x^2 + 2 a x - b h^2 = 0.
+/// Returns the extrema of E(SIR_1), rising, for a linear Upsilon. The roots of b x^2 + 2 a x - b h^2 = 0.
 fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);
@@ -126,7 +126,7 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
     [one.min(other), one.max(other)]
 }
 
-/// Runs Algorithm 3 with the step `epsilon` (linear SIR, above 0), from the highest target; `None` without a field.
+/// Runs Algorithm 3 with the step `epsilon` (linear SIR, above 0), from the highest target. `None` without a field.
 ///
 /// It only evaluates positions where E(SIR_2) is one of its targets, so it may miss the optimum of a field that changes much
 /// between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.

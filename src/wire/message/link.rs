@@ -27,7 +27,7 @@ pub struct Hello {
     pub form: bool,
     /// True if the sender has restarted and has not taken part in anything yet.
     pub fresh: bool,
-    /// True if the sender could join between the destination and the destination's neighbour: these two receive each other.
+    /// True if the sender could join between the destination and the destination's neighbour. These two receive each other.
     pub ready: bool,
     /// Number of connected relays from the sender on toward its other side, 1 to 1000.
     pub behind: u16,
@@ -39,7 +39,7 @@ pub struct Hello {
     pub flies: bool,
     /// True if all relays of the sender's view fly that mission, an upload.
     pub whole: bool,
-    /// True if a relay refuses that mission: the sender itself, which then flies another one, or one beyond it.
+    /// True if a relay refuses that mission. The sender itself, which then flies another one, or one beyond it.
     pub refused: bool,
     /// Number for the offer that answers this hello; 0 if the sender accepts none.
     pub nonce: u16,
@@ -52,8 +52,8 @@ impl Hello {
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes mission, neighbour, `behind`, newest view, digest and version of `holds`, nonce, `hears`, and flags from bit 0:
-    /// `ask`, `form`, `fresh`, `ready`, `flies`, `whole`, `refused`.
+    /// Encodes the fields in their order on the wire. Mission, neighbour, `behind`, newest view, digest and version of `holds`,
+    /// nonce, `hears`, and flags from bit 0: `ask`, `form`, `fresh`, `ready`, `flies`, `whole`, `refused`.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
             ask, form, fresh, ..
@@ -114,7 +114,7 @@ impl Hello {
     }
 }
 
-/// Claim of the sender to its node number since its start, or the repetition of such a claim; sent in both directions.
+/// Claim of the sender to its node number since its start, or the repetition of such a claim. Sent in both directions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {

@@ -50,11 +50,11 @@ pub const MAX_BODY: usize = LONG;
 /// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Onward: targets, and the sender's reach for each.
+    /// Onward message: targets, and the sender's reach for each.
     Sweep(Sweep),
-    /// Back: verdict on a sweep. It acknowledges the sweep of the same number.
+    /// Reply to a sweep: its verdict. It acknowledges the sweep of the same number.
     Verdict(Answer),
-    /// Back: the pass of this number has arrived, but has no result yet. Sent in reply to a repeated pass only.
+    /// Reply to a repeated pass: the pass of this number has arrived, but has no result yet.
     Busy {
         /// Number of the pass.
         sweep: u16,
@@ -68,31 +68,32 @@ pub enum Message {
         /// Number of the answered request, 0 for none.
         answer: u16,
     },
-    /// Onward: profiles of the relays up to the sender.
+    /// Onward message: profiles of the relays up to the sender.
     Gather(Roster),
-    /// Back: profiles of the whole chain.
+    /// Reply to a gathering: profiles of the whole chain.
     Gathered(Roster),
-    /// Onward: interference estimate, and measurements of the relays up to the sender.
+    /// Onward message: interference estimate, and measurements of the relays up to the sender.
     Sense(Heard),
-    /// Back: measurements of the relays from the sender on.
+    /// Reply to a sensing pass: measurements of the relays from the sender on.
     Sensed(Heard),
-    /// Onward: token of Algorithm 2.
+    /// Onward message: token of Algorithm 2.
     Token(Token),
-    /// Back: result of a token.
+    /// Reply to a token: its result.
     Moved(Moved),
-    /// Onward: lease renewal by the view's leader.
+    /// Onward message: lease renewal by the view's leader.
     Pulse(Pulse),
-    /// Back: acknowledgement of a lease renewal.
+    /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
     /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Onward: proposal of a new view, which counts the present relays.
+    /// Onward message: proposal of a new view, which counts the present relays.
     Proposal(Proposal),
-    /// Back: decision on a proposal.
+    /// Reply to a proposal: the decision on it.
     Decision(Decision),
     /// Either direction: fence between two neighbours.
     Fence {
-        /// [`digest`](super::digest::digest) of the sender's mission as loaded before flight, combined with its upload's sites.
+        /// Digest of the sender's mission as loaded before flight, combined with its upload's sites. See
+        /// [`digest`](super::digest::digest).
         mission: u16,
         /// State of the fence at the sender.
         fence: Fence,

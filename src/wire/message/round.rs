@@ -33,7 +33,7 @@ pub struct Sweep {
     pub chosen: bool,
     /// Upsilon measured by the sender at its position, 1/W, in a closed loop.
     pub measured_per_w: Option<f32>,
-    /// Reach of the sender for each target, m along x; shorter than the ladder if the upper targets cannot be met.
+    /// Reach of the sender for each target, m along x. Shorter than the ladder if the upper targets cannot be met.
     pub reaches: PerTarget,
 }
 
@@ -406,7 +406,7 @@ fn sir_in_range(sir: f32) -> Option<f32> {
 /// Length of the body: tag, pass id, estimate, sums, receiver's level and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Interference estimate, and measurements: onward of the relays up to the sender, back of those from the sender on.
+/// Interference estimate, and measurements. Onward of the relays up to the sender, back of those from the sender on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass, wrapping.

@@ -33,8 +33,8 @@ pub struct Poll {
     pub proposer: bool,
     /// Remaining lease of members of that view that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until positions of the new view may be used, because of leases of earlier views, in tenths of a second; 65535 if
-    /// unknown.
+    /// Time until positions of the new view may be used, tenths of a second; 65535 if unknown. The cause is leases of earlier
+    /// views.
     pub rest: u16,
     /// Latest successor of that view that a member has accepted; it may have been agreed on.
     pub successor: Option<Successor>,
@@ -80,7 +80,8 @@ pub struct Decision {
     pub base: View,
     /// View to accept: the proposed one, or one that was decided before; `None` without a quorum.
     pub view: Option<View>,
-    /// Time until its positions may be used, because of members of the previous view that were not polled, in tenths of a second.
+    /// Time until the view's positions may be used, tenths of a second. The cause is members of the previous view that were not
+    /// polled.
     pub lease_left: u16,
 }
 

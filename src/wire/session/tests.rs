@@ -63,7 +63,7 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Exchanges all pending handshakes, and returns their number; `counters` are those of `one` and `other`.
+/// Exchanges all pending handshakes, and returns their number. `counters` are those of `one` and `other`.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -243,7 +243,7 @@ fn recorded_handshakes_do_not_drive_out_who_is_known() {
     }
 }
 
-/// A node that restarted without a handshake, or forgot this one, has no session in either direction; `greet` starts one.
+/// A node that restarted without a handshake, or forgot this one, has no session in either direction. `greet` starts one.
 #[test]
 fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();
@@ -374,7 +374,7 @@ fn frames_of_its_own_are_recognised() {
     }
 }
 
-/// Two nodes 2 of one epoch at node 1, which accepts the larger claim and shows that to the smaller one.
+/// Two nodes 2 of one epoch at node 1. Node 1 accepts the larger claim and shows that to the smaller one.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     const FAR: u32 = 1 << 20;
@@ -418,8 +418,8 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     }
 }
 
-/// Node 2 with the larger claim falls silent: after the timeout the smaller claim is accepted, and recordings of the larger one
-/// are rejected until that node itself is received.
+/// Node 2 with the larger claim falls silent. After the timeout the smaller claim is accepted, and recordings of the larger one are
+/// rejected until that node itself is received.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

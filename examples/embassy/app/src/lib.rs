@@ -1,4 +1,4 @@
-//! Application of every board here: reads the configuration block, creates the relay, runs its ports, and logs events and
+//! Application of every board here. Reads the configuration block, creates the relay, runs its ports, and logs events and
 //! setpoints.
 //!
 //! | file | content |

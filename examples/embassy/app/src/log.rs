@@ -29,7 +29,7 @@ pub(crate) fn begins(config: &Config) {
 }
 
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody can send some");
+    warn!("no key: frames are not signed, and anybody in range can send frames");
 }
 
 /// Logs the signing epoch; `kept` is true if it was stored.
@@ -38,45 +38,45 @@ pub(crate) fn signs(epoch: u32, kept: bool) {
         info!("frames are signed, epoch {}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {}; it cannot be kept: raise the epoch of the block before the next start",
+            "frames are signed, epoch {}; it cannot be stored: raise the epoch of the block before the next start",
             epoch
         );
     }
 }
 
 pub(crate) fn unguarded() {
-    warn!(
-        "no sites: no autopilot is told where to fly, and nothing keeps drones apart on their way"
-    );
+    warn!("no sites: no autopilot is controlled, and drones are not kept apart while they move");
 }
 
 /// Logs the line and the speed limit of the autopilot.
 pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
     info!(
-        "the autopilot flies along {} m at {} m/s or less",
+        "autopilot: line of {} m, at most {} m/s",
         along_m, speed_m_s
     );
 }
 
 pub(crate) fn signs_to_autopilot() {
-    info!("frames to the autopilot are signed, and only what is signed with its key counts");
+    info!(
+        "frames to the autopilot are signed, and frames that are not signed with its key are ignored"
+    );
 }
 
 /// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
 pub(crate) fn stands_by(taken: bool) {
     if taken {
-        info!("what was said in the votes on views before holds");
+        info!("votes restored from flash");
     } else {
-        error!("what was said in the votes on views before is of another firmware");
+        error!("votes in flash are of another firmware, and ignored");
     }
 }
 
 /// Logs that storing the votes works again (`kept`) or fails.
 pub(crate) fn votes(kept: bool) {
     if kept {
-        info!("what is said in the votes on views is kept again");
+        info!("votes can be stored again");
     } else {
-        error!("what is said in the votes on views cannot be kept: a reboot in flight forgets it");
+        error!("votes cannot be stored: a reboot in flight loses them");
     }
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn refused(why: Refused) {
         Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),
         Refused::NoFlash => {
             error!(
-                "configuration refused: it has a key, and this board keeps no epoch to sign with"
+                "configuration refused: it has a key, and this board stores no epoch to sign with"
             );
         }
         Refused::NoEpoch => error!("no epoch is left to sign with"),
@@ -129,13 +129,15 @@ pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
     loop {
         match link.next_event().await {
             AutopilotEvent::State(State::Silent) => {
-                warn!("autopilot: silent; look at the cable, the baud rate and MAVLink 2");
+                warn!(
+                    "autopilot: no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2"
+                );
             }
             AutopilotEvent::State(State::Engaged) => {
-                info!("autopilot: flies to the relay's setpoints");
+                info!("autopilot: setpoint control engaged");
             }
             AutopilotEvent::State(State::Blind) => {
-                warn!("autopilot: no position; keeps its last target");
+                warn!("autopilot: no position; keeps the last target");
             }
             AutopilotEvent::Released(release) => warn!("autopilot: released, {}", release),
             AutopilotEvent::Waits(reason) => warn!("autopilot: cannot be engaged, {}", reason),
@@ -146,9 +148,9 @@ pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
                 "relays {} are not cleared: name all lost relays of one side; by MAVLink {}",
                 relays, from
             ),
-            AutopilotEvent::FenceBreached => warn!("autopilot: its fence is breached"),
+            AutopilotEvent::FenceBreached => warn!("autopilot: fence breached"),
             AutopilotEvent::Refused => warn!(
-                "autopilot: does not fly where it is told to; is the place outside its fence?"
+                "autopilot: flies to another target than it was sent; is the setpoint outside its fence?"
             ),
             AutopilotEvent::Mistrusted(why) => error!("autopilot: signatures, {}", why),
             other => info!("autopilot: {}", other),

@@ -32,7 +32,8 @@ fn the_results_have_the_run_that_is_kept() {
     );
 }
 
-/// SLSQP from its best start takes at least twenty times as long, with eight and fifty relays and free altitudes.
+/// Compares SLSQP from its best start with this crate: it takes at least twenty times as long. The scenarios have eight and fifty
+/// relays and free altitudes.
 ///
 /// With lateral room this crate has more than twice as many starts to try.
 #[test]

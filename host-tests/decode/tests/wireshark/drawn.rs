@@ -19,7 +19,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
     around(&body, flags, rng)
 }
 
-/// Returns a frame around a body, with a random header with these flags and a random tag if they are not 0.
+/// Returns a frame around a body. Header and tag are random; `flags` that are 0 leave out the tag.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let first = 0x1000 | rng.random_range(0..4_095_u16);
     let second = flags << 12 | rng.random_range(0..4_095_u16);

@@ -1,4 +1,5 @@
-//! The dissector in `tshark` shows the same names and values as `cargo decode`, for random and damaged frames of every kind.
+//! Comparison of the dissector in `tshark` with `cargo decode`. Both show the same names and values, for random and damaged frames
+//! of every kind.
 //!
 //! Without `tshark` these tests fail and say how to install it.
 #![allow(

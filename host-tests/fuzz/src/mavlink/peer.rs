@@ -1,5 +1,5 @@
-//! Signing autopilot, an attacker without its key, and the expected reaction of a link with a key, by the definition of MAVLink's
-//! signatures.
+//! Signing autopilot and an attacker without its key. The expected reaction of a link with a key follows from the definition of
+//! MAVLink's signatures.
 
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;

@@ -1,4 +1,4 @@
-//! Sensing messages of a malicious neighbour: sums as relays would compute them, or any eighteen numbers.
+//! Sensing messages of a malicious neighbour. Sums as relays would compute them, or any eighteen numbers.
 
 use super::parts::Body;
 use crate::input::Input;

@@ -1,4 +1,4 @@
-//! Offers of a malicious neighbour: the numbers of a whole mission, most of them in range, some equal to the relay's.
+//! Offers of a malicious neighbour. The numbers of a whole mission, most of them in range, some equal to the relay's.
 
 use super::parts::Body;
 
@@ -75,7 +75,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with another interferer, perhaps with altitudes and lateral positions to choose from.
+    /// Appends the paper's mission with another interferer. It may have altitudes and lateral positions to choose from.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));

@@ -221,7 +221,7 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the view's mark, which is added to the mission's digest: the lower half plus the byte-swapped upper half.
+/// Returns the view's mark, which is added to the mission's digest. The lower half plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

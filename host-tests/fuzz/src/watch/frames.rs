@@ -1,4 +1,4 @@
-//! Checks of the frames that a watched relay sends: each is valid, from this relay, and to an existing node.
+//! Checks of the frames that a watched relay sends. Each is valid, from this relay, and to an existing node.
 
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;

@@ -1,4 +1,4 @@
-//! One hop with a fixed sender: the SIR as a function of the receiver's position, and bisections on it.
+//! Hop with a fixed sender: the SIR as a function of the receiver's position, and bisections on it.
 
 use super::link::{Link, meets, received_w};
 
@@ -70,7 +70,7 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a value with the sign of the SIR's slope at `x`, concave in `x` beyond the sender (see [`super`]).
+    /// Returns a value with the sign of the SIR's slope at `x`. It is concave in `x` beyond the sender (see [`super`]).
     ///
     /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of the total disturbance.
     fn rise(&self, x: f64) -> f64 {
@@ -92,7 +92,7 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// Returns the turning points of the SIR from `low` to `high`, both at or beyond the sender, rising; at most two.
+    /// Returns the turning points of the SIR from `low` to `high`, both at or beyond the sender, rising. At most two.
     ///
     /// The SIR is monotone between them. About 60 slope evaluations, with noise 300.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
@@ -130,7 +130,7 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// Returns the last point from `inside` towards `outside` (either direction, metres) at which `holds` is still true.
+/// Returns the last point from `inside` towards `outside` at which `holds` is true. Either direction, metres.
 ///
 /// `holds` must be true at `inside`, false at `outside`, and change once. Exact to adjacent f64 values.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {

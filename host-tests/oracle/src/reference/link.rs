@@ -46,7 +46,7 @@ pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
 }
 
 impl Link {
-    /// Returns the paper's multi-hop scenario: 80 W Tx, `n` 1 W relays at 20 m, 80 W interferer at (500, 400) m, D = 1 km.
+    /// Returns the paper's multi-hop scenario. 80 W Tx, `n` 1 W relays at 20 m, 80 W interferer at (500, 400) m, D = 1 km.
     pub fn paper(n: usize) -> Self {
         let mu_los = path_loss_factor(2e9, 10_f64.powf(0.01));
         Self {

@@ -23,7 +23,7 @@ impl Link {
         }
     }
 
-    /// Returns the target (linear) above which [`Link::feasible`] fails, to 1e-13 relative; `None` as for [`Link::optimum`].
+    /// Returns the target (linear) above which [`Link::feasible`] fails, to 1e-13 relative. `None` as for [`Link::optimum`].
     ///
     /// The optimum itself if all relays share one altitude. Otherwise at most the optimum, and only one of the targets at which
     /// the greedy chain fails: it may fail at a target and succeed at a larger one.
@@ -66,7 +66,7 @@ impl Link {
         Some(near.min(self.sir_rx(self.distance_m)?))
     }
 
-    /// Runs the paper's fixed step: returns the number of targets tried, the feasible one included, and that target (linear).
+    /// Runs the paper's fixed step. Returns the number of targets tried, the feasible one included, and that target (linear).
     ///
     /// The targets are `gamma_0` - i `epsilon`, i = 0, 1, ...; `gamma_0` is the lesser of the SIRs above Tx and above Rx (for X <
     /// 0, of hop 1's best over [0, D] and the SIR above Rx), `epsilon` the step (linear, > 0). `None` if no target is feasible.

@@ -4,7 +4,8 @@ use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
 
 impl Link {
-    /// Returns the farthest position in [`from_x`, D], m, at which relay `k` in 1..=N meets `target` (linear, > 0).
+    /// Returns the farthest position in [`from_x`, D], m, at which relay `k` meets `target`. `k` is in 1..=N; `target` is linear
+    /// and above 0.
     ///
     /// Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None` if no position meets the target. About 60 SIR evaluations, at most
     /// about 150.
@@ -29,7 +30,7 @@ impl Link {
         None
     }
 
-    /// Returns the largest distance from Rx, m, at which the last relay meets `target` (linear, > 0) at Rx; may exceed D.
+    /// Returns the largest distance from Rx, m, at which the last relay meets `target` (linear) at Rx. It may exceed D.
     ///
     /// `None` if the target is missed even above Rx, or is not positive. About 60 SIR evaluations.
     pub fn rx_reach(&self, target: f64) -> Option<f64> {
@@ -45,7 +46,7 @@ impl Link {
         Some(bisect(0.0, outside, meets))
     }
 
-    /// Returns the positions, m, of the chain in which each relay in turn goes as far as `target` (linear, > 0) allows.
+    /// Returns the positions, m, of the chain in which each relay goes as far as `target` (linear) allows.
     ///
     /// `None` if a relay has no position or Rx is out of the last one's reach. The on-board protocol does the same with a target.
     /// If all relays share one altitude, `None` proves that no chain meets the target; otherwise see [`Link::placement`]. N

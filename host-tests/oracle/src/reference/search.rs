@@ -8,7 +8,7 @@ const STEPS: usize = 42;
 const PEAKS: usize = 4;
 
 impl Link {
-    /// Returns the best chain SIR (linear) over all ordered placements, on refined nested grids; 0 without relays.
+    /// Returns the best chain SIR (linear) over all ordered placements, on refined nested grids. 0 without relays.
     ///
     /// `points` (>= 16) is the number of grid points per relay. Never more than the optimum except for rounding; the grid may
     /// miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
@@ -52,7 +52,7 @@ impl Link {
     }
 }
 
-/// Returns the largest value of `f`, sampled at the sorted points `x` and refined around the best few local maxima.
+/// Returns the largest value of `f`. It is sampled at the sorted points `x` and refined around the best few local maxima.
 fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<(f64, f64)> = x.iter().map(|&x| (x, f(x))).collect();
     let place = |i: Option<usize>| i.and_then(|i| samples.get(i)).copied();

@@ -11,7 +11,7 @@ use super::link::{Link, meets};
 type Interval = (f64, f64);
 
 impl Link {
-    /// Returns positions, m, of a chain that meets `target` (linear, > 0), each relay as far toward Rx as possible.
+    /// Returns positions, m, of a chain that meets `target` (linear). Each relay is as far toward Rx as possible.
     ///
     /// `None` only if there is no such chain, whatever the altitudes. Per relay and interval about 300 SIR evaluations; there are
     /// seldom more than three intervals.
@@ -64,7 +64,7 @@ impl Link {
     }
 }
 
-/// Returns the part of [`low`, `high`] on which `holds`, which changes at most once between two of the rising `turns`.
+/// Returns the part of [`low`, `high`] on which `holds`. `holds` changes at most once between two of the rising `turns`.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());

@@ -4,7 +4,7 @@ use super::hop::Hop;
 use super::link::{Link, received_w};
 
 impl Link {
-    /// Returns the SIR (linear) of hop `k` in 1..=N at relay `k` at `x` metres, with its sender at `from_x` metres.
+    /// Returns the SIR (linear) of hop `k` in 1..=N. Relay `k` is at `x` metres, its sender at `from_x` metres.
     ///
     /// Hop 1 is sent by Tx at 0, whatever `from_x`. `None` for any other `k`. Infinite if sender and receiver coincide.
     pub fn sir_relay(&self, k: usize, from_x: f64, x: f64) -> Option<f64> {

@@ -1,4 +1,5 @@
-//! `cargo page`: builds the page as one file, `page/index.html` in the target folder, without a server or external resources.
+//! Builds the page, for `cargo page`, as one file, `page/index.html` in the target folder. The page needs no server and no external
+//! resources.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -24,7 +25,7 @@ const SCRIPTS: [&str; 7] = [
     "page.js",
 ];
 
-/// First run of the page, as in its `wish.js`: its outcome is embedded, so that it is visible before the code is loaded.
+/// First run of the page, as in its `wish.js`. Its outcome is embedded, so that it is visible before the code is loaded.
 const FIRST_OPTIONS: &str = "--uavs 8 --method align";
 const FIRST_SCENARIO: &str = "[geometry]
 distance_m = 1000.0

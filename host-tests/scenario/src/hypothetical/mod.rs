@@ -1,4 +1,4 @@
-//! The hypothetical interferer closest to several: the paper's "Extension to Multiple Sources of Interference".
+//! The hypothetical interferer closest to several. The paper's "Extension to Multiple Sources of Interference".
 //!
 //! Minimises the integral, over [0, D] and the altitude band, of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - the same summed over the
 //! true sources|. The best p_H at a position is a weighted median ([`Raster::weigh`]); the position is searched on a grid, then
@@ -161,7 +161,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     })
 }
 
-/// Returns the starting points: the grid's deepest local minima and the best true sources, in the coordinates of `space`.
+/// Returns the starting points. The grid's deepest local minima and the best true sources, in the coordinates of `space`.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -214,7 +214,7 @@ fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Search space: x in metres, and u = asinh(y / least altitude), linear in y below that altitude and logarithmic above.
+/// Search space: x in metres, and u = asinh(y / least altitude). u is linear in y below that altitude and logarithmic above.
 struct Space {
     distance_m: f64,
     low: f64,

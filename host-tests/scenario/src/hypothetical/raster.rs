@@ -30,7 +30,7 @@ pub struct Raster {
 pub struct Weighed {
     /// Transmit power, W, > 0.
     pub power_w: f64,
-    /// Integral of the absolute difference from the true sum of p / distance^2: W over an area, W/m over a line.
+    /// Integral of the absolute difference from the true sum of p / distance^2. W over an area, W/m over a line.
     pub error: f64,
 }
 
@@ -55,7 +55,7 @@ impl Raster {
         Self::of(scene, &rows, |_| midpoints(0.0, scene.distance_m, columns))
     }
 
-    /// Creates a two-point Gauss rule per cell and direction, with cells that shrink toward sources and `also` (x, y in metres).
+    /// Creates a two-point Gauss rule per cell and direction. Cells shrink toward sources and `also` (x, y in metres).
     ///
     /// At most about `most` points, > 100, unless the number of sources alone requires more.
     pub fn graded(scene: &Scene, also: Option<(f64, f64)>, most: usize) -> Self {

@@ -69,7 +69,7 @@ fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
 mod tests {
     use super::minimise;
 
-    /// Around a narrow pit everything between the corners is higher than they are: only shrinking reaches it.
+    /// Checks a narrow pit, which only shrinking reaches. Everything between the corners is higher than they are.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

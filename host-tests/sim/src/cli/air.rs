@@ -20,15 +20,15 @@ pub struct Air {
     /// Bits per second of every link or of the channel, 300 to 10000000; a byte takes ten bits
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole(300_u32, 10_000_000))]
     baud: u32,
-    /// Silence after which a neighbour is probed, ms, 1 to 1200000, and a third of the silence after which it counts as lost;
-    /// default 5000. Larger values allow more relays on a slow channel
+    /// Silence after which a neighbour is probed, ms, 1 to 1200000; default 5000. After three times as long it counts as lost.
+    /// Larger values allow more relays on a slow channel
     #[arg(long, value_name = "MS", value_parser = whole(1_u64, 1_200_000))]
     probe_after_ms: Option<u64>,
     /// Range of the radios on a shared channel, in relays, 1 to 1000; default 4
     #[arg(long, value_name = "K", conflicts_with = "wires", value_parser = whole(1_usize, 1_000))]
     reach: Option<usize>,
-    /// Mean length of a burst of losses, frames, 1 to 1e6, independent for each direction of a link (Gilbert-Elliott); --loss P
-    /// is the mean share of lost frames; 1 for independent losses, otherwise at least 1 / (1 - P)
+    /// Mean length of a burst of losses, frames, 1 to 1e6 (Gilbert-Elliott). It is independent for each direction of a link; --loss
+    /// P is the mean share of lost frames. 1 for independent losses, otherwise at least 1 / (1 - P)
     #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
     burst: f64,
     /// Relay J does not receive relay I from second S until E, or permanently. Repeatable

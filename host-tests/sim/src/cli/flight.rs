@@ -25,8 +25,9 @@ const HOVER_M: f32 = 1.5;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Drones")]
 pub struct Flight {
-    /// Simulate drones: limited speed and acceleration, position noise, gusts, MAVLink autopilots (PX4 and ArduCopter in turn),
-    /// pilots who take off and hand over, and the guard; the run ends when all flying drones hover at their positions
+    /// Simulate drones: limited speed and acceleration, position noise, gusts, autopilots, pilots, guard. The autopilots speak
+    /// MAVLink (PX4 and ArduCopter in turn), and the pilots take off and hand over. The run ends when all flying drones hover at
+    /// their positions
     #[arg(long)]
     fly: bool,
     /// The pilot of drone I takes over from second S until E, or permanently. Repeatable

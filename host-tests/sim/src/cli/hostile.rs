@@ -28,7 +28,7 @@ pub struct Hostile {
     /// Relays 1 to K and the others do not receive each other from second S until T, or permanently. Repeatable
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
-    /// An attacker sends N forged frames, 1 to 100000: with guessed tags, altered, without tags, with another key
+    /// An attacker sends N forged frames, 1 to 100000. With guessed tags, altered, without tags, with another key
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     forge: Option<u32>,
     /// An attacker replays N received frames, 1 to 100000
@@ -39,14 +39,14 @@ pub struct Hostile {
     /// Sign frames with a key drawn from the seed; default with an attacker or an upload
     #[arg(long, conflicts_with = "no_auth")]
     auth: bool,
-    /// Do not sign frames, even with an attacker; excludes uploads
+    /// Send unsigned frames, even with an attacker; excludes uploads
     #[arg(long)]
     no_auth: bool,
-    /// Connect all relays by one radio channel, which reaches four relays far; default with any of --kill, --boot, --partition,
+    /// Connect all relays by one radio channel, which reaches four relays far. Default with any of --kill, --boot, --partition,
     /// --deaf, --soak, --air, --fly, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
-    /// Connect each relay to its neighbours by wires even then; a failure is reported, but the gap is not closed
+    /// Connect each relay to its neighbours by wires even then. A failure is reported, but the gap is not closed
     #[arg(long)]
     wires: bool,
     #[command(flatten)]
@@ -97,7 +97,7 @@ impl Hostile {
         all.max().unwrap_or(Instant::ZERO)
     }
 
-    /// Checks the options against a chain of `uavs` relays, and against `--closed-loop` if `is_loop` is true.
+    /// Checks the options against a chain of `uavs` relays. If `is_loop` is true, `--closed-loop` is checked, too.
     pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {

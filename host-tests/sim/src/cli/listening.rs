@@ -15,7 +15,7 @@ use super::said::said;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Listening")]
 pub struct Listening {
-    /// Hide the interferers from the relays: each measures the interference at its position once a second, and together they
+    /// Hide the interferers from the relays. Each measures the interference at its position once a second, and together they
     /// estimate an equivalent interferer. The scenario's listening parameters apply, if any
     #[arg(long)]
     listen: bool,

@@ -10,7 +10,7 @@ use super::hostile::Hostile;
 use super::listening::Listening;
 use super::said::said;
 
-/// N simulated relays exchange real frames over simulated links and move to the positions that maximise the SIR of the worst hop
+/// Simulates N relays that exchange real frames and move to the positions with the best worst-hop SIR
 #[derive(Parser, Debug)]
 #[command(name = "chain", bin_name = "cargo chain", disable_version_flag = true)]
 pub struct Options {
@@ -35,8 +35,8 @@ pub struct Options {
     /// Search a grid of columns by rows in `adjust`, 2 to 255 each, instead of from coarse to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub grid: Option<uav_relay::Local>,
-    /// Start a stochastic chain with the value of Upsilon at Rx everywhere, then fly, measure the true field and agree again R
-    /// times, 1 to 100
+    /// Repeat a stochastic run R times, 1 to 100: fly, measure the true field, and agree again. The chain starts with the value of
+    /// Upsilon at Rx everywhere
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = whole(1_u8, 100))]
     pub closed_loop: Option<u8>,
     /// Relative tolerance of the achieved SIR, 1e-6 to 0.1; default 1e-4. Not for the -step methods
@@ -63,10 +63,10 @@ pub struct Options {
     /// Print only one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Draw the chain with each hop's SIR: a side view, and a top view with room or an interferer beside the line
+    /// Draw the chain with each hop's SIR. A side view, and a top view with room or an interferer beside the line
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub svg: Option<PathBuf>,
-    /// Write every transmitted frame to a pcapng capture with virtual times, for `cargo decode` and Wireshark
+    /// Write every transmitted frame to a pcapng capture with virtual times. `cargo decode` and Wireshark read it
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub capture: Option<PathBuf>,
     /// Measurement options.

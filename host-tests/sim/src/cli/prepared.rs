@@ -224,13 +224,13 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
     }
     if let Some(one) = mission::hypothetical(scenario) {
         command::complain(&format!(
-            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m stands for all, and SIRs are against it; `cargo plan` has what \
-             its places are worth against all",
+            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m replaces all, and SIRs are against it; `cargo plan` has the \
+             SIRs against all",
             one.power_w, one.x_m, one.y_m
         ));
         if uploads {
             command::complain(
-                "note: an upload changes that one, and what it leaves out stays as it is",
+                "note: an upload changes that one; all other values stay as they are",
             );
         }
     }

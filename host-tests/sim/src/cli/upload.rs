@@ -24,7 +24,7 @@ pub struct Uploads {
     /// Uploading end of the link; default tx
     #[arg(long, value_name = "END", value_enum)]
     upload_from: Option<End>,
-    /// Do not persist uploads: a rebooted relay starts with the scenario's mission
+    /// Discard uploads at a reboot: a rebooted relay starts with the scenario's mission
     #[arg(long)]
     no_store: bool,
 }

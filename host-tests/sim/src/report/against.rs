@@ -54,8 +54,8 @@ impl AgainstAll {
         let part = 100.0 * all_loss.abs();
         let side = if *all_loss < 0.0 { "above" } else { "below" };
         format!(
-            "against all interferers: SIR {all_sir:.6} ({all_sir_db:.3} dB), {part:.1} % {side} what the relays believe; the best places \
-             against all are those of `cargo plan`\n"
+            "against all interferers: SIR {all_sir:.6} ({all_sir_db:.3} dB), {part:.1} % {side} the relays' estimate; `cargo plan` has the \
+             best positions against all\n"
         )
     }
 }

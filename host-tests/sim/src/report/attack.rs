@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use crate::simulator::attack::Strike;
-use crate::simulator::outcome::{Moment, Outcome, Turning};
+use crate::simulator::outcome::{Moment, Outcome, TimelineEvent};
 
 /// Attacker's frames of one kind.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -115,19 +115,19 @@ impl AttackReport {
                 "every relay ended where it ends without the attack, to the bit"
             ),
             (Some(harm), Some(far)) => writeln!(text, "{harm}, by {far:.3} m at most"),
-            (Some(harm), None) => writeln!(text, "{harm}, and some got no place at all"),
+            (Some(harm), None) => writeln!(text, "{harm}, and some got no position at all"),
         };
         if self.misled > 0 {
             _ = writeln!(
                 text,
-                "on the way, relays took {} places for false targets",
+                "in between, relays flew to {} positions for false targets",
                 self.misled
             );
         }
         if self.formed != self.formed_without {
             _ = writeln!(
                 text,
-                "the chain formed anew {} times, without the attack {}",
+                "views accepted: {}, without the attack {}",
                 self.formed, self.formed_without
             );
         }
@@ -137,7 +137,7 @@ impl AttackReport {
 
 /// Returns the accepted targets as bit patterns.
 fn targets(outcome: &Outcome) -> impl Iterator<Item = u32> {
-    let converged = |moment: &&Moment| moment.what == Turning::Converged;
+    let converged = |moment: &&Moment| moment.what == TimelineEvent::Converged;
     let moments = outcome.moments.iter().filter(converged);
     moments.filter_map(|moment| moment.target.map(f32::to_bits))
 }
@@ -148,7 +148,7 @@ fn formed(outcome: &Outcome) -> u64 {
         .moments
         .iter()
         .filter_map(|moment| match moment.what {
-            Turning::Reformed { view, .. } => Some(view),
+            TimelineEvent::Reformed { view, .. } => Some(view),
             _ => None,
         })
         .collect();

@@ -2,7 +2,7 @@
 
 use super::flown::version;
 use super::timeline::seconds;
-use crate::simulator::outcome::{Ending, Outcome, Turning};
+use crate::simulator::outcome::{Ending, Outcome, TimelineEvent};
 
 /// Returns the reason for a failed run, and the upload that was not adopted, if any.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
@@ -19,7 +19,7 @@ pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
 /// Returns the newest mission version that any relay adopted; 0 for the original mission.
 fn adopted(outcome: &Outcome) -> u16 {
     let versions = outcome.moments.iter().map(|moment| match moment.what {
-        Turning::Adopted(version) => version,
+        TimelineEvent::Adopted(version) => version,
         _ => 0,
     });
     versions.max().unwrap_or(0)
@@ -44,10 +44,7 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
                 silent.join(", ")
             ))
         }
-        Ending::Cut => Some(
-            "the chain is cut: too few relays can reach each other to go on without the others"
-                .to_owned(),
-        ),
+        Ending::NoQuorum => Some("no quorum: too few relays reach each other".to_owned()),
         Ending::OutOfTime => Some(format!(
             "the chain had not settled after {:.0} s",
             seconds(outcome.ended)

@@ -21,7 +21,7 @@ pub struct LostReport {
     /// Last version of the relay's mission; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// Reason: `silent`; `apart` (alive, cannot reach the others); `cut` (alive, no chain is left).
+    /// Reason: `silent`; `apart` (alive, cannot reach the others); `no quorum` (alive, no chain is left).
     pub why: &'static str,
 }
 
@@ -33,7 +33,7 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
         Ending::Broken => return all,
-        Ending::Cut => return Vec::new(),
+        Ending::NoQuorum => return Vec::new(),
         _ => {}
     }
     let living: Vec<_> = all
@@ -71,7 +71,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
             version: outcome.offered().map(|_| relay.version),
             why: match outcome.ending {
                 _ if relay.killed.is_some() => "silent",
-                Ending::Cut => "cut",
+                Ending::NoQuorum => "no quorum",
                 _ => "apart",
             },
         })

@@ -92,17 +92,13 @@ impl ListenedReport {
         _ = match self.believed {
             Some(believed) => writeln!(
                 text,
-                "believed: an interferer of {:.3} W at x = {:.1} m, |y| = {:.1} m, after {} agreements",
+                "estimate: an interferer of {:.3} W at x = {:.1} m, |y| = {:.1} m, after {} agreements",
                 believed.power_w,
                 believed.x_m,
                 believed.y_m.abs(),
                 self.agreements
             ),
-            None => writeln!(
-                text,
-                "believed: nothing, after {} agreements",
-                self.agreements
-            ),
+            None => writeln!(text, "estimate: none, after {} agreements", self.agreements),
         };
         if let Some(sir) = self.true_sir {
             _ = write!(text, "true SIR {sir:.6} ({:.3} dB)", db(sir));

@@ -7,7 +7,7 @@ use serde::Serialize;
 use uav_relay::Instant;
 
 use super::timeline::{list, seconds};
-use crate::simulator::outcome::{Moment, Turning};
+use crate::simulator::outcome::{Moment, TimelineEvent};
 
 /// New view of the chain. All times are virtual time since the start, s.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -96,7 +96,7 @@ pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport>
 fn views(moments: &[Moment]) -> Vec<View> {
     let mut views: BTreeMap<u32, (u16, View)> = BTreeMap::new();
     for (place, moment) in moments.iter().enumerate() {
-        if let Turning::Reformed { view, relays, .. } = moment.what {
+        if let TimelineEvent::Reformed { view, relays, .. } = moment.what {
             let (_, known) = views.entry(view).or_insert_with(|| {
                 let view = View {
                     number: view,
@@ -120,7 +120,7 @@ fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
     // A relay logs the adoption right after the view.
     let story = moments.get(..=view.span.1 + 1).unwrap_or(moments);
     let versions = story.iter().filter_map(|moment| match moment.what {
-        Turning::Adopted(version) if view.members.contains(&moment.relay) => Some(version),
+        TimelineEvent::Adopted(version) if view.members.contains(&moment.relay) => Some(version),
         _ => None,
     });
     versions.max()
@@ -129,12 +129,12 @@ fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
 fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
     moments
         .iter()
-        .find(|moment| moment.what == Turning::Offered(version))
+        .find(|moment| moment.what == TimelineEvent::Offered(version))
 }
 
 /// Returns the time of the event that removed relays from the view, or brought them back.
 fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
-    let of = |relays: &[u16], own: Turning, common: Turning| {
+    let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {
             let mut story = earlier.iter().rev();
             story
@@ -145,16 +145,16 @@ fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
         };
         relays.iter().filter_map(latest).min()
     };
-    let gone = of(lost, Turning::Silent, Turning::Parted);
-    let come = of(back, Turning::Booted, Turning::Healed);
+    let gone = of(lost, TimelineEvent::Silent, TimelineEvent::Partitioned);
+    let come = of(back, TimelineEvent::Booted, TimelineEvent::PartitionEnded);
     gone.into_iter().chain(come).min()
 }
 
 /// Returns the first detection of a lost or returned relay.
 fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
     earlier.iter().find(|moment| match moment.what {
-        Turning::Lost(_) => moment.other.is_some_and(|other| lost.contains(&other)),
-        Turning::Found(_) => {
+        TimelineEvent::Lost(_) => moment.other.is_some_and(|other| lost.contains(&other)),
+        TimelineEvent::Found(_) => {
             back.contains(&moment.relay) || moment.other.is_some_and(|other| back.contains(&other))
         }
         _ => false,
@@ -163,8 +163,9 @@ fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a
 
 /// Returns the last convergence among `members`, if all have converged.
 fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
-    let placed =
-        |moment: &&Moment| moment.what == Turning::Converged && members.contains(&moment.relay);
+    let placed = |moment: &&Moment| {
+        moment.what == TimelineEvent::Converged && members.contains(&moment.relay)
+    };
     let who: BTreeSet<u16> = later
         .iter()
         .filter(placed)
@@ -223,7 +224,7 @@ pub(super) fn text(recoveries: &[RecoveryReport]) -> String {
         } else {
             &format!("{same} times")
         };
-        _ = writeln!(text, "formed anew {times} with the same relays");
+        _ = writeln!(text, "accepted {times} with the same relays");
     }
     text
 }
@@ -237,7 +238,7 @@ impl RecoveryReport {
         if let Some(detected) = self.detected_s {
             _ = write!(
                 text,
-                "formed anew {:.3} s later, ",
+                "view accepted {:.3} s later, ",
                 self.formed_s - detected
             );
         }

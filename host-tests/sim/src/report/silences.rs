@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::timeline::seconds;
-use crate::simulator::outcome::{Outcome, Turning};
+use crate::simulator::outcome::{Outcome, TimelineEvent};
 
 /// Detected failure of a relay.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -31,10 +31,10 @@ pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
             continue;
         };
         match moment.what {
-            Turning::Lost(_) if killed(other) => {
+            TimelineEvent::Lost(_) if killed(other) => {
                 silences.insert((moment.relay, other), seconds(moment.at));
             }
-            Turning::Found(_) => {
+            TimelineEvent::Found(_) => {
                 silences.remove(&(moment.relay, other));
             }
             _ => {}

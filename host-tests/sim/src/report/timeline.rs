@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay::Instant;
 
-use crate::simulator::outcome::{Moment, Turning};
+use crate::simulator::outcome::{Moment, TimelineEvent};
 
 /// Converts to seconds of virtual time since the start.
 pub(super) fn seconds(at: Instant) -> f64 {
@@ -21,9 +21,9 @@ pub struct MomentReport {
     pub relay: u16,
     /// Kind of the entry.
     ///
-    /// `silent`, `on`, `lost`, `found`, `formed`, `cut`, `converged`, `infeasible`, `parted`, `healed`, `deaf`, `hears`,
-    /// `offered`, `held`, `adopted`, `lapsed`, `unheard`, `stranger`, `other key`, `old epoch`, `namesake`; of autopilots
-    /// `engaged`, `released`, `blind`, `restarted`; of relays that measure `believes`, `unclear`, `off`.
+    /// `silent`, `switched on`, `lost`, `found`, `view accepted`, `no quorum`, `converged`, `infeasible`, `partition`, `partition ended`, `does not receive`, `receives again`,
+    /// `offered`, `stored`, `adopted`, `lease expired`, `not received by`, `mission mismatch`, `key mismatch`, `epoch went back`, `duplicate index`; of autopilots
+    /// `engaged`, `released`, `blind`, `restarted`; of relays that measure `new estimate`, `interferer unclear`, `sensor off`.
     pub what: &'static str,
     /// Other node of the entry, for example a lost or found neighbour.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,43 +45,43 @@ pub struct MomentReport {
 impl MomentReport {
     fn of(moment: &Moment) -> Self {
         let what = match moment.what {
-            Turning::Silent => "silent",
-            Turning::Booted => "on",
-            Turning::Lost(_) => "lost",
-            Turning::Found(_) => "found",
-            Turning::Reformed { .. } => "formed",
-            Turning::Cut => "cut",
-            Turning::Lapsed => "lapsed",
-            Turning::Unheard => "unheard",
-            Turning::Stranger => "stranger",
-            Turning::OtherKey => "other key",
-            Turning::OldEpoch => "old epoch",
-            Turning::Namesake => "namesake",
-            Turning::Converged => "converged",
-            Turning::Infeasible => "infeasible",
-            Turning::Parted => "parted",
-            Turning::Healed => "healed",
-            Turning::Deaf => "deaf",
-            Turning::Hears => "hears",
-            Turning::Offered(_) => "offered",
-            Turning::Uploaded(_) => "held",
-            Turning::Adopted(_) => "adopted",
-            Turning::Engaged => "engaged",
-            Turning::Released => "released",
-            Turning::Blind => "blind",
-            Turning::Restarted => "restarted",
-            Turning::Believes => "believes",
-            Turning::Unclear => "unclear",
-            Turning::Off => "off",
+            TimelineEvent::Silent => "silent",
+            TimelineEvent::Booted => "switched on",
+            TimelineEvent::Lost(_) => "lost",
+            TimelineEvent::Found(_) => "found",
+            TimelineEvent::Reformed { .. } => "view accepted",
+            TimelineEvent::NoQuorum => "no quorum",
+            TimelineEvent::LeaseLapsed => "lease expired",
+            TimelineEvent::NotHeard => "not received by",
+            TimelineEvent::MissionMismatch => "mission mismatch",
+            TimelineEvent::KeyMismatch => "key mismatch",
+            TimelineEvent::EpochWentBack => "epoch went back",
+            TimelineEvent::DuplicateIndex => "duplicate index",
+            TimelineEvent::Converged => "converged",
+            TimelineEvent::Infeasible => "infeasible",
+            TimelineEvent::Partitioned => "partition",
+            TimelineEvent::PartitionEnded => "partition ended",
+            TimelineEvent::Deaf => "does not receive",
+            TimelineEvent::Hears => "receives again",
+            TimelineEvent::Offered(_) => "offered",
+            TimelineEvent::Uploaded(_) => "stored",
+            TimelineEvent::Adopted(_) => "adopted",
+            TimelineEvent::Engaged => "engaged",
+            TimelineEvent::Released => "released",
+            TimelineEvent::Blind => "blind",
+            TimelineEvent::Restarted => "restarted",
+            TimelineEvent::NewEstimate => "new estimate",
+            TimelineEvent::InterfererUnclear => "interferer unclear",
+            TimelineEvent::SensorOff => "sensor off",
         };
         let (view, relays) = match moment.what {
-            Turning::Reformed { view, relays, .. } => (Some(view), Some(relays)),
+            TimelineEvent::Reformed { view, relays, .. } => (Some(view), Some(relays)),
             _ => (None, None),
         };
         let version = match moment.what {
-            Turning::Offered(version) | Turning::Uploaded(version) | Turning::Adopted(version) => {
-                Some(version)
-            }
+            TimelineEvent::Offered(version)
+            | TimelineEvent::Uploaded(version)
+            | TimelineEvent::Adopted(version) => Some(version),
             _ => None,
         };
         let sir = moment.target.filter(|_| what == "converged");
@@ -100,7 +100,12 @@ impl MomentReport {
 
 /// Returns all log entries; none if the run has only convergence.
 pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
-    let plain = |moment: &Moment| matches!(moment.what, Turning::Converged | Turning::Infeasible);
+    let plain = |moment: &Moment| {
+        matches!(
+            moment.what,
+            TimelineEvent::Converged | TimelineEvent::Infeasible
+        )
+    };
     if moments.iter().all(plain) {
         return Vec::new();
     }
@@ -120,14 +125,14 @@ struct Group {
 /// Longest time between entries of one group, s: neighbours may detect a failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
-/// Groups the log entries; sorted by a group's last time if all relays have to agree, else by its first.
+/// Groups the log entries. Sorted by a group's last time if all relays have to agree, else by its first.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
         // Entries before a new view do not belong to those after it.
         let open = groups
             .iter()
-            .rposition(|group| group.sample.what == "formed" && moment.what == "converged")
+            .rposition(|group| group.sample.what == "view accepted" && moment.what == "converged")
             .unwrap_or(0);
         let mut known = groups.iter_mut().skip(open).rev();
         let same =
@@ -156,22 +161,21 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         return false;
     }
     match one.what {
-        "lost" | "unheard" | "stranger" | "other key" | "old epoch" | "namesake" => {
-            one.other == moment.other
-        }
+        "lost" | "not received by" | "mission mismatch" | "key mismatch" | "epoch went back"
+        | "duplicate index" => one.other == moment.other,
         // Both neighbours log that they found each other.
         "found" => {
             one.other == Some(moment.relay) && moment.other == Some(one.relay)
                 || (one.relay, one.other) == (moment.relay, moment.other)
         }
-        "formed" => one.view == moment.view,
+        "view accepted" => one.view == moment.view,
         // Targets are compared bit by bit.
         "converged" => one.sir.map(f64::to_bits) == moment.sir.map(f64::to_bits),
-        "silent" | "on" => one.at_s.to_bits() == moment.at_s.to_bits(),
-        "held" | "adopted" => one.version == moment.version,
-        "cut" | "lapsed" | "engaged" | "released" => true,
-        "believes" => !group.relays.contains(&moment.relay),
-        "off" => one.other == moment.other,
+        "silent" | "switched on" => one.at_s.to_bits() == moment.at_s.to_bits(),
+        "stored" | "adopted" => one.version == moment.version,
+        "no quorum" | "lease expired" | "engaged" | "released" => true,
+        "new estimate" => !group.relays.contains(&moment.relay),
+        "sensor off" => one.other == moment.other,
         _ => false,
     }
 }
@@ -179,7 +183,7 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
 impl Group {
     fn at_s(&self) -> f64 {
         match self.sample.what {
-            "formed" | "converged" | "held" | "adopted" => self.last_s,
+            "view accepted" | "converged" | "stored" | "adopted" => self.last_s,
             _ => self.first_s,
         }
     }
@@ -190,26 +194,36 @@ impl Group {
         let one = &self.sample;
         match one.what {
             "silent" => format!("{who} silent"),
-            "on" => format!("{who} on again"),
-            "lost" => format!("{} is missed", one.other.unwrap_or_default()),
-            "found" => format!("{} meets {}", one.relay, one.other.unwrap_or_default()),
-            "formed" => format!("formed: {}", one.relays.unwrap_or_default()),
+            "switched on" => format!("{who} on again"),
+            "lost" => format!("{} lost", one.other.unwrap_or_default()),
+            "found" => format!("{} and {} linked", one.relay, one.other.unwrap_or_default()),
+            "view accepted" => format!("view: {} relays", one.relays.unwrap_or_default()),
             "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
-            "parted" => format!("parted after {}", one.relay),
-            "healed" => format!("joined after {}", one.relay),
-            "deaf" => format!("{} deaf to {}", one.relay, one.other.unwrap_or_default()),
-            "hears" => format!("{} hears {}", one.relay, one.other.unwrap_or_default()),
-            "unheard" => format!("{} does not hear {who}", one.other.unwrap_or_default()),
-            "stranger" => format!("{}: another mission", one.other.unwrap_or_default()),
-            "other key" => format!("{}: another key", one.other.unwrap_or_default()),
-            "old epoch" => format!("{}: an old epoch", one.other.unwrap_or_default()),
-            "namesake" => format!("{} used twice", one.other.unwrap_or_default()),
+            "partition" => format!("partition after {}", one.relay),
+            "partition ended" => format!("partition after {} ended", one.relay),
+            "does not receive" => format!(
+                "{} does not receive {}",
+                one.relay,
+                one.other.unwrap_or_default()
+            ),
+            "receives again" => format!(
+                "{} receives {} again",
+                one.relay,
+                one.other.unwrap_or_default()
+            ),
+            "not received by" => {
+                format!("{} does not receive {who}", one.other.unwrap_or_default())
+            }
+            "mission mismatch" => format!("{}: another mission", one.other.unwrap_or_default()),
+            "key mismatch" => format!("{}: another key", one.other.unwrap_or_default()),
+            "epoch went back" => format!("{}: old epoch", one.other.unwrap_or_default()),
+            "duplicate index" => format!("duplicate number {}", one.other.unwrap_or_default()),
             "engaged" | "released" if self.relays.len() > 1 => {
                 format!("{} {}", self.relays.len(), one.what)
             }
             "engaged" | "released" | "blind" => format!("{who} {}", one.what),
             "restarted" => format!("{who}: autopilot restarted"),
-            "offered" | "held" | "adopted" => {
+            "offered" | "stored" | "adopted" => {
                 format!("mission {} {}", one.version.unwrap_or_default(), one.what)
             }
             other => other.to_owned(),
@@ -230,38 +244,35 @@ impl Group {
         let version = one.version.unwrap_or_default();
         match one.what {
             "silent" => format!("{who} went silent"),
-            "on" => format!("{who} switched on again"),
+            "switched on" => format!("{who} switched on again"),
             "lost" => format!("{who} lost relay {other}"),
-            "found" if many => format!("{who} found each other"),
-            "found" => format!("{who} found relay {other}"),
-            "formed" => format!(
-                "formed anew: {}, view {}",
+            "found" if many => format!("{who} became neighbours"),
+            "found" => format!("{who} became a neighbour of relay {other}"),
+            "view accepted" => format!(
+                "view accepted: {}, view {}",
                 count(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
-            "lapsed" => format!("{who} cannot be certain of the others any more"),
-            "unheard" => format!("relay {other} does not hear {who}"),
-            "stranger" => format!("{who} found that relay {other} flies another mission"),
-            "other key" => format!("{who} found that relay {other} signs with another key"),
-            "old epoch" => format!("{who} found that the epoch of relay {other} went back"),
-            "namesake" => format!("{who} found that number {other} is used twice"),
-            "engaged" if many => format!("{who} fly their drones"),
-            "engaged" => format!("{who} flies its drone"),
-            "released" => format!("{who} released: a pilot flies"),
-            "blind" => format!("{who} does not know where its drone is"),
-            "restarted" => format!("the autopilot of {who} was switched off and on"),
-            "cut" => format!("{who} cut off: too few to go on without the others"),
-            "believes" => format!(
-                "{who} {} a new finding of what interferes",
-                if many { "take up" } else { "takes up" }
-            ),
-            "unclear" => format!("{who} found that what is heard is not of one source"),
-            "off" => {
-                format!("{who} found that relay {other} hears something else than all the others")
+            "lease expired" => format!("{who}: lease expired"),
+            "not received by" => format!("relay {other} does not receive {who}"),
+            "mission mismatch" => format!("{who}: relay {other} flies another mission"),
+            "key mismatch" => format!("{who}: relay {other} signs with another key"),
+            "epoch went back" => format!("{who}: the epoch of relay {other} went back"),
+            "duplicate index" => format!("{who}: duplicate relay number {other}"),
+            "engaged" if many => format!("{who}: setpoint control engaged"),
+            "engaged" => format!("{who}: setpoint control engaged"),
+            "released" => format!("{who} released: the pilot took control"),
+            "blind" => format!("{who}: no position of its drone"),
+            "restarted" => format!("{who}: autopilot restarted"),
+            "no quorum" => format!("{who}: no quorum, holding position"),
+            "new estimate" => format!("{who}: new interference estimate"),
+            "interferer unclear" => format!("{who}: the measurements do not fit one interferer"),
+            "sensor off" => {
+                format!("{who}: the measurements of relay {other} do not fit those of the others")
             }
             "converged" if one.sir.is_none() => {
                 format!(
-                    "spread evenly: {}, to hear what interferes",
+                    "spread evenly to measure the interference: {}",
                     count(self.relays.len())
                 )
             }
@@ -270,18 +281,19 @@ impl Group {
                 count(self.relays.len()),
                 one.sir.unwrap_or_default()
             ),
-            "parted" => format!("relays 1 to {relay} and the others do not hear each other"),
-            "healed" => format!("relays 1 to {relay} and the others hear each other again"),
-            "deaf" => format!("{who} does not hear relay {other}"),
-            "hears" => format!("{who} hears relay {other} again"),
+            "partition" => {
+                format!("partition: relays 1 to {relay} and the others do not receive each other")
+            }
+            "partition ended" => format!(
+                "partition ended: relays 1 to {relay} and the others receive each other again"
+            ),
+            "does not receive" => format!("{who} does not receive relay {other}"),
+            "receives again" => format!("{who} receives relay {other} again"),
             "offered" if relay == 0 => format!("the transmitter uploads mission {version}"),
             "offered" => format!("the receiver uploads mission {version}"),
-            "held" => format!(
-                "{who} {} mission {version}",
-                if many { "hold" } else { "holds" }
-            ),
+            "stored" => format!("{who} stored mission {version}"),
             "adopted" => format!("mission {version} adopted: {}", count(self.relays.len())),
-            _ => "no target can be met".to_owned(),
+            _ => "no target SIR can be met".to_owned(),
         }
     }
 }
@@ -332,7 +344,7 @@ pub(super) fn text(timeline: &[MomentReport]) -> String {
 pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
     groups(timeline)
         .iter()
-        .filter(|group| !matches!(group.sample.what, "found" | "held"))
+        .filter(|group| !matches!(group.sample.what, "found" | "stored"))
         .map(|group| (group.at_s(), group.words()))
         .collect()
 }

@@ -51,14 +51,14 @@ impl WatchedReport {
                 ),
                 None => writeln!(
                     text,
-                    "availability: {availability:.6}, for want of any agreement"
+                    "availability: {availability:.6}, because there was no agreement"
                 ),
             };
         }
         if let Some(most) = self.most_flying {
             _ = writeln!(
                 text,
-                "most groups that flew an agreement of their own at once: {most}"
+                "most groups with separate agreements at the same time: {most}"
             );
         }
         if let Some(least) = self.least_separation_m {

@@ -32,7 +32,7 @@ pub enum Strike {
 /// Counts of the attacker's frames by how the receiving relays classified them.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Struck {
-    /// Frames by kind and by the name of the counter in [`Stats`]; `received` counts frames accepted as a neighbour's.
+    /// Frames by kind and by the name of the counter in [`Stats`]. `received` counts frames accepted as a neighbour's.
     pub counted: BTreeMap<(Strike, &'static str), u64>,
 }
 

@@ -1,4 +1,4 @@
-//! Bursts of frame losses: Gilbert-Elliott model with a good and a bad state per link; every frame is lost in the bad state.
+//! Bursts of frame losses: Gilbert-Elliott model with a good and a bad state per link. Every frame is lost in the bad state.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,8 @@ pub struct Bursts {
 }
 
 impl Bursts {
-    /// Links with a `share` of lost frames, 0 to 0.9, and a mean burst `length` from [`Bursts::shortest`] up.
+    /// Creates the model: a `share` of lost frames, 0 to 0.9, and a mean burst `length`. The length is at least
+    /// [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {
@@ -30,7 +31,7 @@ impl Bursts {
         }
     }
 
-    /// Returns the mean burst length of independent losses with probability `share`: the model's lower limit.
+    /// Returns the mean burst length of independent losses with probability `share`. The model's lower limit.
     pub fn shortest(share: f64) -> f64 {
         1.0 / (1.0 - share)
     }

@@ -34,7 +34,7 @@ use start::{Start, switched_on};
 use super::fleet::Vehicle;
 use super::flying::Seen;
 use super::medium::AirCounts;
-use super::outcome::{Outcome, RelayEnd, Turning};
+use super::outcome::{Outcome, RelayEnd, TimelineEvent};
 use super::queue::Happening;
 use super::setup::Setup;
 
@@ -78,7 +78,7 @@ impl Chain {
         false
     }
 
-    /// Feeds `samples` interference samples to every living relay that has a setpoint; `draw` returns one, W, for a position.
+    /// Feeds `samples` interference samples to every living relay that has a setpoint. `draw` returns one, W, for a position.
     pub fn measure(
         &mut self,
         samples: u32,
@@ -216,7 +216,7 @@ impl Chain {
                 if let Some(vehicle) = self.fleet.get_mut(index) {
                     vehicle.boot(now);
                 }
-                self.tell(index, Turning::Booted, None);
+                self.tell(index, TimelineEvent::Booted, None);
             }
             _ if member.killed.is_some() => return,
             Happening::Kill => {
@@ -224,7 +224,7 @@ impl Chain {
                 if let Some(medium) = &mut self.medium {
                     medium.switch_off(index);
                 }
-                self.tell(index, Turning::Silent, None);
+                self.tell(index, TimelineEvent::Silent, None);
                 self.film(index);
                 return;
             }

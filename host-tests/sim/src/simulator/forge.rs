@@ -1,4 +1,4 @@
-//! Forged frames of an attacker that knows the format, the mission and all frames sent, but not the key.
+//! Forged frames of an attacker that knows the format and the mission. It has received all frames sent, and has no key.
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
@@ -187,7 +187,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     frame.get(..len).unwrap_or_default().to_vec()
 }
 
-/// Returns a newer-looking mission with another interferer position; `None` in a field, where uploads do not exist.
+/// Returns a newer-looking mission with another interferer position. `None` in a field, where uploads do not exist.
 fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     let config = mission.config();
     let at = mission.interferer()?;

@@ -1,4 +1,4 @@
-//! One direction of a serial link: frames are sent one after the other at the baud rate.
+//! Single direction of a serial link: frames are sent one after the other at the baud rate.
 
 use uav_relay::Duration;
 use uav_relay::Instant;

@@ -56,7 +56,7 @@ impl Optima {
     }
 }
 
-/// Returns a fault-free setup with only `nodes` and the mission of `version`; `None` if the mission or the count is invalid.
+/// Returns a fault-free setup with only `nodes` and the mission of `version`. `None` if the mission or the count is invalid.
 pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
     let uploaded = setup
         .uploads

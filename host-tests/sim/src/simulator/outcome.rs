@@ -15,7 +15,7 @@ use super::sky::Stand;
 
 /// Kind of a log entry about a relay; "the other node" is [`Moment::other`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Turning {
+pub enum TimelineEvent {
     /// The relay went silent.
     Silent,
     /// The relay was switched on again.
@@ -36,32 +36,32 @@ pub enum Turning {
         version: u16,
     },
     /// The relay's part of the chain has no quorum.
-    Cut,
+    NoQuorum,
     /// The relay's lease expired.
-    Lapsed,
+    LeaseLapsed,
     /// The other node reports that it does not receive the relay.
-    Unheard,
+    NotHeard,
     /// The other node has a different mission.
-    Stranger,
+    MissionMismatch,
     /// The other node signs with a different key.
-    OtherKey,
+    KeyMismatch,
     /// The other node's epoch went back.
-    OldEpoch,
+    EpochWentBack,
     /// The number of the relay or of the other node is used twice.
-    Namesake,
+    DuplicateIndex,
     /// The relay accepted its position in an agreement.
     Converged,
     /// The leader found that no target can be met.
     Infeasible,
     /// A partition begins between the relay and the next one.
-    Parted,
+    Partitioned,
     /// The partition between the relay and the next one ends.
-    Healed,
+    PartitionEnded,
     /// The relay stops receiving the other node.
     Deaf,
     /// The relay receives the other node again.
     Hears,
-    /// A ground station offers a mission of this version; Tx counts as relay 0, Rx as the relay after the last.
+    /// A ground station offers a mission of this version. Tx counts as relay 0, Rx as the relay after the last.
     Offered(u16),
     /// The relay stored an uploaded mission of this version.
     Uploaded(u16),
@@ -76,11 +76,11 @@ pub enum Turning {
     /// The autopilot of the relay's drone was restarted.
     Restarted,
     /// The relay's estimate of the interference changed.
-    Believes,
+    NewEstimate,
     /// The measurements do not fit a single interferer.
-    Unclear,
+    InterfererUnclear,
     /// The other node's measurements contradict those of all others.
-    Off,
+    SensorOff,
 }
 
 /// Log entry of a run.
@@ -91,7 +91,7 @@ pub struct Moment {
     /// Relay number, from 1.
     pub relay: u16,
     /// Kind of the entry.
-    pub what: Turning,
+    pub what: TimelineEvent,
     /// Node that the entry is about, from 1: a lost or found neighbour, a relay that is not received, ...
     pub other: Option<u16>,
     /// Target SIR of the relay's position, linear.
@@ -110,7 +110,7 @@ pub enum Ending {
     /// Relays went silent, and all their neighbours have noticed.
     Broken,
     /// Each part of the chain lacks a quorum.
-    Cut,
+    NoQuorum,
     /// The planned end ([`Setup::soak`](super::setup::Setup::soak), or of the measurements) was reached.
     Soaked,
     /// The deadline or the event limit was reached.
@@ -153,7 +153,7 @@ pub struct RelayEnd {
 pub struct Watched {
     /// Time of the first agreement: all relays of a view hold their positions.
     pub first_agreement: Option<Instant>,
-    /// Share of the time since then in which a longest possible chain held its optimum; 0 without an agreement.
+    /// Share of the time since then in which a longest possible chain held its optimum. 0 without an agreement.
     pub availability: Option<f64>,
     /// Longest continuous time since then without that.
     pub longest_wrong: Option<Duration>,
@@ -231,7 +231,7 @@ impl Outcome {
     /// Returns the newest mission version that the ground has offered.
     pub fn offered(&self) -> Option<u16> {
         let versions = self.moments.iter().filter_map(|moment| match moment.what {
-            Turning::Offered(version) => Some(version),
+            TimelineEvent::Offered(version) => Some(version),
             _ => None,
         });
         versions.max()

@@ -50,7 +50,7 @@ pub struct UploadSpec {
 pub struct Channel {
     /// Bits per second.
     pub baud: u32,
-    /// Largest number of relays within range at one point, including the relay itself; 1 for separate lines.
+    /// Largest number of relays within range at one point, including the relay itself. 1 for separate lines.
     pub in_range: usize,
     /// Overhead of a frame, bytes.
     pub overhead: usize,
@@ -68,7 +68,7 @@ pub struct Setup {
     pub profiles: Vec<(u16, Profile)>,
     /// Relays that keep their altitude when altitudes are planned.
     pub held: Vec<u16>,
-    /// Settings of every relay; `hop_time`, `hold_altitude`, `profile` and, with `auth`, the key and the epoch are filled in.
+    /// Settings of every relay. `hop_time`, `hold_altitude`, `profile` and, with `auth`, the key and the epoch are filled in.
     pub settings: Settings,
     /// Parameters of the links.
     pub link: LinkSpec,
@@ -96,7 +96,7 @@ pub struct Setup {
     pub radio_reach: usize,
     /// Channel access of the radios, on a shared channel.
     pub access: Access,
-    /// Mean burst of losses, frames: 1 if independent, else at least [`Bursts::shortest`](super::bursts::Bursts::shortest).
+    /// Mean burst of losses, frames. 1 if independent, else at least [`Bursts::shortest`](super::bursts::Bursts::shortest).
     pub burst: f64,
     /// Failures of single link directions.
     pub deaf: Vec<Deaf>,

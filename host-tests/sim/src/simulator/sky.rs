@@ -172,7 +172,7 @@ pub struct Stand {
     pub at: Instant,
     /// Living relays, by index from 1.
     pub nodes: Vec<u16>,
-    /// Position of each living relay that has one: its drone's, or its setpoint if drones are not simulated.
+    /// Position of each living relay that has one. Its drone's, or its setpoint if drones are not simulated.
     pub places: Vec<Placement>,
     /// Setpoints; `None` unless every relay has one.
     pub goals: Option<Vec<Placement>>,

@@ -1,4 +1,4 @@
-//! Statistics over time: availability of the chain, simultaneous groups, and smallest distance of relays.
+//! Statistics over time. Availability of the chain, simultaneous groups, and smallest distance of relays.
 
 use uav_relay::{Duration, Instant};
 

@@ -33,7 +33,7 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     let events = shown(&picture.events);
     let top = bottom(picture);
     let line = top + LINE;
-    canvas.text((24.0, top + 9.0), "start", "What happened, not to scale:");
+    canvas.text((24.0, top + 9.0), "start", "Events, not to scale:");
     canvas.line((24.0, line), (WIDTH - 24.0, line), "time");
     let gaps = (events.len() as f64 - 1.0).max(1.0);
     for (place, (time, words)) in events.iter().enumerate() {

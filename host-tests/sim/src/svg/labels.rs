@@ -101,7 +101,7 @@ impl Labels {
     }
 }
 
-/// Estimates the width of a text from a wide sans-serif font's average; rather too wide than too narrow.
+/// Estimates the width of a text from a wide sans-serif font's average. Rather too wide than too narrow.
 pub(super) fn width(words: &str, size: f64) -> f64 {
     words.chars().count() as f64 * 0.62 * size
 }

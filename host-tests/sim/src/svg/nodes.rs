@@ -42,7 +42,7 @@ pub(super) fn relays(
         let (class, note) = if picture.lost.contains(&number) {
             ("relay lost", ", silent")
         } else if lost {
-            ("relay lost", ", not in the chain any more")
+            ("relay lost", ", no longer in the chain")
         } else {
             ("relay", "")
         };
@@ -66,7 +66,7 @@ pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
     canvas.line((x - arm, y + arm), (x + arm, y - arm), "cross");
 }
 
-/// Numbers the relays: all in a short chain, every fifth, tenth and so on in a long one, and the lost ones.
+/// Numbers the relays. In a short chain all have a number, in a long one every fifth, tenth and so on, and the lost ones.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));

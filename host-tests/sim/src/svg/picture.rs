@@ -64,8 +64,8 @@ impl Others {
     /// Returns the tooltip of the marker.
     pub(super) const fn tip(self) -> &'static str {
         match self {
-            Self::Before => "interferer of the mission before",
-            Self::Believed => "interferer that the relays believe in",
+            Self::Before => "interferer of the previous mission",
+            Self::Believed => "estimated interferer",
         }
     }
 }
@@ -153,7 +153,7 @@ pub(super) fn is_gone(picture: &Picture, number: usize) -> bool {
     picture.lost.contains(&number) || picture.left_out.contains(&number)
 }
 
-/// Returns true if `x` is at most a fifth of the distance beyond the chain; the x axis then includes it.
+/// Returns true if `x` is at most a fifth of the distance beyond the chain. The x axis then includes it.
 pub(super) fn near(x: f64, distance: f64) -> bool {
     x >= -0.2 * distance && x <= 1.2 * distance
 }

@@ -1,4 +1,4 @@
-//! Capacity of a shared channel: how many relays agree and stay in agreement, and with how many messages.
+//! Capacity of a shared channel. How many relays agree and stay in agreement, and with how many messages.
 //!
 //! `-- --ignored --nocapture` prints the tables of long chains.
 #![allow(

@@ -69,7 +69,7 @@ fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
     for line in [
         "air (csma, 115200 baud): load 0.",
         "availability: 0.",
-        "at once: 1",
+        "at the same time: 1",
         "least separation of two relays: ",
     ] {
         assert!(text.contains(line), "{line} in {text}");
@@ -102,8 +102,8 @@ fn the_story_tells_who_does_not_hear_whom() {
     let output = chain(&["--deaf", "4:3@5-9", "--soak", "20"]);
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
-        "5.000 s  relay 4 does not hear relay 3",
-        "9.000 s  relay 4 hears relay 3 again",
+        "5.000 s  relay 4 does not receive relay 3",
+        "9.000 s  relay 4 receives relay 3 again",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }
@@ -112,7 +112,7 @@ fn the_story_tells_who_does_not_hear_whom() {
         .as_array()
         .unwrap()
         .iter()
-        .filter(|moment| moment["what"] == "deaf")
+        .filter(|moment| moment["what"] == "does not receive")
         .collect();
     assert_eq!(deaf.len(), 1);
     assert_eq!(

@@ -99,12 +99,12 @@ fn a_capture_of_the_shared_channel_has_what_was_sent_and_the_attacker_too() {
         captured(&["--uavs", "4", "--shared", "--forge", "20", "--replay", "10"]);
     assert!(frames.iter().all(|frame| frame.interface == "channel"));
     let with = |word: &str| frames.iter().filter(|frame| frame.comment == word).count();
-    assert_eq!(with("the attacker's own"), 20);
-    assert_eq!(with("the attacker's, sent again"), 10);
+    assert_eq!(with("forged by the attacker"), 20);
+    assert_eq!(with("replayed by the attacker"), 10);
     let sent = usize::try_from(report["air"]["sent"].as_u64().unwrap()).unwrap();
     // Transmissions that are unfinished at the end are not captured.
     assert!((sent - 4..=sent).contains(&(frames.len() - 30)), "{sent}");
-    let missed = |frame: &Frame| frame.comment.contains("did not hear it");
+    let missed = |frame: &Frame| frame.comment.contains("did not receive it");
     assert!(frames.iter().any(missed));
 }
 

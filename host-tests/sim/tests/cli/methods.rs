@@ -232,7 +232,7 @@ fn several_interferers_are_flown_as_one_and_a_note_says_so() {
     let table = String::from_utf8(chain(&["--uavs", "3", "--scenario", several]).stdout).unwrap();
     assert!(
         table.contains("against all interferers: SIR ")
-            && table.contains("% below what the relays believe"),
+            && table.contains("% below the relays' estimate"),
         "{table}"
     );
 }

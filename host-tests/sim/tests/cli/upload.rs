@@ -97,7 +97,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
         "one radio channel",
         "converged: 8 relays, SIR 2.466",
         "20.000 s  the transmitter uploads mission 1",
-        " s  relays 1 to 8 hold mission 1",
+        " s  relays 1 to 8 stored mission 1",
         " s  mission 1 adopted: 8 relays",
         "converged: 8 relays, SIR 1.582",
         "view 1, mission 1 uploaded: adopted after 0.",
@@ -108,7 +108,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
     Document::parse(&drawing).unwrap();
     for words in [
         "interferer: 80 W, x = 800 m, y = -300 m",
-        "interferer of the mission before: 80 W, x = 500 m, y = 400 m",
+        "interferer of the previous mission: 80 W, x = 500 m, y = 400 m",
         "|y| = 300 m",
         "mission 1 offered",
         "mission 1 adopted",
@@ -241,7 +241,7 @@ fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
     assert!(output.status.success());
     let notes = String::from_utf8(output.stderr).unwrap();
     assert!(
-        notes.contains("stands for all") && notes.contains("an upload changes that one"),
+        notes.contains("replaces all") && notes.contains("an upload changes that one"),
         "{notes}"
     );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -5,7 +5,7 @@ use super::*;
 /// Time at which relay 4 of eight dies, s.
 const DIES_S: u64 = 20;
 
-/// Returns the time without a correct chain after the death, s; `None` unless the remaining relays hold their positions.
+/// Returns the time without a correct chain after the death, s. `None` unless the remaining relays hold their positions.
 fn recovery(outcome: &Outcome) -> Option<f64> {
     let left = || outcome.relays.iter().filter(|relay| relay.killed.is_none());
     // The remaining relays may be forming another view when the run ends.

@@ -3,7 +3,7 @@
 use uav_relay::Phase;
 use uav_relay_sim::simulator::deaf::Deaf;
 use uav_relay_sim::simulator::flying::groups;
-use uav_relay_sim::simulator::outcome::Turning;
+use uav_relay_sim::simulator::outcome::TimelineEvent;
 
 use super::*;
 
@@ -11,7 +11,7 @@ use super::*;
 const ALL_S: u64 = 400;
 const STILL_S: u64 = 120;
 
-/// Returns all one-way links in chains of 4 and 8 relays, with and without tags, from 0 s and from 20 s.
+/// Returns all one-way links in chains of 4 and 8 relays. They have tags or not, and begin at 0 s or at 20 s.
 fn cases(seed: u64) -> Vec<Setup> {
     let mut all = Vec::new();
     for relays in [4, 8] {
@@ -54,7 +54,7 @@ fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let last = outcome.moments.iter().rfind(|moment| {
         let changes = matches!(
             moment.what,
-            Turning::Reformed { .. } | Turning::Converged | Turning::Cut
+            TimelineEvent::Reformed { .. } | TimelineEvent::Converged | TimelineEvent::NoQuorum
         );
         changes && nodes.contains(&moment.relay)
     });

@@ -158,7 +158,7 @@ fn whatever_happens_one_group_flies_at_most() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
-/// Regression test: a view accepted only by the last relay was followed by one without its leased voters.
+/// Regression test. A view accepted only by the last relay was followed by one without its leased voters.
 #[test]
 fn what_was_decided_and_not_heard_of_ends_no_lease() {
     let mut sequence = sequence(6_450);

@@ -18,14 +18,14 @@ use air::mission;
 use uav_relay::Instant;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::deaf::Deaf;
-use uav_relay_sim::simulator::outcome::{Moment, Outcome, Turning};
+use uav_relay_sim::simulator::outcome::{Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 
 fn at(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-fn of(outcome: &Outcome, what: fn(Turning) -> bool) -> Vec<(u16, Option<u16>)> {
+fn of(outcome: &Outcome, what: fn(TimelineEvent) -> bool) -> Vec<(u16, Option<u16>)> {
     let moments = outcome.moments.iter().filter(|moment| what(moment.what));
     moments
         .map(|&Moment { relay, other, .. }| (relay, other))
@@ -38,10 +38,10 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
     setup.kills = vec![(3, at(60))];
     let outcome = run(setup).unwrap();
-    let mut lost = of(&outcome, |what| matches!(what, Turning::Lost(_)));
+    let mut lost = of(&outcome, |what| matches!(what, TimelineEvent::Lost(_)));
     lost.sort_unstable();
     assert_eq!(lost, [(2, Some(3)), (4, Some(3))]);
-    let found = of(&outcome, |what| matches!(what, Turning::Found(_)));
+    let found = of(&outcome, |what| matches!(what, TimelineEvent::Found(_)));
     assert!(
         found.contains(&(2, Some(4))) && found.contains(&(4, Some(2))),
         "{found:?}"
@@ -52,7 +52,7 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     );
 }
 
-/// Relay 3 does not receive relay 2; relay 2 receives relay 3 and must be told why they are no neighbours.
+/// Relay 3 does not receive relay 2. Relay 2 receives relay 3 and must be told why they are no neighbours.
 #[test]
 fn a_relay_that_is_not_heard_is_told_by_whom() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
@@ -64,7 +64,7 @@ fn a_relay_that_is_not_heard_is_told_by_whom() {
     }];
     let outcome = run(setup).unwrap();
     assert_eq!(
-        of(&outcome, |what| what == Turning::Unheard),
+        of(&outcome, |what| what == TimelineEvent::NotHeard),
         [(2, Some(3))]
     );
 }
@@ -81,11 +81,11 @@ fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
         let outcome = run(setup).unwrap();
         let told = of(&outcome, |what| {
             let causes = [
-                Turning::Unheard,
-                Turning::Stranger,
-                Turning::OtherKey,
-                Turning::OldEpoch,
-                Turning::Namesake,
+                TimelineEvent::NotHeard,
+                TimelineEvent::MissionMismatch,
+                TimelineEvent::KeyMismatch,
+                TimelineEvent::EpochWentBack,
+                TimelineEvent::DuplicateIndex,
             ];
             causes.contains(&what)
         });
@@ -99,7 +99,7 @@ fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));
     setup.kills = vec![(1, at(60)), (2, at(60)), (3, at(60))];
     let outcome = run(setup).unwrap();
-    for what in [Turning::Cut, Turning::Lapsed] {
+    for what in [TimelineEvent::NoQuorum, TimelineEvent::LeaseLapsed] {
         let mut told = outcome.moments.clone();
         told.retain(|moment| moment.what == what);
         let mut by: Vec<u16> = told.iter().map(|moment| moment.relay).collect();

@@ -47,7 +47,7 @@ struct Hops<'a> {
 }
 
 impl Hops<'_> {
-    /// Returns the strongest signal possible on the weaker outer hop, W: its relay straight above the ground station.
+    /// Returns the strongest signal possible on the weaker outer hop, W. Its relay straight above the ground station.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)

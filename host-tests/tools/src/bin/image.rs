@@ -10,7 +10,7 @@ use uav_relay_tools::image::elf::{Piece, flat, pieces};
 use uav_relay_tools::image::{hex, uf2};
 use uav_relay_tools::provision::config::LEN;
 
-/// Builds a board's image, or converts a configuration block, to .bin and .hex, for the Pico 2 also to .uf2.
+/// Builds a board's image, or converts a configuration block. Writes .bin and .hex, and .uf2 for the Pico 2.
 #[derive(Parser, Debug)]
 #[command(name = "image", bin_name = "cargo image", disable_version_flag = true)]
 struct Options {

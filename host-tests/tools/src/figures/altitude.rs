@@ -80,7 +80,7 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, Trouble> {
     })
 }
 
-/// Returns the best common altitude, m, and SIR, linear, with an interferer at (500, `y_m`) m, 20 m to 300 m.
+/// Returns the best common altitude, m, and SIR, linear. The interferer is at (500, `y_m`) m, the band is 20 m to 300 m.
 ///
 /// Scans every 5 m, then refines to 0.1 m by ternary search if that gains more than the tolerance of a chain.
 ///

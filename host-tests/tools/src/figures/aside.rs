@@ -1,4 +1,4 @@
-//! One relay beside the line: its best position by lateral room, and the gain of lateral and vertical freedom.
+//! Relay beside the line: its best position by lateral room, and the gain of freedom. The freedom is lateral and vertical.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -105,7 +105,7 @@ pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
     Ok(rows)
 }
 
-/// Returns the SIRs with and without lateral and vertical freedom, every `step_m` of the interferer's offset.
+/// Returns the SIRs with and without lateral and vertical freedom. The interferer's offset rises by `step_m`.
 ///
 /// # Errors
 /// [`Trouble`].

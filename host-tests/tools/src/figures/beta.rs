@@ -23,7 +23,7 @@ pub struct Row {
     pub beta: f64,
     /// E[`I_max` / I] as used by relays: Upsilon times `I_max`.
     pub upsilon_times_i_max: f64,
-    /// I / `I_max`, 0 to 1.
+    /// Interference as a fraction of `I_max`, 0 to 1.
     pub interference_over_i_max: f64,
     /// Probability density.
     pub density: f64,

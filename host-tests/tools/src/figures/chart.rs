@@ -55,7 +55,7 @@ pub struct Look {
     pub signs: Signs,
 }
 
-/// Which points of a line have a sign.
+/// Points of a line that have a sign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signs {
     /// Draws no signs.

@@ -1,4 +1,4 @@
-//! One relay at its best position (Theorem 1), against random, interference-blind and middle positions.
+//! Relay at its best position (Theorem 1), against random, interference-blind and middle positions.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -166,7 +166,7 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference from the printed averages, percentage points; `middle` replaces the blind method.
+/// Returns the larger difference from the printed averages, percentage points. `middle` replaces the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent
@@ -212,7 +212,7 @@ pub fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the nearest pair of powers per reading, then the linear readings of the pairs that are drawn.
+/// Returns the nearest pair of powers per reading. The linear readings of the drawn pairs follow.
 pub fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",

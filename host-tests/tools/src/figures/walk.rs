@@ -19,7 +19,7 @@ pub struct Chain {
     pub sir: f64,
 }
 
-/// Returns the chain with every hop as long as `target` (linear, > 0) allows; `None` if a hop cannot meet it.
+/// Returns the chain with every hop as long as `target` (linear, > 0) allows. `None` if a hop cannot meet it.
 ///
 /// If the target is too high, the chain ends short of its end, with a lower SIR on the last hop. Work: N reaches.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
@@ -71,7 +71,7 @@ pub struct Sweep {
     pub chain: Option<Chain>,
 }
 
-/// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) with this `step` (linear SIR) until the chain settles.
+/// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles. `step` is in linear SIR.
 ///
 /// # Errors
 /// [`Trouble::Unsettled`] if no target is met.

@@ -62,7 +62,7 @@ pub fn shadowed(wild: &Wild) -> Result<Setup, Trouble> {
     Ok(setup)
 }
 
-/// Setup without measurements: the relays know the interferer, or the paper's hypothetical one for several sources.
+/// Setup without measurements. The relays know the interferer, or the paper's hypothetical one for several sources.
 ///
 /// # Errors
 /// [`Trouble`].

@@ -88,7 +88,7 @@ impl Wild {
         Mission::try_new(config).map_err(|_| NO_SCENE)
     }
 
-    /// Returns the best SIR with full knowledge, linear: one source, the briefed chain's; several, the exact optimum.
+    /// Returns the best SIR with full knowledge, linear: one source, the briefed chain's. Several, the exact optimum.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -100,7 +100,7 @@ impl Wild {
         Ok(scene.chain_sir(&self.told()?))
     }
 
-    /// Returns the positions of a chain that knows the interferer; for several sources, the paper's hypothetical one.
+    /// Returns the positions of a chain that knows the interferer. For several sources, the paper's hypothetical one.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -128,7 +128,7 @@ impl Wild {
         Ok(setup)
     }
 
-    /// Returns a simulation with drones of 10 m/s that start beside the transmitter and measure every second in flight.
+    /// Returns a simulation with drones of 10 m/s. They start beside the transmitter and measure every second in flight.
     ///
     /// # Errors
     /// [`Trouble`].

@@ -8,12 +8,12 @@ const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
 
-/// Golden-section steps per refined maximum: the interval shrinks by about 5e-6, the loss in SIR by its square.
+/// Golden-section steps per refined maximum. The interval shrinks by about 5e-6, the loss in SIR by its square.
 const STEPS: u32 = 25;
 
 const TOLERANCE: f64 = 1e-11;
 
-/// Returns the best chain whose relays share one altitude of the band; never worse than at either end of the band.
+/// Returns the best chain whose relays share one altitude of the band. Never worse than at either end of the band.
 ///
 /// Scans the band and refines the three highest maxima; a narrower maximum between scanned altitudes may be missed. `None` as for
 /// [`optimum`](super::optimum()), if a relay has a fixed altitude of its own, and for an empty band. Work: about 120 optima.

@@ -10,7 +10,7 @@ pub(super) struct Crossing {
     pub(super) rising: bool,
 }
 
-/// Returns the crossings of `level` by `exact` in rising order, from its `values` at the rising `nodes`.
+/// Returns the crossings of `level` by `exact` in rising order. `values` are those at the rising `nodes`.
 ///
 /// Two crossings within one cell are missed. Work: about 60 evaluations per crossing.
 pub(super) fn crossings(
@@ -33,7 +33,7 @@ pub(super) fn crossings(
         .collect()
 }
 
-/// Returns the last point from `inside` towards `outside` (in either direction) at which `holds` is still true.
+/// Returns the last point from `inside` towards `outside` at which `holds` is still true. Either direction.
 ///
 /// `holds` must be true at `inside` and false at `outside`; if it changes more than once, one of the changes is found.
 pub(super) fn boundary(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {

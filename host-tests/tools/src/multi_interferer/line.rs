@@ -10,7 +10,7 @@ const STEP: f64 = 0.02;
 
 const CELLS: f64 = 500.0;
 
-/// The line above the ground at one altitude, sampled finely enough to catch every turn of the interference.
+/// Line above the ground at one altitude. Its samples catch every turn of the interference.
 pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
@@ -128,7 +128,8 @@ impl<'a> Line<'a> {
         spans
     }
 
-    /// Returns the position nearest to Tx at which the last relay, with `power_w` watts, meets `target` (linear, > 0) at Rx.
+    /// Returns the position nearest to Tx at which the last relay meets `target` at Rx. The relay has `power_w` watts; `target` is
+    /// linear and above 0.
     ///
     /// At least 0; `None` if the target is missed even above Rx.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
@@ -139,7 +140,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the falling crossings: maxima of the integral, or points where the function drops below the level.
+/// Returns the falling crossings. Maxima of the integral, or points where the function drops below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

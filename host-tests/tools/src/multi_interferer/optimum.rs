@@ -10,13 +10,13 @@ const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
-/// Relative rounding allowance on the least separation, so that a thousand relays that just fit are accepted.
+/// Relative rounding allowance on the least separation. A thousand relays that just fit are accepted.
 const ROUNDING: f64 = 1e-12;
 
 /// A chain and its SIR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
-    /// Positions from Tx to Rx, (x, h) in metres: x in [0, D], rising by at least the least separation (less 1e-12 of it, for
+    /// Positions from Tx to Rx, (x, h) in metres. x in [0, D], rising by at least the least separation (less 1e-12 of it, for
     /// rounding).
     pub places: Vec<(f64, f64)>,
     /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`].
@@ -70,7 +70,7 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     })
 }
 
-/// Returns the best target (linear) with the least separation, to a relative `tolerance`; `None` as for [`optimum`].
+/// Returns the best target (linear) with the least separation, to a relative `tolerance`. `None` as for [`optimum`].
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)

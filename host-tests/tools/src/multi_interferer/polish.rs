@@ -19,7 +19,7 @@ const PATIENCE: u32 = 3;
 /// Positions along x that are scanned before the best is refined.
 const PLACES: u32 = 16;
 
-/// Altitudes and lateral positions scanned in the first round; later rounds search this fraction of the range on either side.
+/// Altitudes and lateral positions scanned in the first round. Later rounds search this fraction of the range on either side.
 const LEVELS: u32 = 8;
 
 /// Golden-section steps: the interval shrinks by about 1e-7.
@@ -120,7 +120,7 @@ impl Turn<'_> {
         heard.min(fed)
     }
 
-    /// Returns the best position found from `own`, first upward and then sideways, and its SIR: 0 if there is no room.
+    /// Returns the best position found from `own`, first upward and then sideways, and its SIR. 0 if there is no room.
     fn best(&self, own: Place, room: Corridor, window: f64) -> (Place, f64) {
         let start = if self.relay.holds {
             own.h
@@ -167,7 +167,7 @@ impl Turn<'_> {
         }
     }
 
-    /// Returns the range along x open to the relay at altitude `h` and lateral position `y`, m; reversed if there is no room.
+    /// Returns the range along x open to the relay at altitude `h` and lateral position `y`, m. Reversed if there is no room.
     fn room(&self, y: f64, h: f64) -> (f64, f64) {
         let ahead = |apart: f64, other: Place| {
             let across = (y - other.y).powi(2) + (h - other.h).powi(2);
@@ -186,7 +186,7 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// Returns the best of `at` within a `window` of the range around `own`: a scan and a refinement of its maximum.
+/// Returns the best of `at` within a `window` of the range around `own`. A scan and a refinement of its maximum.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

@@ -1,4 +1,4 @@
-//! For one target SIR and altitude: the exact sets of positions from which each relay's part of the chain can reach Rx.
+//! Exact sets of positions from which each relay's part of the chain can reach Rx. They belong to one target SIR and altitude.
 //!
 //! For a receiver at y the SIR of a hop depends only on its length, so the sender may be anywhere in [y - d(y), y - s]: d(y) the
 //! hop range at the target, s the least separation. Backwards from Rx, the feasible positions of relay k are the union of these
@@ -43,7 +43,7 @@ struct Reach {
 }
 
 impl<'a> Stages<'a> {
-    /// Computes the sets for `target` (linear, > 0) and a separation of `apart` metres; `None` if one is empty.
+    /// Computes the sets for `target` (linear, > 0) and a separation of `apart` metres. `None` if one is empty.
     ///
     /// Work: a scan of the line's nodes for every change of power along the chain, and a few intervals per relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
@@ -86,7 +86,7 @@ impl<'a> Stages<'a> {
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
     }
 
-    /// Returns a chain that meets the target if [`Stages::is_met`], rising in x; `None` if the sets are not connected.
+    /// Returns a chain that meets the target if [`Stages::is_met`], rising in x. `None` if the sets are not connected.
     ///
     /// Each relay is as near to an even division of the remaining distance as the target allows.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
@@ -145,7 +145,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns `wish` if `holds` is true there, else the last point on the way from `sure`, where it is true.
+/// Returns `wish` if `holds` is true there. Otherwise returns the last such point on the way from `sure`, where it is true.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(wish) {
         wish

@@ -37,7 +37,7 @@ fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
     })
 }
 
-/// Returns the joint method's positions for relays with the profiles `seat_of`; `None` if it finds none.
+/// Returns the joint method's positions for relays with the profiles `seat_of`. `None` if it finds none.
 ///
 /// Computes what a relay on board solves for the whole chain, and the sweep that follows.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
@@ -98,7 +98,7 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
     )
 }
 
-/// Returns a plan with the fewest relays that meet `target`, found by bisection on the number of relays.
+/// Returns a plan with the fewest relays that meet `target`. The search is a bisection on the number of relays.
 ///
 /// The upper end is the fewest that meet it `at_level`, at one altitude of the band. `free` plans a given number of relays; more
 /// relays are assumed to do no worse.

@@ -5,7 +5,7 @@ use uav_relay_scenario::{Planned, PlannedMethod, PlannedPlace};
 
 use super::flown::Flown;
 
-/// Tolerated difference between planned and recomputed positions and SIR, m and dB: rounding of another machine.
+/// Tolerated difference between planned and recomputed positions and SIR, m and dB. Rounding of another machine.
 const SAME_M: f64 = 0.1;
 const SAME_DB: f64 = 0.01;
 
@@ -75,7 +75,7 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Checks that the scenario's plan still is what the relays fly: `flown`, recomputed with the same number and method.
+/// Checks that the scenario's plan still is what the relays fly. `flown`, recomputed with the same number and method.
 ///
 /// # Errors
 /// A line that states the differences.

@@ -1,4 +1,4 @@
-//! Positions that relays given a scenario agree on by themselves, and their loss against the best known ones.
+//! Positions on which relays with a scenario agree, and their loss against the best known ones.
 //!
 //! On board there is a single interferer or a field. A hypothetical interferer in place of several is an approximation, and
 //! Algorithm 4 falls short in an uneven field, so the positions are judged against the full interference.

@@ -25,9 +25,9 @@ pub struct Theorem {
 pub struct Fitted {
     /// Power, position and error of the hypothetical interferer.
     pub hypothetical: Hypothetical,
-    /// SIR (linear) against all interferers of the positions that are best against it; `None` if there are none.
+    /// SIR (linear) against all interferers of the positions that are best against it. `None` if there are none.
     pub sir: Option<f64>,
-    /// True if those positions are the plan's; otherwise the plan's are the best found against all interferers.
+    /// True if those positions are the plan's. Otherwise the plan's are the best found against all interferers.
     pub kept: bool,
 }
 
@@ -52,7 +52,7 @@ pub struct Plan {
     pub fitted: Option<Fitted>,
 }
 
-/// Why the request cannot be met.
+/// Reason for which the request cannot be met.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Why {
     /// An explanation.
@@ -99,7 +99,7 @@ impl Default for Why {
     }
 }
 
-/// Why there is no plan.
+/// Reason for which there is no plan.
 #[derive(Clone, PartialEq, Debug)]
 pub enum NoPlan {
     /// The scenario is not a valid mission, or the request does not fit it.

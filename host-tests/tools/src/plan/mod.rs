@@ -1,4 +1,4 @@
-//! The planner: how many relays a target needs, or where a given number goes, computed without messages.
+//! Planner: number of relays for a target, or positions of a given number, without messages.
 //!
 //! | interference | file |
 //! | --- | --- |

@@ -23,7 +23,7 @@ pub struct NoiseReport {
 }
 
 impl NoiseReport {
-    /// Returns the noise of a scenario; `None` if there is none, or if the scenario states the power itself.
+    /// Returns the noise of a scenario. `None` if there is none, or if the scenario states the power itself.
     pub fn of(noise: &Noise) -> Option<Self> {
         let power_w = noise.receiver_w();
         let is_made = noise.power_dbm.is_none() && power_w > 0.0;

@@ -21,7 +21,7 @@ pub const fn slots(relays: u16) -> u32 {
     relays as u32 + 1
 }
 
-/// Returns the data rate of a hop while it sends, bit/s: Shannon's, with the interference as noise; `sir` is linear.
+/// Returns the data rate of a hop while it sends, bit/s: Shannon's, with the interference as noise. `sir` is linear.
 pub fn hop_bps(bandwidth_hz: f64, sir: f64) -> f64 {
     bandwidth_hz * sir.ln_1p() / std::f64::consts::LN_2
 }
@@ -59,7 +59,7 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Plans 1, 2, 3 and more relays until no larger number can carry more, or the limit for a few seconds is reached.
+    /// Plans 1, 2, 3 and more relays. It ends when no larger number can carry more, or at the limit for a few seconds.
     ///
     /// `target_bps` is the wanted rate.
     ///

@@ -22,11 +22,11 @@ pub struct HypotheticalReport {
     pub x_m: f64,
     /// Lateral position, m; positive to the right of the line.
     pub y_m: f64,
-    /// Mean absolute error of its interference against the true sum, over the positions that relays may take, W.
+    /// Mean absolute error of its interference against the true sum, W. The mean is over the positions that relays may take.
     pub mean_abs_error_w: f64,
     /// Mean absolute error divided by the mean interference.
     pub relative_error: f64,
-    /// SIR (linear) against all interferers of the positions that are best against it; absent if there are none.
+    /// SIR (linear) against all interferers of the positions that are best against it. Absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// True if these positions are the plan's. Otherwise the plan's are the best found against all interferers.
@@ -314,7 +314,7 @@ impl PlanReport {
             let most = unit.say(most);
             _ = writeln!(
                 text,
-                "target: SIR {target}; so many relays can have up to {most} (--uavs {uavs})"
+                "target: SIR {target}; that many relays reach up to {most} (--uavs {uavs})"
             );
         }
         _ = writeln!(text, "{}; {NOT_MODELLED}", self.certainty());
@@ -330,11 +330,9 @@ impl PlanReport {
     fn certainty(&self) -> &'static str {
         match (self.proven, self.target_sir) {
             (Some(true), Some(_)) => "in this model no fewer relays meet the target",
-            (Some(true), None) => "in this model no places are better",
-            (_, Some(_)) => {
-                "in this model whether fewer relays could meet the target is not certain"
-            }
-            (_, None) => "in this model whether other places could be better is not certain",
+            (Some(true), None) => "in this model no positions are better",
+            (_, Some(_)) => "in this model fewer relays might meet the target: not proven",
+            (_, None) => "in this model other positions might be better: not proven",
         }
     }
 }
@@ -356,7 +354,7 @@ impl HypotheticalReport {
         _ = match (self.kept, self.sir) {
             (true, _) => writeln!(
                 text,
-                "its places are good enough against all interferers, and kept"
+                "its positions are good enough against all interferers, and are kept"
             ),
             (false, Some(sir)) => writeln!(
                 text,
@@ -366,7 +364,7 @@ impl HypotheticalReport {
             ),
             (false, None) => writeln!(
                 text,
-                "no places are good against it; these are the best found against all"
+                "no positions are good against it; these are the best found against all"
             ),
         };
     }

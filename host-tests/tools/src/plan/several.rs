@@ -111,7 +111,7 @@ impl Planner<'_> {
         })
     }
 
-    /// Returns the best chain against the true sum; polished from several starts if altitudes differ or are free.
+    /// Returns the best chain against the true sum. Polished from several starts if altitudes differ or are free.
     fn by_all(&self, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         if let Some(x_m) = self.ask.x_m {
             return at(scene, x_m);
@@ -234,7 +234,8 @@ impl Candidates {
         one.max(all)
     }
 
-    /// Returns the hypothetical interferer's chain if it is good enough (or meets `target`), else the one against the true sum.
+    /// Returns the hypothetical interferer's chain if it is good enough. It is good enough, too, if it meets `target`; otherwise
+    /// returns the chain against the true sum.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, sir)| *sir);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);

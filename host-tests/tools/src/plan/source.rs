@@ -22,7 +22,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     })
 }
 
-/// Returns the best position of one relay, by a theorem or beside the line; with a fixed altitude it stays above the line.
+/// Returns the best position of one relay, by a theorem or beside the line. With a fixed altitude it stays above the line.
 pub(super) fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
     let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
@@ -164,7 +164,7 @@ pub(super) fn fewest(
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the mission of the fewest relays that meet `target` at their own altitudes, and whether that is proven.
+/// Returns the mission of the fewest relays that meet `target`, and true if that is proven. Relays are at their own altitudes.
 pub(super) fn enough(
     scenario: &Scenario,
     target: f64,

@@ -12,7 +12,7 @@ use super::config::{
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::{AirGround, ChannelSpec, Scenario};
 
-/// Why a block cannot be built.
+/// Reason for which a block cannot be built.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BlockError {
@@ -97,7 +97,7 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// Creates the flight of `uavs` relays in `scenario` on network `network`, with method `align` and without measurements.
+    /// Creates the flight of `uavs` relays in `scenario` on network `network`. The method is `align`, without measurements.
     ///
     /// # Errors
     /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.
@@ -238,7 +238,7 @@ impl Flight {
     }
 }
 
-/// Converts decibels to factors, exactly as [`uav_relay::Channel::from_db`], so that both channels are equal to the bit.
+/// Converts decibels to factors as [`uav_relay::Channel::from_db`] does. Both channels are equal to the bit.
 fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     let factor = |db: f64| libm::pow(10.0, db / 10.0);
     ChannelNumbers {

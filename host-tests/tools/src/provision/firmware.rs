@@ -5,7 +5,7 @@ use uav_relay_scenario::deployment::Network;
 
 use super::config::{BAUD, MOST_PROBE_AFTER_MS};
 
-/// Returns the silence after which a neighbour is probed and that after which it is lost; 0 selects the default.
+/// Returns the silence after which a neighbour is probed and that after which it is lost. 0 selects the default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     let settings = match u64::from(probe_after_ms) {
         0 => Settings::default(),
@@ -14,7 +14,7 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     [settings.probe_after, settings.dead_after]
 }
 
-/// Returns `probe_after_ms` for the block: the command line's `given_ms`, else the section's; 0 for the firmware's default.
+/// Returns `probe_after_ms` for the block: the command line's `given_ms`, else the section's. 0 for the firmware's default.
 ///
 /// # Errors
 /// A line that names a key whose value no block can express, the value and the allowed one.

@@ -24,7 +24,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
         && !force
     {
         return Err(format!(
-            "--out-dir {}: {} is there already; --force writes over it, and removes blocks of other relays",
+            "--out-dir {}: {} exists already; --force overwrites it, and removes blocks of other relays",
             dir.display(),
             first.file_name().unwrap_or_default().to_string_lossy()
         ));
@@ -69,7 +69,7 @@ fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     Ok(file)
 }
 
-/// Returns the files in the folder that belong to a flight: blocks of any relay, and the names in `files`.
+/// Returns the files in the folder that belong to a flight. Blocks of any relay, and the names in `files`.
 fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String> {
     if !dir.exists() {
         return Ok(Vec::new());

@@ -23,7 +23,7 @@ pub struct Heading {
     pub signed: bool,
 }
 
-/// Returns the text of `summary.txt`; `places` are the expected positions of the relays, empty if unknown.
+/// Returns the text of `summary.txt`. `places` are the expected positions of the relays, empty if unknown.
 pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<&Line>) -> String {
     let Heading {
         scenario,
@@ -37,9 +37,9 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
         "{uavs} relays of {scenario}, network {network}, method {method}, frames {signed}\n\n"
     );
     if places.is_empty() {
-        text.push_str("where they settle is not known before they fly\n");
+        text.push_str("their positions are not known before the flight\n");
     } else {
-        text.push_str("where they settle:\n");
+        text.push_str("positions on which they settle:\n");
         let earth = if line.is_some() {
             "      lat [deg]     lon [deg]  amsl [m]"
         } else {
@@ -71,7 +71,7 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
         text.push('\n');
     }
     text.push_str(
-        "\nto type in this folder, each two lines with the drone of that number at the probe:\n",
+        "\ncommands to type in this folder, two for each drone, with that drone at the probe:\n",
     );
     for index in 1..=*uavs {
         _ = writeln!(

@@ -97,7 +97,7 @@ fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
     assert!(step(500.0, 49.0) < step(500.0, 25.0));
 }
 
-/// Compares with Algorithm 2 with exact local maximisation, and the joint optimum, of a separate program.
+/// Compares with a separate program: Algorithm 2 with exact local maximisation, and the joint optimum.
 #[test]
 fn rounds_rise_as_exact_local_search_does_and_a_coarse_grid_gains_nothing() {
     let table = Table::read("rounds");

@@ -1,4 +1,4 @@
-//! One relay beside the line: positions and gains, against the three-dimensional reference.
+//! Relay beside the line: positions and gains, against the three-dimensional reference.
 
 use uav_relay_oracle::reference::joint::{Corridor, Effort, Place, optimum, sir};
 use uav_relay_oracle::reference::{Link, Station};

@@ -1,5 +1,5 @@
-//! `cargo figures`, run as a program: each table against a reference that shares no formula with the crate, or against values of
-//! a separate program.
+//! Runs of `cargo figures` as a program. Each table is compared with a reference that shares no formula with the crate, or with
+//! values of a separate program.
 //!
 //! The tool runs once, in full; the tests read its files.
 #![allow(

@@ -1,4 +1,4 @@
-//! One relay: the equal-SIR locus, the best position by altitude, and the readings of the gain.
+//! Single relay: the equal-SIR locus, the best position by altitude, and the readings of the gain.
 
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::{Link, Station};
@@ -94,7 +94,7 @@ fn the_locus_is_the_reference_programs() {
     }
 }
 
-/// Checks the page: more power shifts the locus toward Rx, an interferer nearer to the line shifts it down.
+/// Checks the page: more power shifts the locus toward Rx. An interferer nearer to the line shifts it down.
 #[test]
 fn the_locus_moves_as_it_is_said_to() {
     let table = Table::read("locus");

@@ -1,4 +1,4 @@
-//! Flash images: the files contain the bytes of the ELF at their load addresses, as independent readers read them.
+//! Flash images. Independent readers find the bytes of the ELF at their load addresses.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::expect_used)]
 
 use std::process::{Command, Output};

@@ -28,14 +28,14 @@ fn what_is_asked_in_decibels_is_answered_in_decibels() {
     let table = said(&["--target-sir-db", "6"]);
     for part in [
         "worst hop: 6.000 dB (SIR 3.98107",
-        "target: SIR 6 dB; so many relays can have up to 6.",
+        "target: SIR 6 dB; that many relays reach up to 6.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
     let table = said(&["--target-sir", "4"]);
     for part in [
         "worst hop: SIR 4.00000",
-        "target: SIR 4; so many relays can have up to 4.",
+        "target: SIR 4; that many relays reach up to 4.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }

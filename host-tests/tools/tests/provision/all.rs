@@ -1,4 +1,4 @@
-//! From a plan to the blocks of all drones, without entering a number twice.
+//! Steps from a plan to the blocks of all drones, without entering a number twice.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -170,7 +170,7 @@ fn a_joint_plan_is_flown_jointly_and_planned_anew_in_place() {
     let line = plan(&["--scenario", &file, "--uavs", "4", "--out", &file]);
     let line = String::from_utf8(line.stderr).unwrap();
     assert!(
-        line.contains("is there already; --force writes over it"),
+        line.contains("exists already; --force overwrites it"),
         "{line}"
     );
     planned(&[

@@ -7,7 +7,7 @@ use uav_relay_tools::provision::config::{ConfigError, LEN, MAX_POINTS};
 
 use super::{example, field, in_a_field, paper, reads};
 
-/// Builds a block by hand: the method's number and parameters, and differences from the paper's scenario.
+/// Builds a block by hand. The method's number and parameters, and differences from the paper's scenario.
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;

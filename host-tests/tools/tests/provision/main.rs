@@ -1,4 +1,4 @@
-//! Configuration of a drone: `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
+//! Configuration of a drone. `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -1,4 +1,4 @@
-//! Robustness of reading: any flash content is a valid configuration, or an error that names the number.
+//! Robustness of reading. Any flash content is a valid configuration, or an error that names the number.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -99,7 +99,7 @@ fn a_number_out_of_range_is_named() {
     assert_eq!(reads(&[0; LEN]), Err(ConfigError::Blank));
 }
 
-/// Checks values just inside and just outside the ranges of `explore`, `rounds`, `i_max_w` and `samples`.
+/// Checks the limits of `explore`, `rounds`, `i_max_w` and `samples`, from just inside and outside.
 #[test]
 fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
     for (explore_m, rounds, good) in [

@@ -63,7 +63,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(
         said,
-        "no --key-file: frames are not signed, and anybody can send some\n"
+        "no --key-file: frames are not signed, and anybody in range can send frames\n"
     );
     assert_eq!(block(), paper());
 

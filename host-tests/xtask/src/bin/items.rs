@@ -1,4 +1,5 @@
-//! Counts the items of the library's public interface, in the `all.html` that `cargo doc` has written, and fails above [`MOST`].
+//! Counts the items of the library's public interface and fails above [`MOST`]. It reads the `all.html` that `cargo doc` has
+//! written.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! Checks the workspace's dependencies: licences, a single registry, and no duplicate versions in the library; run by `cargo ci`.
+//! Checks the workspace's dependencies. Licences, a single registry, and no duplicate versions in the library; run by `cargo ci`.
 //!
 //! Advisories are not checked, because they change without a commit and have to be fetched.
 

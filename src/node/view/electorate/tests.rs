@@ -160,7 +160,7 @@ fn what_may_be_agreed_on_is_decided_on_again() {
     assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), granted(id(3, 2), 2));
 }
 
-/// If they were refused, a chain in which most relays were restarted would never fly again.
+/// Checks that a view of all relays is accepted. Otherwise a chain with most relays restarted would never fly again.
 #[test]
 fn all_of_the_mission_are_a_view_whatever_they_remember() {
     let mut chain = Chain::of(3);
@@ -239,7 +239,7 @@ fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Relays that vote before one that knows the newer view vote in the older view, so their votes do not count.
+/// Relays that vote before one that knows the newer view vote in the older view. Their votes do not count.
 #[test]
 fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
     let mut chain = Chain::of(3);
@@ -277,7 +277,7 @@ fn others_may_rely_on_members_alone() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Refused proposals free their places; only a limited number of proposals without a decision is remembered.
+/// Refused proposals free their places. Only a limited number of proposals without a decision is remembered.
 #[test]
 fn votes_are_remembered_until_what_came_of_them_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -316,7 +316,7 @@ fn votes_are_remembered_until_what_came_of_them_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Requirement of the module's documentation: node 3 is a member of the current view, forgets it, and votes in the initial view.
+/// Requirement of the module's documentation. Node 3 is a member of the current view, forgets it, and votes in the initial view.
 #[test]
 fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
     let mut chain = Chain::of(5);

@@ -187,7 +187,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current start, with `turn` next, is dropped early because it cannot become the best.
+    /// Returns true if the current start is dropped early because it cannot become the best. `turn` is its next step.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -231,7 +231,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays of a polished chain; chains with fixed altitudes are always polished, since their path has kinks.
+/// Maximum number of relays of a polished chain. Chains with fixed altitudes are always polished, since their path has kinks.
 const POLISHED: u16 = 5;
 
 /// Number of halvings of the polish's moves, and the first move as a fraction of the room.
@@ -251,7 +251,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of a polished chain that meets `sigma`: one relay by a fraction of its room, halved round by round. It
+    /// Tries the next move of a polished chain that meets `sigma`. One relay by a fraction of its room, halved round by round. It
     /// finds gains that the derivatives do not show because another constraint is active.
     pub(super) fn polish(
         &mut self,

@@ -125,7 +125,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Creates a solver; `None` in a field, for more than `RELAYS` relays, or without the feature `altitude`.
+    /// Creates a solver. `None` in a field, for more than `RELAYS` relays, or without the feature `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
         (fits && mission.interferer().is_some()).then(|| Self {
@@ -164,7 +164,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Does one portion of the work: ten relays backward and forward, or twenty without a change.
+    /// Processes one portion of the work: ten relays backward and forward, or twenty without a change.
     ///
     /// Ready with the target, a linear SIR, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and must be
     /// constant.

@@ -197,7 +197,7 @@ const PLAIN: u16 = 20;
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Continues a plain pass for `sigma`; ready with the slack at its end, `None` if a hop cannot meet the target.
+    /// Continues a plain pass for `sigma`. Ready with the slack at its end, `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -317,7 +317,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index` of a solved chain that leaves the relays after it their separation, m.
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation. The chain is solved.
     ///
     /// It equals the limit in the passes with the sweep's rules, to the bit.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
@@ -454,7 +454,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, in ln gamma, above which no hop leaps over the interferer: the largest gain of any hop.
+    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. The largest gain of any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);

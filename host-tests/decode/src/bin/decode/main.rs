@@ -52,7 +52,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             Err(Failure::input(format!("{name}: cannot be read: {error}")))
         }
         Err(Trouble::Capture(error)) => {
-            Err(Failure::input(format!("{name}: no sound capture: {error}")))
+            Err(Failure::input(format!("{name}: no valid capture: {error}")))
         }
     }
 }

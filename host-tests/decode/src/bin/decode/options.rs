@@ -2,8 +2,8 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
-/// Prints the frames of a capture or of a byte stream field by field, as soon as each is complete, and why a rejected one is
-/// rejected.
+/// Prints the frames of a capture or of a byte stream field by field. A frame is printed as soon as it is complete, a rejected one
+/// with the reason.
 #[derive(Parser, Debug)]
 #[command(
     name = "decode",
@@ -11,13 +11,13 @@ use clap::Parser;
     disable_version_flag = true
 )]
 pub(crate) struct Options {
-    /// Capture (pcapng), or bytes of a port; by default or with `-` standard input, as of `cat /dev/ttyUSB0`
+    /// Capture (pcapng), or bytes of a port. By default or with `-` standard input, as of `cat /dev/ttyUSB0`
     #[arg(value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
     /// Print one JSON object per frame and line. Numbers are as on the wire
     #[arg(long)]
     pub(crate) json: bool,
-    /// File with the network key, 64 hexadecimal digits: checks the tags of two nodes once their handshake was captured
+    /// File with the network key, 64 hexadecimal digits. Tags of two nodes are checked once their handshake was captured
     #[arg(long, value_name = "FILE")]
     pub(crate) key: Option<PathBuf>,
     /// Write the dissector for Wireshark to this file instead, or with `-` to standard output

@@ -1,4 +1,4 @@
-//! Two thousand scenarios in space with stored optima, to test a solver without searching for them again.
+//! Two thousand scenarios in space with stored optima. A solver is tested without searching for them again.
 
 use std::io;
 

@@ -82,7 +82,7 @@ impl Scenario {
 /// Least separation in half of the scenarios, as a fraction of D / (N + 1): it hardly ever binds.
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
-/// Least separation that often binds, as a fraction of D / (N + 1): about a tenth of those scenarios lose SIR by it.
+/// Least separation that often binds, as a fraction of D / (N + 1). About a tenth of those scenarios lose SIR by it.
 pub const CROWDED: (f64, f64) = (0.03, 0.3);
 
 /// Draws one scenario; the distribution is in the module's table. `relays` within 1 to 1000, `apart` [`ROOMY`] or [`CROWDED`].

@@ -60,7 +60,7 @@ impl Hold {
 /// Position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Coordinate along Tx-Rx, m, in [0, D].
+    /// Coordinate along the line from Tx to Rx, m, in [0, D].
     pub x_m: f64,
     /// Offset from the Tx-Rx plane, m, with the sign of the interferer's `y_i`.
     pub y_m: f64,

@@ -30,8 +30,7 @@ impl Side {
     }
 }
 
-/// Returns a jittered grid of `columns` x `rows` levels with walls and corners; as many in all if the room has no width or
-/// height.
+/// Returns a jittered grid of `columns` x `rows` levels with walls and corners. As many in all if the room has no width or height.
 pub(super) fn levels(room: &Room, rng: &mut ChaCha8Rng, columns: u32, rows: u32) -> Vec<Across> {
     let free = room.free();
     let (columns, rows) = match (free.y > 0.0, free.h > 0.0) {

@@ -1,4 +1,4 @@
-//! The best chain for given levels (positions in the cross-section) of each relay: exact, whatever the interferer.
+//! The best chain for given levels (positions in the cross-section) of each relay. Exact, whatever the interferer.
 //!
 //! For a target, the positions that each relay can reach at each of its levels are a union of intervals (see `reference::sets`).
 //! A sender at another level matters only through its nearest position, which is the least advance away or at the end of an
@@ -46,7 +46,7 @@ pub(super) fn in_room(room: &Room, levels: &[Across]) -> Vec<Across> {
     inside
 }
 
-/// Returns the best chain, one slot per relay, to `tolerance` in ln SIR; `None` if no chain reaches `floor`, a ln SIR.
+/// Returns the best chain, one slot per relay, to `tolerance` in ln SIR. `None` if no chain reaches `floor`, a ln SIR.
 pub(super) fn best_chain(
     scene: &Scene,
     slots: &[Slot],
@@ -130,12 +130,13 @@ fn trace_back(scene: &Scene, reaches: &[Reach], target: f64) -> Option<Vec<Tripl
     Some(places)
 }
 
-/// Returns the least advance past the sender that keeps the separation; `across_2` is the squared cross-section distance.
+/// Returns the least advance past the sender that keeps the separation. `across_2` is the squared cross-section distance.
 pub(super) fn least_advance(scene: &Scene, across_2: f64) -> f64 {
     (scene.apart * scene.apart - across_2).max(0.0).sqrt()
 }
 
-/// A receiver at one level: l <= `ease` s / (1 + nu s), with l = (sender to relay)^2 and s = (relay to interferer)^2.
+/// Receiver at one level: l <= `ease` s / (1 + nu s). l is the squared distance from sender to relay, s that from relay to
+/// interferer.
 struct Landing<'a> {
     scene: &'a Scene,
     ease: f64,

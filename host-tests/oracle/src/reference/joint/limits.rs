@@ -51,7 +51,7 @@ impl Log {
     }
 }
 
-/// A constraint `value` >= 0 on a relay and its predecessor: a hop's ln SIR over the target, or a margin.
+/// A constraint `value` >= 0 on a relay and its predecessor. A hop's ln SIR over the target, or a margin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limit {
     pub(super) relay: usize,

@@ -1,4 +1,4 @@
-//! The joint problem: relays choose positions in a corridor along Tx-Rx that maximise the worst hop's SIR.
+//! The joint problem: positions in a corridor along Tx-Rx that maximise the worst hop's SIR.
 //!
 //! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (except relays with a fixed cross-section position), and
 //! neighbours at least the link's least separation apart. The problem is not concave: a chain may pass the interferer on either
@@ -58,7 +58,7 @@ pub fn optimum(
         .then_some(JointOptimum { sir, places })
 }
 
-/// Returns the best SIR (linear) of a link with relays at their altitudes above the line, with the least separation.
+/// Returns the best SIR (linear) of a link. Relays keep their altitudes above the line and the least separation.
 ///
 /// Accurate to 1e-6 relative. `None` as for [`optimum`].
 pub fn at_their_altitudes(link: &Link) -> Option<f64> {
@@ -78,7 +78,7 @@ pub fn at_their_altitudes(link: &Link) -> Option<f64> {
     Some(scene.worst(&best).exp())
 }
 
-/// Returns the SIR (linear) of the worst hop; `None` without relays, or unless there is one position per relay.
+/// Returns the SIR (linear) of the worst hop. `None` without relays, or unless there is one position per relay.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let (tail, last) = (places.last()?, link.relays.last()?);
     if places.len() != link.len() {
@@ -111,7 +111,8 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     Some(hops.fold(rx, f64::min))
 }
 
-/// Returns true if a chain keeps order, corridor, fixed positions and least separation (to 1e-9 of it, for rounding).
+/// Returns true if a chain keeps order, corridor, fixed positions and least separation. The separation may be short by 1e-9 of
+/// itself, for rounding.
 pub fn keeps_rules(link: &Link, corridor: Corridor, held: &[Hold], places: &[Place]) -> bool {
     let mut each = (0..).zip(places);
     let within = each.all(|(relay, place)| {

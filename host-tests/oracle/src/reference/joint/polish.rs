@@ -8,7 +8,7 @@ use super::scene::Scene;
 use super::space::{Square, Triple};
 use super::system::{Block, solve};
 
-/// Final barrier weight: the target ends below the local optimum by this times the number of constraints.
+/// Final barrier weight. The target ends below the local optimum by this times the number of constraints.
 const LAST_WEIGHT: f64 = 1e-12;
 
 /// Least error of the optimality conditions above rounding.

@@ -3,7 +3,7 @@
 /// Bisection steps to the resolution of f64.
 const HALVINGS: usize = 80;
 
-/// Returns the intervals of [`low`, `high`] where the polynomial (coefficients from the constant up) is <= 0.
+/// Returns the intervals of [`low`, `high`] where the polynomial is <= 0. Coefficients are from the constant up.
 pub(super) fn not_positive(coefficients: &[f64], low: f64, high: f64) -> Vec<(f64, f64)> {
     if !(low <= high) {
         return Vec::new();

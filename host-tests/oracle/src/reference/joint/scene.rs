@@ -84,7 +84,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Creates the scene; `None` without relays, with an empty corridor, or if every chain has an SIR of zero.
+    /// Creates the scene. `None` without relays, with an empty corridor, or if every chain has an SIR of zero.
     pub(super) fn new(link: &Link, corridor: Corridor, held: &[Hold]) -> Option<Self> {
         let unit = link.distance_m.recip();
         let powers = || link.relays.iter().map(|relay| relay.power_w);

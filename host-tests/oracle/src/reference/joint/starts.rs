@@ -1,4 +1,4 @@
-//! Multi-start search: chains from searches over levels, bends and perturbations, each locally optimised.
+//! Multi-start search. Chains from searches over levels, bends and perturbations are each locally optimised.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -99,7 +99,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Tries chains at one common cross-section position: several lateral positions, each with the best of a few altitudes.
+    /// Tries chains at one common cross-section position. Several lateral positions, each with the best of a few altitudes.
     fn one_level(&mut self) {
         for side in [Side::Any, Side::Left, Side::Right] {
             let Some(room) = side.part(self.scene) else {
@@ -130,7 +130,7 @@ impl Search<'_> {
         best.map(|(_, chain)| chain)
     }
 
-    /// Tries the best chain on some levels; with `split`, the first `count` relays are before the interferer.
+    /// Tries the best chain on some levels. With `split`, the first `count` relays are before the interferer.
     fn on_levels(&mut self, levels: &[Across], split: Option<usize>, below: f64) {
         let x_i = self.scene.interferer.x;
         let window = |k: usize| match split {
@@ -264,7 +264,7 @@ impl Search<'_> {
         }
     }
 
-    /// Moves the chain by `share` toward evenly spread positions within the rooms, off every active constraint.
+    /// Moves the chain by `share` toward evenly spread positions within the rooms. The result is off every active constraint.
     fn inward(&self, chain: &[Triple], share: f64) -> Vec<Triple> {
         let gap = 1.0 / (self.scene.len() as f64 + 1.0);
         let mut even = 0.0;

@@ -1,4 +1,4 @@
-//! Linear system of a chain: one 3 x 3 block per relay, coupled to its neighbours, and one more unknown coupled to all.
+//! Linear system of a chain. One 3 x 3 block per relay, coupled to its neighbours, and one more unknown coupled to all.
 
 use super::space::{Factor, Square, Triple};
 
@@ -25,7 +25,7 @@ impl Block {
     }
 }
 
-/// Solves the system in O(N), with `corner` on the common unknown's diagonal; `None` unless it is positive definite.
+/// Solves the system in O(N), with `corner` on the common unknown's diagonal. `None` unless it is positive definite.
 pub(super) fn solve(
     blocks: &[Block],
     corner: f64,

@@ -1,4 +1,4 @@
-//! Chains built from Rx toward Tx with hops as long as a target allows: the paper's Algorithm 4 and its optimum.
+//! Chains built from Rx toward Tx with hops as long as a target allows. The paper's Algorithm 4 and its optimum.
 
 use super::link::StochasticLink;
 use crate::reference::link::Station;
@@ -15,7 +15,7 @@ pub struct Backward {
 }
 
 impl StochasticLink {
-    /// Returns the expected SIR at Rx with the last relay straight above it: an upper bound, and the first target.
+    /// Returns the expected SIR at Rx with the last relay straight above it. An upper bound, and the first target.
     pub fn ceiling(&self) -> f64 {
         self.relays.last().map_or(0.0, |tail| {
             tail.power_w * self.upsilon_at(self.distance_m)
@@ -48,14 +48,14 @@ impl StochasticLink {
         Some(places)
     }
 
-    /// Returns the lesser of `gamma` and the first hop's expected SIR in the backward chain; 0 without a chain.
+    /// Returns the lesser of `gamma` and the first hop's expected SIR in the backward chain. 0 without a chain.
     pub fn backward_sir(&self, gamma: f64) -> f64 {
         self.backward(gamma)
             .and_then(|places| self.hop_sirs(&places).first().map(|sir| sir.min(gamma)))
             .unwrap_or(0.0)
     }
 
-    /// Runs the paper's Algorithm 4: lowers the target from [`StochasticLink::ceiling`] until the first hop meets it.
+    /// Runs the paper's Algorithm 4. Lowers the target from [`StochasticLink::ceiling`] until the first hop meets it.
     ///
     /// The step is `step`. Unlike printed, the last hop follows the target and no relay is before Tx. `None` if no target above 0
     /// is met, as with a step larger than the optimum.
@@ -100,7 +100,7 @@ impl StochasticLink {
         best.1
     }
 
-    /// Solves the paper's problem 1: the fewest relays like the first, at most `most`, whose backward chain for `gamma` closes.
+    /// Solves the paper's problem 1. The fewest relays like the first, at most `most`, whose backward chain for `gamma` closes.
     ///
     /// `iterations` is their number.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {

@@ -28,7 +28,7 @@ fn joined(mut all: Stretches) -> Stretches {
 }
 
 impl StochasticLink {
-    /// Returns the SIR (linear) of the worst hop of the best chain with relays at least `apart_m` apart; 0 if there is none.
+    /// Returns the SIR (linear) of the worst hop of the best chain with relays at least `apart_m` apart. 0 if there is none.
     ///
     /// Going back from Rx, the feasible positions of each relay are intervals: as a receiver moves along an interval, so does the
     /// interval of its sender. No position is left out, however far a relay has to stay behind its reach.

@@ -1,4 +1,4 @@
-//! One relay: the paper's Algorithm 3, as printed and corrected, and its optimum by brute force.
+//! Best position of one relay: the paper's Algorithm 3, as printed and corrected, and brute force.
 
 use super::link::StochasticLink;
 
@@ -14,14 +14,14 @@ pub struct Single {
 }
 
 impl StochasticLink {
-    /// Runs Algorithm 3 as printed: stops at the first target that the first hop meets, else returns the best seen.
+    /// Runs Algorithm 3 as printed. Stops at the first target that the first hop meets, else returns the best seen.
     ///
     /// The second hop's targets fall from its largest value in steps of `step`; `None` unless there is exactly one relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
-    /// Runs the corrected Algorithm 3: continues while a lower target could still be better than the best seen.
+    /// Runs the corrected Algorithm 3. Continues while a lower target could still be better than the best seen.
     ///
     /// Prefers, of the two steps around the optimum, the one where the first hop is weaker, so for a constant Upsilon its
     /// position may be one step off the printed one's, with an SIR at least as high.
@@ -31,7 +31,7 @@ impl StochasticLink {
         })
     }
 
-    /// Lowers the target until `end` returns a result, given the current position, the best one and the target.
+    /// Lowers the target until `end` returns a result. Its arguments are the current position, the best one and the target.
     fn descend(
         &self,
         step: f64,
@@ -65,7 +65,7 @@ impl StochasticLink {
         best.map(|best| Single { iterations, ..best })
     }
 
-    /// Returns the best position and expected SIR of one relay by brute force; `None` unless there is exactly one relay.
+    /// Returns the best position and expected SIR of one relay by brute force. `None` unless there is exactly one relay.
     ///
     /// A grid of `points` per piece of the table of Upsilon, refined four times around the best position.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {

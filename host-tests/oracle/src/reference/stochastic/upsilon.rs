@@ -1,6 +1,6 @@
 //! Upsilon = E[1/I] of any distribution.
 
-/// Returns Upsilon = E[1/I] in 1/W, as the integral of the moment-generating function `m` over the negative half line.
+/// Returns Upsilon = E[1/I] in 1/W. It is the integral of the moment-generating function `m` over the negative half line.
 ///
 /// `m`(t) = E[exp(t I)] for t <= 0, I > 0 in W. With y = e^z the integrand is analytic and falls off exponentially on both sides,
 /// so the trapezoidal rule is accurate to about 1e-13. `None` if the integral diverges in f64: E[1/I] infinite, or nearly so (a

@@ -1,4 +1,4 @@
-//! The page in a headless Chromium, opened as a file: user input moves the chain, and its numbers equal `cargo chain --json`.
+//! The page in a headless Chromium, opened as a file. User input moves the chain, and its numbers equal `cargo chain --json`.
 //!
 //! | file | content |
 //! | --- | --- |

@@ -76,7 +76,10 @@ fn a_chain_is_seen_to_lose_a_relay_and_to_close_up() {
     // Moving the slider shows text and picture of that time.
     browser.run("byId('time').value = 0; byId('time').dispatchEvent(new Event('input'))");
     let words = said(&mut browser, "summary");
-    assert_eq!(words, "At 0.000 s: 0 of 8 relays have a place; 0 messages.");
+    assert_eq!(
+        words,
+        "At 0.000 s: 0 of 8 relays have a position; 0 messages."
+    );
     let waits = browser.value("document.querySelectorAll('#above .hop.waits').length");
     assert_eq!(waits, 9);
     browser.run(&format!("player.seek({silent})"));

@@ -62,7 +62,7 @@ fn it_is_there_at_once_and_follows_a_hand() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// During a long run the page is redrawn, and new input does not wait for its end.
+/// Checks that during a long run the page is redrawn, and new input does not wait for its end.
 #[test]
 fn the_page_stays_awake_while_it_computes() {
     let mut browser = opened(1280, 900);

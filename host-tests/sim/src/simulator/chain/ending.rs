@@ -37,7 +37,7 @@ impl Chain {
         }
         let parts = self.parts();
         if is_cut(&parts) {
-            return Some(Ending::Cut);
+            return Some(Ending::NoQuorum);
         }
         let counted = parts.iter().filter(|part| is_counted(part));
         let largest = counted.max_by_key(|part| part.len())?;

@@ -7,7 +7,7 @@ use uav_relay::{Duration, Instant, Side};
 
 use super::super::drones::{Nearest, Point, apart};
 use super::super::fleet::Vehicle;
-use super::super::outcome::Turning;
+use super::super::outcome::TimelineEvent;
 use super::super::queue::Happening;
 use super::state::Chain;
 
@@ -138,11 +138,11 @@ impl Chain {
         let mut turnings = Vec::new();
         while let Some(event) = vehicle.link.poll_event() {
             match event {
-                AutopilotEvent::Restarted => turnings.push(Turning::Restarted),
-                AutopilotEvent::State(State::Engaged) => turnings.push(Turning::Engaged),
-                AutopilotEvent::State(State::Blind) => turnings.push(Turning::Blind),
+                AutopilotEvent::Restarted => turnings.push(TimelineEvent::Restarted),
+                AutopilotEvent::State(State::Engaged) => turnings.push(TimelineEvent::Engaged),
+                AutopilotEvent::State(State::Blind) => turnings.push(TimelineEvent::Blind),
                 AutopilotEvent::State(State::Standby) if member.lent => {
-                    turnings.push(Turning::Released);
+                    turnings.push(TimelineEvent::Released);
                 }
                 _ => {}
             }
@@ -203,7 +203,7 @@ impl Chain {
         };
         let engaged = self.outcome.moments.iter().rev();
         engaged
-            .filter(|moment| moment.relay == member.node && moment.what == Turning::Engaged)
+            .filter(|moment| moment.relay == member.node && moment.what == TimelineEvent::Engaged)
             .map(|moment| moment.at)
             .next()
             .is_some_and(|at| self.now.since(at) >= LANDS_AFTER)

@@ -5,7 +5,7 @@ use uav_relay::{Port, Side, Wiring};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
-use super::super::outcome::{Moment, Turning};
+use super::super::outcome::{Moment, TimelineEvent};
 use super::super::queue::Happening;
 use super::super::record::Link;
 use super::super::sky::Sky;
@@ -27,7 +27,7 @@ impl Chain {
         if let Some(station) = self.stations.get_mut(at)
             && station.ground.upload(self.now, spec.upload).is_ok()
         {
-            self.tell_of_ground(spec.end, Turning::Offered(spec.upload.version()));
+            self.tell_of_ground(spec.end, TimelineEvent::Offered(spec.upload.version()));
         }
         self.drain_station(at);
     }
@@ -131,7 +131,7 @@ impl Chain {
         }
     }
 
-    fn tell_of_ground(&mut self, end: Side, what: Turning) {
+    fn tell_of_ground(&mut self, end: Side, what: TimelineEvent) {
         self.outcome.moments.push(Moment {
             at: self.now,
             relay: match end {

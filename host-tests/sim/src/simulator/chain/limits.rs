@@ -1,4 +1,4 @@
-//! Invariants of a run: setpoints stay within their limits, and Algorithm 2 never makes the chain worse.
+//! Invariants of a run. Setpoints stay within their limits, and Algorithm 2 never makes the chain worse.
 
 use uav_relay::{Method, Placement};
 

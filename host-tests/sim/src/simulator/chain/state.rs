@@ -63,7 +63,7 @@ pub struct Chain {
     pub(super) attacker: Option<Attacker>,
     pub(super) flight: Option<Flight>,
     pub(super) fleet: Vec<Vehicle>,
-    /// Distance of each pair of drones at their last hand-over, m; `None` while a pilot flies one of the two.
+    /// Distance of each pair of drones at their last hand-over, m. `None` while a pilot flies one of the two.
     pub(super) handed_over_m: Vec<Option<f64>>,
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     pub(super) medium: Option<Medium>,

@@ -2,7 +2,7 @@
 
 use uav_relay::Event;
 
-use super::super::outcome::{Moment, Turning};
+use super::super::outcome::{Moment, TimelineEvent};
 use super::state::{Chain, Member};
 
 impl Chain {
@@ -15,29 +15,29 @@ impl Chain {
             let (what, other) = match event {
                 Event::NeighbourLost { side, node } => {
                     self.outcome.noticed.insert((by, side), self.now);
-                    (Turning::Lost(side), Some(node))
+                    (TimelineEvent::Lost(side), Some(node))
                 }
                 Event::NeighbourBack { side, node } => {
                     self.outcome.noticed.remove(&(by, side));
-                    (Turning::Found(side), Some(node))
+                    (TimelineEvent::Found(side), Some(node))
                 }
-                Event::NotHeard { node } => (Turning::Unheard, Some(node)),
-                Event::MissionMismatch { node } => (Turning::Stranger, Some(node)),
-                Event::KeyMismatch { node } => (Turning::OtherKey, Some(node)),
-                Event::EpochWentBack { node } => (Turning::OldEpoch, Some(node)),
-                Event::IndexTaken { node } => (Turning::Namesake, Some(node)),
-                Event::Believed => (Turning::Believes, None),
-                Event::InterfererUnclear => (Turning::Unclear, None),
-                Event::SensorOff { node } => (Turning::Off, Some(node)),
-                Event::LeaseLapsed => (Turning::Lapsed, None),
+                Event::NotHeard { node } => (TimelineEvent::NotHeard, Some(node)),
+                Event::MissionMismatch { node } => (TimelineEvent::MissionMismatch, Some(node)),
+                Event::KeyMismatch { node } => (TimelineEvent::KeyMismatch, Some(node)),
+                Event::EpochWentBack { node } => (TimelineEvent::EpochWentBack, Some(node)),
+                Event::IndexTaken { node } => (TimelineEvent::DuplicateIndex, Some(node)),
+                Event::Believed => (TimelineEvent::NewEstimate, None),
+                Event::InterfererUnclear => (TimelineEvent::InterfererUnclear, None),
+                Event::SensorOff { node } => (TimelineEvent::SensorOff, Some(node)),
+                Event::LeaseLapsed => (TimelineEvent::LeaseLapsed, None),
                 Event::Converged => {
                     self.holding += 1;
-                    (Turning::Converged, None)
+                    (TimelineEvent::Converged, None)
                 }
                 Event::Reformed => {
                     // The rounds so far belong to the previous view.
                     self.outcome.rounds.clear();
-                    let what = Turning::Reformed {
+                    let what = TimelineEvent::Reformed {
                         view: member.relay.view().number(),
                         index: member.relay.index(),
                         relays: member.relay.mission().relays(),
@@ -51,11 +51,11 @@ impl Chain {
                         member.stored = upload;
                     }
                     let version = upload.map_or(0, |upload| upload.version());
-                    (Turning::Uploaded(version), None)
+                    (TimelineEvent::Uploaded(version), None)
                 }
-                Event::Adopted => (Turning::Adopted(member.relay.version()), None),
-                Event::NoQuorum => (Turning::Cut, None),
-                Event::Infeasible => (Turning::Infeasible, None),
+                Event::Adopted => (TimelineEvent::Adopted(member.relay.version()), None),
+                Event::NoQuorum => (TimelineEvent::NoQuorum, None),
+                Event::Infeasible => (TimelineEvent::Infeasible, None),
                 _ => continue,
             };
             self.tell(index, what, other);
@@ -63,7 +63,7 @@ impl Chain {
     }
 
     /// Adds a log entry about relay `index` (from 0).
-    pub(super) fn tell(&mut self, index: usize, what: Turning, other: Option<u16>) {
+    pub(super) fn tell(&mut self, index: usize, what: TimelineEvent, other: Option<u16>) {
         let Some(member) = self.members.get(index) else {
             return;
         };
@@ -82,9 +82,9 @@ impl Chain {
         for deaf in self.setup.deaf.clone() {
             let by = usize::from(deaf.by).saturating_sub(1);
             if deaf.from == self.now {
-                self.tell(by, Turning::Deaf, Some(deaf.of));
+                self.tell(by, TimelineEvent::Deaf, Some(deaf.of));
             } else if deaf.until == Some(self.now) {
-                self.tell(by, Turning::Hears, Some(deaf.of));
+                self.tell(by, TimelineEvent::Hears, Some(deaf.of));
             }
         }
         let relays = self.setup.mission.relays();
@@ -95,9 +95,9 @@ impl Chain {
             }
             let last = usize::from(partition.after).saturating_sub(1);
             if partition.from == self.now {
-                self.tell(last, Turning::Parted, None);
+                self.tell(last, TimelineEvent::Partitioned, None);
             } else if partition.until == Some(self.now) {
-                self.tell(last, Turning::Healed, None);
+                self.tell(last, TimelineEvent::PartitionEnded, None);
             }
         }
     }

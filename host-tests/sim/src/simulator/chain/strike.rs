@@ -89,7 +89,7 @@ impl Chain {
         }
     }
 
-    /// Returns the index (from 0) of relay `to` (from 1), or of a random living relay if that one is not alive.
+    /// Returns the index (from 0) of relay `to` (from 1). If that one is not alive, it is a random living relay.
     fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
         let living = |member: &Member| member.killed.is_none();
         let meant = to.and_then(|to| usize::from(to).checked_sub(1));
@@ -113,8 +113,8 @@ impl Chain {
         let name = fate(&before, member.relay.stats());
         *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
         let note = match kind {
-            Strike::Forge => "the attacker's own",
-            Strike::Replay => "the attacker's, sent again",
+            Strike::Forge => "forged by the attacker",
+            Strike::Replay => "replayed by the attacker",
         };
         self.keep_frame(self.now, link(index, port), bytes, note.to_owned());
         self.drain(index);

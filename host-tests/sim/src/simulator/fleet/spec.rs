@@ -16,7 +16,7 @@ pub struct Takeover {
     pub from: Instant,
     /// End time, if any: the pilot then hands the drone over once it hovers without traffic.
     pub until: Option<Instant>,
-    /// Position to which the pilot flies, m along the run's line, to its right and up; `None` to climb in place.
+    /// Position to which the pilot flies, m along the run's line, to its right and up. `None` to climb in place.
     pub to: Option<Point>,
 }
 
@@ -50,7 +50,7 @@ impl FleetSpec {
     }
 }
 
-/// Returns a line of the given length eastward from 47.4 N, 8.54 E, for scenarios without sites; `None` for an invalid length.
+/// Returns a line of the given length eastward from 47.4 N, 8.54 E, for scenarios without sites. `None` for an invalid length.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
     const TX: [f64; 2] = [47.4, 8.54];
     let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;

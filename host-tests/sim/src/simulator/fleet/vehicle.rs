@@ -1,4 +1,4 @@
-//! One drone with its autopilot: dynamics, modes and messages.
+//! Simulated drone with its autopilot: dynamics, modes and messages.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -24,7 +24,8 @@ pub const TURNAROUND: usize = 6;
 /// Overhead of a frame on the air, bytes.
 pub const OVERHEAD: usize = HEADER + TURNAROUND;
 
-/// Back-off slot, in bytes: `aUnitBackoffPeriod`, 20 symbols; longer than the turnaround, so that later slots sense the sender.
+/// Length of a back-off slot, bytes: `aUnitBackoffPeriod`, 20 symbols. It is longer than the turnaround, so that later slots sense
+/// the sender.
 pub const SLOT: usize = 10;
 
 /// Initial back-off exponent, `macMinBE`: the first wait is 0 to 2^3 - 1 slots.

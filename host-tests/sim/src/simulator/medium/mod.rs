@@ -194,7 +194,7 @@ impl Medium {
     fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let until = now + self.link.line_time(access::TURNAROUND);
         if let Some(radio) = self.radios.get_mut(node) {
-            radio.state = State::Turning { until };
+            radio.state = State::TimelineEvent { until };
             agenda.push((until, AirEvent::Begin(node)));
         }
         for frame in &mut self.on_air {
@@ -212,7 +212,7 @@ impl Medium {
         let Some(radio) = self.radios.get_mut(node) else {
             return;
         };
-        if radio.state != (State::Turning { until: now }) {
+        if radio.state != (State::TimelineEvent { until: now }) {
             return;
         }
         let frame = radio.queue.pop_front().unwrap_or_default();
@@ -265,7 +265,7 @@ impl Medium {
 }
 
 impl OnAir {
-    /// Returns true if `node` is in range and the frame has not ended; a frame ending now does not interfere.
+    /// Returns true if `node` is in range and the frame has not ended. A frame ending now does not interfere.
     fn is_heard(&self, node: usize, now: Instant) -> bool {
         self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
     }

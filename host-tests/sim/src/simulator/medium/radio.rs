@@ -11,8 +11,8 @@ pub(super) enum State {
     Idle,
     /// Receiving until the back-off ends; `exponent` is the back-off exponent.
     Waiting { until: Instant, exponent: u32 },
-    /// Turning from receiving to sending.
-    Turning { until: Instant },
+    /// TimelineEvent from receiving to sending.
+    TimelineEvent { until: Instant },
     /// Sending.
     Sending,
 }
@@ -27,7 +27,7 @@ pub(super) struct Radio {
 impl Radio {
     /// Returns true while the radio cannot receive.
     pub(super) fn is_deaf(&self) -> bool {
-        matches!(self.state, State::Turning { .. } | State::Sending)
+        matches!(self.state, State::TimelineEvent { .. } | State::Sending)
     }
 
     /// Returns the number of frames held, including the one being sent.

@@ -3,8 +3,8 @@ use std::path::PathBuf;
 use clap::Parser;
 use uav_relay_tools::figures::ALL;
 
-/// Computes every figure of the paper's evaluation, and this project's own, with the code that flies: pictures (SVG), their
-/// numbers (CSV), and index.html with all of them.
+/// Computes every figure of the paper's evaluation, and this project's own, with the code that flies. Pictures (SVG), their numbers
+/// (CSV), and index.html with all of them.
 #[derive(Parser, Debug)]
 #[command(name = "figures", bin_name = "cargo figures", disable_version_flag = true, after_help = figures())]
 pub(crate) struct Options {

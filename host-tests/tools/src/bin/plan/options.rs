@@ -4,7 +4,7 @@ use clap::{Args, Parser, ValueEnum};
 use uav_relay_sim::command::{number, whole};
 use uav_relay_tools::plan::{Number, Unit};
 
-/// Computes how many relays a target SIR needs, or the best places for a given number, without any messages.
+/// Computes how many relays a target SIR needs, or the best places for a given number. No messages are simulated.
 #[derive(Parser, Debug)]
 #[command(name = "plan", bin_name = "cargo plan", disable_version_flag = true)]
 pub(crate) struct Options {
@@ -13,8 +13,9 @@ pub(crate) struct Options {
     pub(crate) scenario: Option<PathBuf>,
     #[command(flatten)]
     wanted: Wanted,
-    /// Altitudes: each relay stays above the line at its altitude of the scenario, or may choose an altitude in the scenario's
-    /// band (geometry.altitude_min_m to altitude_max_m) and a place beside the line (geometry.lateral_min_m to lateral_max_m)
+    /// Altitudes of the relays: fixed, or free in the scenario's band. A fixed relay stays above the line at its altitude of the
+    /// scenario. A free one may choose an altitude (geometry.altitude_min_m to altitude_max_m) and a place beside the line
+    /// (geometry.lateral_min_m to lateral_max_m)
     #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
     pub(crate) altitude: Altitude,
     /// Required place of the only relay, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
@@ -30,10 +31,11 @@ pub(crate) struct Options {
     /// Print one JSON object on standard output and nothing else there
     #[arg(long)]
     pub(crate) json: bool,
-    /// Draw the chain from the side, and from above where there is room or an interferer beside the line, with each hop's SIR
+    /// Draw the chain from the side, with each hop's SIR. A view from above is added where there is room or an interferer beside
+    /// the line
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write sites, relays, hops and interferers with geographic coordinates for a map (GeoJSON); needs a scenario with a site
+    /// Write sites, relays, hops and interferers with geographic coordinates for a map (GeoJSON). Needs a scenario with a site
     #[arg(long, value_name = "FILE")]
     pub(crate) geojson: Option<PathBuf>,
     /// Write the same for a globe (KML), with altitudes above the sea
@@ -54,13 +56,13 @@ struct Wanted {
     /// The best places for this number of relays, 1 to 1000
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     uavs: Option<u16>,
-    /// The fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
+    /// Find the fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-9, 1e9))]
     target_sir: Option<f64>,
     /// --target-sir in dB, -90 to 90
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, -90.0, 90.0))]
     target_sir_db: Option<f64>,
-    /// The fewest relays that carry this data rate, bit/s, 1e-9 to 1e15, while all hops share one frequency; needs --bandwidth-hz
+    /// Find the fewest relays that carry this data rate, bit/s, 1e-9 to 1e15. All hops share one frequency. Needs --bandwidth-hz
     #[arg(long, value_name = "R", requires = "bandwidth_hz", value_parser = |text: &str| number(text, 1e-9, 1e15))]
     target_rate_bps: Option<f64>,
 }

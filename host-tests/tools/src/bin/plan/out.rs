@@ -37,7 +37,7 @@ pub(crate) fn check(options: &Options, scenario: &Scenario) -> Result<(), Failur
     }
     if file.exists() && !options.force {
         return refuse(format!(
-            "--out {}: is there already; --force writes over it",
+            "--out {}: exists already; --force overwrites it",
             file.display()
         ));
     }

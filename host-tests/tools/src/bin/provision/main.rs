@@ -85,7 +85,9 @@ fn run(options: &Options) -> Result<String, String> {
         }
     };
     if secret.is_none() {
-        command::complain("no --key-file: frames are not signed, and anybody can send some");
+        command::complain(
+            "no --key-file: frames are not signed, and anybody in range can send frames",
+        );
     }
     Ok(said)
 }
@@ -113,7 +115,7 @@ impl<'a> Asked<'a> {
         );
         let plan = scenario.plan.as_ref();
         let other = |option: &str, has: &str| {
-            format!("{option}: {name} has a [plan] with {has}; leave the option out, or plan anew")
+            format!("{option}: {name} has a [plan] with {has}; leave the option out, or plan again")
         };
         let uavs = match (options.uavs, plan) {
             (Some(uavs), Some(plan)) if uavs != plan.uavs => {
@@ -215,7 +217,7 @@ impl<'a> Asked<'a> {
             .asking_after(self.probe_after_ms))
     }
 
-    /// Returns the positions that the relays settle on, if needed; rejects a hypothetical interferer that loses too much.
+    /// Returns the positions that the relays settle on, if needed. Rejects a hypothetical interferer that loses too much.
     fn flown(&self) -> Result<Option<Flown>, String> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
@@ -248,7 +250,7 @@ impl<'a> Asked<'a> {
         if flown.is_poor() {
             let line = format!("{}: {}", self.name, flown.describe());
             if flown.stand_in && !self.options.stand_in {
-                return Err(format!("{line}; --stand-in has it written nevertheless"));
+                return Err(format!("{line}; --stand-in writes it all the same"));
             }
             command::complain(&line);
         }

@@ -8,7 +8,7 @@ use uav_relay_sim::command;
 
 use super::options::{Method, Options};
 
-/// Reports options that override the section, so that nobody relies on a value in the file that is not used.
+/// Reports options that override the section. Nobody then relies on a value in the file that is not used.
 pub(super) fn overridden(
     options: &Options,
     section: &Network,
@@ -16,7 +16,7 @@ pub(super) fn overridden(
     name: &str,
 ) {
     let say = |option: &str, key: &str| {
-        command::complain(&format!("{option} counts, and not network.{key} of {name}"));
+        command::complain(&format!("{option} replaces network.{key} of {name}"));
     };
     if let (Some(given), Some(own)) = (options.probe_after_ms, section.probe_after_ms)
         && given != own
@@ -63,11 +63,11 @@ pub(super) fn method(
             let said = format!("{method:?}").to_lowercase();
             if is_planned {
                 return Err(format!(
-                    "{name}: network.method = \"{text}\": must be \"{said}\", as its [plan] has it, or plan anew"
+                    "{name}: network.method = \"{text}\": must be \"{said}\", as its [plan] has it, or plan again"
                 ));
             }
             command::complain(&format!(
-                "--method {said} counts, and not network.method = \"{text}\" of {name}"
+                "--method {said} replaces network.method = \"{text}\" of {name}"
             ));
             Ok(method)
         }

@@ -41,20 +41,19 @@ pub(crate) struct Options {
     /// Measure the field on board, and trust this many samples at a place, 100 to 1000000
     #[arg(long, value_name = "S", value_parser = whole::<u32>(100, 1_000_000))]
     pub(crate) samples: Option<u32>,
-    /// File with the network's key, 64 hexadecimal digits; without one here or in the scenario's section `network`, frames are
-    /// not signed
+    /// File with the network's key, 64 hexadecimal digits. Without one here or in the scenario's section `network`, frames are not
+    /// signed
     #[arg(long, value_name = "FILE")]
     pub(crate) key_file: Option<PathBuf>,
-    /// Least epoch to sign with, 1 to 4294967294, above any that a relay of this index has used with this key: it rises by itself
-    /// from there. By default the seconds of this machine's clock
+    /// Least epoch to sign with, 1 to 4294967294. It must exceed every epoch that a relay of this index has used with this key. It
+    /// rises by itself from there. By default the seconds of this machine's clock
     #[arg(long, value_name = "E", value_parser = whole::<u32>(1, 0xFFFF_FFFE))]
     pub(crate) epoch: Option<u32>,
-    /// Bits per second of the radio channel that the relays share, 300 to 10000000; refused if too slow for them
+    /// Bits per second of the radio channel that the relays share, 300 to 10000000. Refused if too slow for them
     #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = whole(300, MOST_BAUD))]
     pub(crate) baud: u32,
-    /// Milliseconds of silence after which a relay probes a neighbour, 1 to 1200000; after three times as many the neighbour
-    /// counts as lost. By default those of the scenario's section `network`, or 5000. Larger values let a slow channel carry more
-    /// relays
+    /// Milliseconds of silence after which a relay probes a neighbour, 1 to 1200000. After three times as many the neighbour counts
+    /// as lost. By default those of the scenario's section `network`, or 5000. Larger values let a slow channel carry more relays
     #[arg(long, value_name = "MS", value_parser = whole(1, MOST_PROBE_AFTER_MS))]
     pub(crate) probe_after_ms: Option<u32>,
     /// Number of relays within range of each other on the channel, 1 to 1000; by default all of them
@@ -66,11 +65,11 @@ pub(crate) struct Options {
     /// Greatest speed of the drone, m/s, 0.1 to 20, if the scenario has sites; 5 by default
     #[arg(long, value_name = "M/S", value_parser = speed)]
     pub(crate) speed: Option<f32>,
-    /// File with the key that the drone's autopilot signs with, 64 hexadecimal digits, if the scenario has sites; without one the
-    /// messages between the two are not signed
+    /// File with the signing key of the drone's autopilot, 64 hexadecimal digits. It applies if the scenario has sites. Without a
+    /// key the messages between the two are not signed
     #[arg(long, value_name = "FILE")]
     pub(crate) autopilot_key_file: Option<PathBuf>,
-    /// Accept a hypothetical interferer in place of several even if that loses more than 1 % of the best SIR
+    /// Accept a hypothetical interferer in place of several. Without it a loss of more than 1 % of the best SIR is refused
     #[arg(long)]
     pub(crate) stand_in: bool,
     /// File to write the block to

@@ -51,7 +51,7 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
     }
 }
 
-/// Returns the points on either side of the antimeridian where the short way crosses it; `None` if it does not.
+/// Returns the points on either side of the antimeridian where the short way crosses it. `None` if it does not.
 fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let [lon, lat, high] = from;
     let [other_lon, other_lat, other_high] = to;

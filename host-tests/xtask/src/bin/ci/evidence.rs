@@ -1,4 +1,4 @@
-//! Evidence of a failed step: the relevant output, repeated at the end of a run, so that a log's last lines contain it.
+//! Evidence of a failed step. The relevant output, repeated at the end of a run, so that a log's last lines contain it.
 
 use std::collections::VecDeque;
 use std::fmt::{Display, Formatter, Result as FormatResult};

@@ -1,4 +1,4 @@
-//! `cargo ci`: runs all checks one after the other; the last lines name the failed ones, with their output.
+//! Runs all checks one after the other; `cargo ci`. The last lines name the failed ones, with their output.
 
 mod evidence;
 mod prepare;
@@ -13,7 +13,7 @@ use clap::Parser;
 #[derive(Parser)]
 #[command(name = "cargo ci")]
 struct Options {
-    /// Run only the quick checks: formatting, host lints, the library's tests and integration tests that take seconds.
+    /// Run only the quick checks. Formatting, host lints, the library's tests and integration tests that take seconds.
     #[arg(long)]
     quick: bool,
     /// Run only the steps whose names contain this text.

@@ -6,7 +6,7 @@ use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
 use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
-/// Debian packages, each with a program of its name: the emulator that runs the firmware, Wireshark's command line, which reads
+/// Debian packages, each with a program of its name. The emulator that runs the firmware, Wireshark's command line, which reads
 /// captures, and a browser.
 const OF_DEBIAN: [&str; 3] = ["qemu-system-arm", "tshark", "chromium"];
 
@@ -77,7 +77,7 @@ const FOR_THE_REST: [Needed; 5] = [
 /// Version of cargo-fuzz.
 const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
-/// Adds missing tools, for the quick steps or for all; returns the command to type for a tool that cannot be added.
+/// Adds missing tools, for the quick steps or for all. Returns the command to type for a tool that cannot be added.
 pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     add(&TO_EDIT)?;
     if quick {

@@ -157,6 +157,10 @@ fn first() -> Vec<Step> {
     vec![
         step("formatting", "cargo fmt --all --check"),
         step(
+            "doc comments",
+            "cargo run --quiet --package uav-relay-xtask --bin comments",
+        ),
+        step(
             "clippy, host",
             "cargo clippy --workspace --all-targets --locked -- -D warnings",
         ),
@@ -179,7 +183,7 @@ fn clippy() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps of the Embassy examples, a separate workspace: checked like the rest, for each chip; the application on the
+/// Returns the steps of the Embassy examples, a separate workspace. Checked like the rest, for each chip; the application on the
 /// host, too.
 fn embassy() -> Vec<Step> {
     const MANIFEST: &str = "--manifest-path examples/embassy/Cargo.toml";
@@ -256,7 +260,7 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that need a nightly compiler: every fuzz target, starting with its corpus, and the corpora under Miri.
+/// Returns the steps that need a nightly compiler. Every fuzz target, starting with its corpus, and the corpora under Miri.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {

@@ -171,7 +171,8 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
     Ok((flash, ram))
 }
 
-/// Returns the largest stack of the thread, from the entry that `Reset` calls, and of one interrupt with its FPU frame.
+/// Returns the largest stack of the thread and of one interrupt. The thread begins with the entry that `Reset` calls; an interrupt
+/// includes its FPU frame.
 pub(crate) fn deepest_stack(elf: &Path, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
@@ -210,7 +211,7 @@ pub(crate) fn deepest_stack(elf: &Path, flies: bool) -> Result<(u64, u64), Strin
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Links every relay image with a panic handler that cannot be linked; and, as a control, one that does panic.
+/// Links every relay image with a panic handler that cannot be linked. And, as a control, one that does panic.
 pub(crate) fn no_panic() -> Result<(), String> {
     only_finished_futures_panic()?;
     let link = |features: &[&str], flags: &[&str]| {

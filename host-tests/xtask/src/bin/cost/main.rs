@@ -1,4 +1,4 @@
-//! `cargo cost`: costs of the firmware against its budgets and the documents, and the proof that it cannot panic.
+//! Compares the firmware's costs with budgets and documents, and proves that it cannot panic. Run by `cargo cost`.
 //!
 //! Builds the relay image and the counting image with the firmware profile, reads sizes and the largest stack from the relay's
 //! ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked.

@@ -1,6 +1,6 @@
 //! Compares the output in a page with the actual output.
 
-/// Checks that the page's lines occur in the output in order; in a noisy block each number matches any number.
+/// Checks that the page's lines occur in the output in order. In a noisy block each number matches any number.
 ///
 /// # Errors
 /// The first missing line, and the most similar line of the output.

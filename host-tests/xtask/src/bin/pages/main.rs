@@ -1,5 +1,4 @@
-//! Tests the commands in the user documentation: runs them in a folder like a clean clone and compares their output with the
-//! page.
+//! Tests the commands in the user documentation. Runs them in a folder like a clean clone and compares their output with the page.
 //!
 //! A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are commands. A
 //! following block `text` under the same heading is the expected output, and so are the other lines of a `console`.
@@ -52,7 +51,7 @@ const PAGES: [&str; 12] = [
 #[derive(Parser)]
 #[command(name = "pages")]
 struct Options {
-    /// Only the pages whose names contain this
+    /// Run for pages whose names contain this only
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
 }

@@ -1,4 +1,4 @@
-//! A folder like a clean clone, and a shell in it that maps `cargo chain` and other aliases to built binaries.
+//! Folder like a clean clone, and a shell in it. It maps `cargo chain` and other aliases to built binaries.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -96,7 +96,7 @@ impl Shell {
     }
 }
 
-/// Returns a shell function `cargo` that runs the binaries in `bin` for those aliases of `config` that are built.
+/// Returns a shell function `cargo` that maps aliases to binaries. It has those aliases of `config` that are built in `bin`.
 fn functions(config: &str, bin: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {

@@ -17,7 +17,7 @@ struct Arguments {
     /// Folder to write to; it must be empty or missing
     #[arg(required_unless_present = "check")]
     folder: Option<PathBuf>,
-    /// Write every template into an empty folder of its own, check its formatting, lint it and build it; `cargo ci` does so
+    /// Write every template into an empty folder of its own, check its formatting, lint it and build it. `cargo ci` does so
     #[arg(long, conflicts_with_all = ["name", "folder"])]
     check: bool,
 }
@@ -46,7 +46,7 @@ fn write(name: &str, folder: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Writes, lints and builds a template outside this checkout, whose cargo settings would hide missing linker arguments.
+/// Writes, lints and builds a template outside this checkout. This checkout's cargo settings would hide missing linker arguments.
 fn check(name: &str) -> Result<(), Box<dyn Error>> {
     let above = std::env::temp_dir().join(format!("uav-relay-template-{}", std::process::id()));
     let folder = above.join(name);
