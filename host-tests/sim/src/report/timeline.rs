@@ -194,7 +194,9 @@ impl Group {
             "lost" => format!("{} is missed", one.other.unwrap_or_default()),
             "found" => format!("{} meets {}", one.relay, one.other.unwrap_or_default()),
             "formed" => format!("formed: {}", one.relays.unwrap_or_default()),
-            "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
+            "converged" => one
+                .sir
+                .map_or_else(|| "spread".to_owned(), |sir| format!("SIR {sir:.3}")),
             "parted" => format!("parted after {}", one.relay),
             "healed" => format!("joined after {}", one.relay),
             "deaf" => format!("{} deaf to {}", one.relay, one.other.unwrap_or_default()),
