@@ -8,6 +8,7 @@
 //! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
 //! | the same again, numbered as a repetition | accepted, and nothing else |
 //! | any other numbers | denied: [`AutopilotEvent::ClearRefused`] |
+//! | any, while the last one's answer, event or side has not been polled | ignored: an operator's station repeats it |
 
 use heapless::Vec;
 
@@ -95,6 +96,11 @@ impl Clearance {
         self.answer = Some((from, ACCEPTED));
         self.cleared = Some(side);
         Some(AutopilotEvent::LostCleared { side, relays, from })
+    }
+
+    /// Returns true until the answer to the last command and its side have been taken.
+    pub(super) const fn is_busy(&self) -> bool {
+        self.answer.is_some() || self.cleared.is_some()
     }
 
     /// Removes the answer that is due.
