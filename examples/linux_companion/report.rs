@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde_json::json;
 use uav_relay::Geofence;
-use uav_relay::sensing::belief::{Belief, Told};
+use uav_relay::sensing::belief::{Belief, Spread, Told};
 
 use uav_relay::{
     Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, Stats, Upload,
@@ -336,12 +336,14 @@ impl Report {
 
     fn converged(&self, now: Instant, target: f32) {
         let db = 10.0 * target.log10();
-        self.log.say(
-            now,
-            "converged",
-            json!({ "target_sir": target, "target_sir_db": db }),
-            format_args!("target SIR {:.6}, {db:.3} dB", Exact(target)),
-        );
+        let fields = json!({ "target_sir": target, "target_sir_db": db });
+        if target > 0.0 {
+            let text = format_args!("target SIR {:.6}, {db:.3} dB", Exact(target));
+            self.log.say(now, "converged", fields, text);
+        } else {
+            let text = format_args!("the relays spread along the line to measure the interferer");
+            self.log.say(now, "converged", fields, text);
+        }
     }
 
     fn believed(&self, now: Instant, told: Told) {
@@ -360,7 +362,16 @@ impl Report {
                     Exact(source.y_m)
                 ),
             ),
-            Belief::Unknown(spread) => tell(format_args!("interference unknown; the relays spread, pattern {spread:?}")),
+            Belief::Unknown(spread) => {
+                let spread = match spread {
+                    Spread::Even => "evenly",
+                    Spread::TowardTx => "toward the transmitter",
+                    Spread::TowardRx => "toward the receiver",
+                };
+                tell(format_args!(
+                    "interference unknown; the relays spread {spread} to measure it"
+                ));
+            }
             Belief::Mission => tell(format_args!("the interferer of the mission")),
         }
     }

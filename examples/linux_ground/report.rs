@@ -2,13 +2,14 @@
 
 use serde_json::json;
 use uav_relay::{
-    FlownMission, Ground, GuardConfig, Instant, Mission, MissionConfig, Progress, Side, Stats,
-    Upload,
+    FlownMission, Geofence, Ground, GuardConfig, Instant, Mission, MissionConfig, Placement,
+    Progress, Side, Stats, Upload,
 };
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
 
+use crate::forecast::Move;
 use crate::measurements::name;
 use crate::options::Plan;
 
@@ -108,49 +109,100 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("--version {version}: relay {by}, or one beyond it, refuses it");
-    match outside(plan, upload) {
-        Some(outside) => format!("{who}: {outside}"),
+    match Outside::of(plan, upload) {
+        Some(Outside { what, .. }) => format!("{who}: {what}"),
         None => format!("{who}: the log of the one that does says why"),
     }
 }
 
-/// Returns the value of `upload` that leaves the geofence, with its range. Assumes that the relays have the geofence of the
-/// loaded mission, the default.
-pub(crate) fn outside(plan: &Plan, upload: &Upload) -> Option<String> {
-    let (loaded, new) = (plan.loaded.mission.config(), upload.config());
-    let fence = |config: &MissionConfig| {
-        let guard =
-            Mission::try_new(*config).map(|mission| GuardConfig::of(&mission, config.common));
-        guard.ok().map(|guard| guard.fence)
-    };
-    let (own, asked) = (fence(loaded)?, fence(new)?);
-    let range = |what: &str, is: [f32; 2], of: [f32; 2], options: &str| {
+/// Value of an upload that leaves the geofence of the relays.
+pub(crate) struct Outside {
+    /// The value and its range.
+    what: String,
+    name: &'static str,
+    /// Coordinate of a position that the range limits, m.
+    coordinate: fn(&Placement) -> f32,
+    range_m: [f32; 2],
+}
+
+impl Outside {
+    /// Returns the first value of `upload` that leaves the geofence. Assumes that the relays have the geofence of the loaded
+    /// mission, the default.
+    pub(crate) fn of(plan: &Plan, upload: &Upload) -> Option<Self> {
+        let (loaded, new) = (plan.loaded.mission.config(), upload.config());
+        let fence = |config: &MissionConfig| {
+            let mission = Mission::try_new(*config).ok()?;
+            Some(GuardConfig::of(&mission, config.common).fence)
+        };
+        let (own, asked) = (fence(loaded)?, fence(new)?);
+        let leaves = |is: [f32; 2], of: [f32; 2]| is[0] < of[0] || is[1] > of[1];
+        let altitudes = |of: Geofence| [of.least_altitude_m, of.most_altitude_m];
+        let sides = |of: Geofence| [of.least_y_m, of.most_y_m];
+        let (what, is, range_m, options, name, coordinate): (_, _, _, _, _, fn(&Placement) -> f32) =
+            if leaves(altitudes(asked), altitudes(own)) {
+                (
+                    "altitude",
+                    altitudes(asked),
+                    altitudes(own),
+                    "this --altitude and --band",
+                    "altitude",
+                    |at| at.altitude_m,
+                )
+            } else if leaves(sides(asked), sides(own)) {
+                (
+                    "room to the side",
+                    sides(asked),
+                    sides(own),
+                    "this --lateral-min-m and --lateral-max-m",
+                    "y",
+                    |at| at.y_m,
+                )
+            } else if upload.sites().is_none() && asked.most_x_m > own.most_x_m {
+                (
+                    "distance",
+                    [asked.most_x_m; 2],
+                    [own.least_x_m, own.most_x_m],
+                    "this --distance",
+                    "x",
+                    |at| at.x_m,
+                )
+            } else {
+                return None;
+            };
         let is = match is {
             [least, most] if least.to_bits() == most.to_bits() => least.to_string(),
             [least, most] => format!("{least} to {most}"),
         };
-        let [least, most] = of;
-        Some(format!(
+        let [least, most] = range_m;
+        let what = format!(
             "{what} {is} m: must be within {least} to {most} m, the geofence of relays that were loaded with {options}"
-        ))
-    };
-    let asked_h = [asked.least_altitude_m, asked.most_altitude_m];
-    let own_h = [own.least_altitude_m, own.most_altitude_m];
-    let (asked_y, own_y) = (
-        [asked.least_y_m, asked.most_y_m],
-        [own.least_y_m, own.most_y_m],
-    );
-    let leaves = |is: [f32; 2], of: [f32; 2]| is[0] < of[0] || is[1] > of[1];
-    if leaves(asked_h, own_h) {
-        range("altitude", asked_h, own_h, "this --altitude and --band")
-    } else if leaves(asked_y, own_y) {
-        let options = "this --lateral-min-m and --lateral-max-m";
-        range("room to the side", asked_y, own_y, options)
-    } else if upload.sites().is_none() && asked.most_x_m > own.most_x_m {
-        let (is, of) = ([asked.most_x_m; 2], [own.least_x_m, own.most_x_m]);
-        range("distance", is, of, "this --distance")
-    } else {
-        None
+        );
+        Some(Self {
+            what,
+            name,
+            coordinate,
+            range_m,
+        })
+    }
+
+    /// Returns the value and its range, and the relay that would fly farthest outside.
+    pub(crate) fn line(&self, moves: Option<&[Move]>) -> String {
+        let Self { what, name, .. } = self;
+        let [least, most] = self.range_m;
+        let beyond_m = |it: &Move| {
+            let at = (self.coordinate)(&it.after);
+            (least - at).max(at - most)
+        };
+        let moves = moves.unwrap_or_default().iter().rev();
+        let outside = moves.filter(|it| beyond_m(it) > 0.0);
+        match outside.max_by(|one, other| beyond_m(one).total_cmp(&beyond_m(other))) {
+            Some(it) => {
+                let at = (self.coordinate)(&it.after);
+                let index = it.index;
+                format!("{what}; farthest outside is relay {index}, at {name} {at:.1} m")
+            }
+            None => what.clone(),
+        }
     }
 }
 

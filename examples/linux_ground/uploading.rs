@@ -18,7 +18,7 @@ use crate::change;
 use crate::forecast::moves;
 use crate::new::Basis;
 use crate::options::{Change, Plan};
-use crate::report;
+use crate::report::{self, Outside};
 
 /// Time that a relay has to send the values of its mission.
 const VALUES: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
@@ -205,14 +205,15 @@ impl Uploading {
         }
         let after = Basis::flown(upload, change.sited);
         change::tell(log, now, &before, &after);
-        if let Some(outside) = report::outside(plan, &upload)
-            && !change.no_fence
-        {
-            return Some(Err(format!("--version {version}: {outside}").into()));
-        }
         let lines = [before.line, after.line];
         let moves = moves(&plan.loaded, flown.upload.as_ref(), &upload, lines);
         change::tell_moves(log, now, moves.as_deref());
+        if let Some(outside) = Outside::of(plan, &upload)
+            && !change.no_fence
+        {
+            let outside = outside.line(moves.as_deref());
+            return Some(Err(format!("--version {version}: {outside}").into()));
+        }
         if change.dry_run {
             let what = format_args!("version {version} was not uploaded");
             log.tell(now, "dry run", what);

@@ -5,6 +5,7 @@ use uav_relay::flight::autopilot::{AutopilotEvent, Kind};
 use uav_relay::flight::mavlink::frame::Address;
 use uav_relay::{Event, Side};
 
+use crate::signed::{OTHER, OURS, keyed};
 use crate::vehicle::{SYSTEM, Said, Vehicle};
 
 /// Address of QGroundControl.
@@ -96,4 +97,81 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
             assert!(has_said, "{line}");
         }
     }
+}
+
+/// Checks commands of which a cable or a router delivers two at once: the second one is as good as lost, and its repetition counts.
+#[test]
+fn two_commands_at_once_are_obeyed_one_after_the_other() {
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.fly_off();
+    for (side, node) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
+        vehicle
+            .link
+            .handle_event(Event::NeighbourLost { side, node });
+    }
+    let own = [SYSTEM, 191];
+    let cleared = |vehicle: &Vehicle| {
+        let events = vehicle.events.iter();
+        let sides = events.filter_map(|event| match event {
+            AutopilotEvent::LostCleared { side, .. } => Some(*side),
+            _ => None,
+        });
+        sides.collect::<Vec<_>>()
+    };
+    vehicle.say_from(STATION, &command(own, [1.0, 0.0], 0));
+    vehicle.say_from(STATION, &command(own, [3.0, 0.0], 0));
+    vehicle.run(1_000);
+    assert_eq!(answers(&vehicle), [(0, STATION)]);
+    assert_eq!(vehicle.link.poll_cleared(), Some(Side::Upstream));
+    assert_eq!(cleared(&vehicle), [Side::Upstream]);
+    vehicle.say_from(STATION, &command(own, [3.0, 0.0], 1));
+    vehicle.run(1_000);
+    assert_eq!(answers(&vehicle)[1..], [(0, STATION)]);
+    assert_eq!(vehicle.link.poll_cleared(), Some(Side::Downstream));
+    assert_eq!(cleared(&vehicle)[1..], [Side::Downstream]);
+
+    // A wrong command right behind one that was accepted does not hide it from the log.
+    let side = Side::Downstream;
+    vehicle
+        .link
+        .handle_event(Event::NeighbourLost { side, node: 3 });
+    vehicle.say_from(STATION, &command(own, [3.0, 0.0], 0));
+    vehicle.say_from(STATION, &command(own, [4.0, 0.0], 0));
+    vehicle.run(1_000);
+    assert_eq!(cleared(&vehicle)[2..], [side]);
+    assert_eq!(vehicle.link.poll_cleared(), Some(side));
+}
+
+/// Checks a link with a key: a command counts only if it is signed with that key, and only once.
+#[test]
+fn with_a_key_only_a_signed_command_clears_a_relay() {
+    let side = Side::Downstream;
+    let mut vehicle = keyed(Kind::ArduCopter, Some(OURS), Some(OURS));
+    vehicle.fly_off();
+    vehicle
+        .link
+        .handle_event(Event::NeighbourLost { side, node: 3 });
+    let right = command([SYSTEM, 191], [3.0, 0.0], 0);
+    let key = vehicle.key.take();
+    for wrong in [None, Some(OTHER)] {
+        vehicle.key = wrong.map(crate::signed::Key::new);
+        let before = vehicle.link.refused();
+        vehicle.say_from(STATION, &right);
+        assert_eq!(vehicle.link.refused(), before + 1, "{wrong:?}");
+        assert_eq!(vehicle.link.poll_cleared(), None);
+    }
+    vehicle.key = key;
+    vehicle.run(1_000);
+    assert_eq!(answers(&vehicle), [], "nobody is answered");
+    vehicle.say_from(STATION, &right);
+    vehicle.run(1_000);
+    assert_eq!(answers(&vehicle), [(0, STATION)]);
+    assert_eq!(vehicle.link.poll_cleared(), Some(side));
+    let relays = [3, 0, 0, 0, 0, 0, 0];
+    let cleared = AutopilotEvent::LostCleared {
+        side,
+        relays,
+        from: FROM,
+    };
+    assert!(vehicle.events.contains(&cleared), "{:?}", vehicle.events);
 }

@@ -7,8 +7,8 @@ use uav_relay::flight::mavlink::frame::{checksum, find_known};
 
 use super::*;
 
-const OURS: [u8; 32] = [7; 32];
-const OTHER: [u8; 32] = [8; 32];
+pub(crate) const OURS: [u8; 32] = [7; 32];
+pub(crate) const OTHER: [u8; 32] = [8; 32];
 
 /// Year 2026 in time stamp units.
 const STAMP: u64 = 37_527_840_000_000;
@@ -23,7 +23,7 @@ pub(crate) struct Key {
 }
 
 impl Key {
-    const fn new(bytes: [u8; 32]) -> Self {
+    pub(crate) const fn new(bytes: [u8; 32]) -> Self {
         Self {
             bytes,
             zero: STAMP,
@@ -83,7 +83,7 @@ fn mistrust(vehicle: &Vehicle) -> Vec<Mistrust> {
 }
 
 /// Creates a vehicle with the key `theirs` and a link with the key `ours`.
-fn keyed(kind: Kind, ours: Option<[u8; 32]>, theirs: Option<[u8; 32]>) -> Vehicle {
+pub(crate) fn keyed(kind: Kind, ours: Option<[u8; 32]>, theirs: Option<[u8; 32]>) -> Vehicle {
     let mut vehicle = Vehicle::new(kind);
     vehicle.key = theirs.map(Key::new);
     if let Some(key) = ours {

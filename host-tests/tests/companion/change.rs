@@ -166,12 +166,17 @@ fn what_leaves_the_geofence_is_refused_before_it_is_sent() {
         "1",
         &["--new-altitude", "50", "--new-band", "50,50", "--yes"],
     );
-    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band";
+    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m";
     assert_eq!(
         (ended.status, &ended.stderr[..]),
         (Some(1), &[line.to_owned()][..])
     );
     assert_eq!(said(&ended, "change")[0], "altitude: 20 m -> 50 m");
+    let moves = said(&ended, "move");
+    assert!(
+        moves.len() == 2 && moves[0].ends_with("altitude 50.0 m"),
+        "{moves:?}"
+    );
     assert!(!bench.relays[0].has_said("uploaded: "));
 }
 

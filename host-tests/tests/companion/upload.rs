@@ -279,7 +279,7 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
         if let Some(range) = range {
             let ended = ground(&files, "5", &more).end();
             let line = format!(
-                "--version 5: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band"
+                "--version 5: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude {altitude}.0 m"
             );
             assert_eq!((ended.status, &ended.stderr[..]), (Some(1), &[line][..]));
             assert!(!relays[0].has_said("refused: "), "nothing was sent");

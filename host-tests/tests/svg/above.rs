@@ -104,6 +104,79 @@ fn an_interferer_beside_the_line_is_seen_beside_it() {
     }
 }
 
+/// Checks interferers farther from the line than the line is long: an arrow at the edge of a plot with readable axes.
+#[test]
+fn an_interferer_far_beside_the_line_is_an_arrow_at_the_edge() {
+    let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
+    for (y, words) in [
+        (5_000.0, "80 W, y = 5000 m"),
+        (-9e4, "80 W, y = -90000 m"),
+        (1e7, "80 W, y = 1e7 m"),
+    ] {
+        let interferers = vec![(80.0, 500.0, y)];
+        let svg = draw(&Picture {
+            room: room(&mission, [0.0; 8], &interferers),
+            interferers,
+            ..level(8)
+        });
+        let document = Document::parse(&svg).unwrap();
+        assert!(has_text(&document, words), "{words}\n{svg}");
+        // Ticks of the vertical axis are whole metres.
+        let ticks = all(&document, "text", "end");
+        let ticks: Vec<f64> = ticks
+            .iter()
+            .filter_map(|tick| super::words(tick).parse().ok())
+            .collect();
+        assert!(ticks.iter().any(|tick| tick * f64::signum(y) >= 100.0));
+        assert!(ticks.iter().all(|tick| tick.fract() == 0.0), "{ticks:?}");
+        let [_, relays] = parts(&document, "circle", "relay", "cy");
+        let line = number(&relays[0], "cy");
+        let marks = all(&document, "path", "source");
+        let [mark] = marks
+            .iter()
+            .filter(|mark| tip_of(mark).is_some() && !has_class(mark, "beside"))
+            .collect::<Vec<_>>()[..]
+        else {
+            panic!("{marks:?}")
+        };
+        let corners = mark.attribute("d").unwrap().matches('L').count() + 1;
+        assert_eq!(corners, 3, "an arrow");
+        assert!((top(mark).unwrap() - line) * f64::signum(y) > 60.0);
+    }
+}
+
+/// Checks markers in the side view: hollow beside the line, filled on it, each explained by the legend.
+#[test]
+fn from_the_side_an_interferer_beside_the_line_differs_from_one_on_it() {
+    let draws = |y: f64| {
+        let svg = draw(&Picture {
+            interferers: vec![(80.0, 500.0, y)],
+            ..level(8)
+        });
+        let document = Document::parse(&svg).unwrap();
+        let marks = all(&document, "path", "source");
+        let marks = marks.iter().filter(|mark| tip_of(mark).is_some());
+        let hollow: Vec<bool> = marks.map(|mark| has_class(mark, "beside")).collect();
+        let legend = ["interferer", "beside the line"].map(|words| has_text(&document, words));
+        (hollow, legend)
+    };
+    assert_eq!(draws(0.0), (vec![false], [true, false]));
+    for y in [400.0, -0.5] {
+        assert_eq!(draws(y), (vec![true], [true, true]));
+    }
+}
+
+fn has_class(node: &Node, class: &str) -> bool {
+    let classes = node.attribute("class").unwrap_or_default();
+    classes.split(' ').any(|one| one == class)
+}
+
+fn tip_of(node: &Node) -> Option<String> {
+    let mut children = node.children();
+    let title = children.find(|child| child.has_tag_name("title"))?;
+    Some(super::words(&title))
+}
+
 /// Returns y of the top corner of a marker with a tooltip.
 fn top(mark: &Node) -> Option<f64> {
     mark.children().find(|child| child.has_tag_name("title"))?;

@@ -8,6 +8,7 @@
 //! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
 //! | the same command, marked as a repetition | accepted, without an effect |
 //! | any other numbers | denied: [`AutopilotEvent::ClearRefused`] |
+//! | any, while the last one's answer, event or side has not been polled | ignored: an operator's station repeats it |
 
 use heapless::Vec;
 
@@ -97,7 +98,12 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Removes the pending answer.
+    /// Returns true until the answer to the last command and its side have been taken.
+    pub(super) const fn is_busy(&self) -> bool {
+        self.answer.is_some() || self.cleared.is_some()
+    }
+
+    /// Removes the answer that is due.
     pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
         self.answer.take()
     }

@@ -190,7 +190,8 @@ impl Autopilot {
         else {
             return;
         };
-        if to != self.own() {
+        let is_busy = self.clearance.is_busy() || self.events.clearance.is_some();
+        if to != self.own() || is_busy {
             return;
         }
         let event = self

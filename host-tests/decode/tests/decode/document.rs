@@ -1,6 +1,6 @@
 //! Examples of FORMAT.md, and its frames with tags.
 
-use super::{lines, name};
+use super::{lines, name, secret};
 
 const DOCUMENT: &str = include_str!("../../../../src/wire/FORMAT.md");
 
@@ -111,7 +111,7 @@ fn tags_are_checked_with_the_key_once_the_handshake_was_seen() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("key");
     let key = (0..32).fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
-    std::fs::write(&file, format!("{key}\n")).unwrap();
+    secret(&file, &format!("{key}\n"));
     let checks = |arguments: &[&str], frames: &[&[u8]]| -> Vec<String> {
         let all = [&["--json"], arguments].concat();
         let said = lines(&all, &frames.concat());

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use uav_relay_capture::{Capture, Direction, Frame};
 
-use super::{HEARTBEAT, decode, lines, name, piped, refusal};
+use super::{HEARTBEAT, decode, lines, name, piped, refusal, secret};
 
 fn capture(comment: &str) -> Vec<u8> {
     let mut capture = Capture::new(Vec::new(), "a test", comment).unwrap();
@@ -66,7 +66,7 @@ fn a_capture_that_breaks_off_is_shown_as_far_as_it_goes() {
 fn wrong_input_is_one_line_that_names_it() {
     let folder = tempfile::tempdir().unwrap();
     let key = folder.path().join("key");
-    std::fs::write(&key, "0011").unwrap();
+    secret(&key, "0011");
     let file = name(&key);
     assert!(refusal(&["/nowhere/air"], &[]).starts_with("/nowhere/air: cannot be read: "));
     assert!(refusal(&[name(folder.path())], &[]).contains(": cannot be read: "));
@@ -76,10 +76,17 @@ fn wrong_input_is_one_line_that_names_it() {
     );
     assert_eq!(
         refusal(&["--key", file], &[]),
-        format!(
-            "--key {file}: must be 64 hexadecimal digits and nothing else, as of `openssl rand -hex 32`\n"
-        )
+        format!("--key {file}: must be 64 hexadecimal digits, as of `openssl rand -hex 32`\n")
     );
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let mode = std::fs::Permissions::from_mode(0o644);
+        std::fs::set_permissions(&key, mode).unwrap();
+        let said = refusal(&["--key", file], &[]);
+        let line = format!("--key {file}: mode 0644: other users of this computer can read");
+        assert!(said.starts_with(&line), "{said}");
+    }
     assert!(
         refusal(&["--dissector", "/nowhere/x.lua"], &[])
             .starts_with("/nowhere/x.lua: --dissector cannot be written: ")

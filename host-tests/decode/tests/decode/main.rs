@@ -61,3 +61,13 @@ fn refusal(arguments: &[&str], input: &[u8]) -> String {
 fn name(file: &Path) -> &str {
     file.to_str().unwrap()
 }
+
+/// Writes a key file that only its owner can read.
+fn secret(file: &Path, text: &str) {
+    std::fs::write(file, text).unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o600)).unwrap();
+    }
+}

@@ -40,7 +40,39 @@ x_m = 500.0
 y_m = 400.0
 ";
 
+const HELP: &str = "\
+Builds the page to play with: the simulator as WebAssembly in one file, and prints its path
+
+Usage: cargo page
+
+It has no options but -h, --help; the target folder is that of CARGO_TARGET_DIR, else `target`
+";
+
+/// Returns the answer to command line arguments, and true if they are valid; `None` without arguments.
+fn answer(arguments: &[String]) -> Option<(String, bool)> {
+    match arguments {
+        [] => None,
+        [one] if matches!(one.as_str(), "-h" | "--help") => Some((HELP.to_owned(), true)),
+        [one, ..] => Some((
+            format!("page: unexpected argument '{one}': must be --help or nothing\n"),
+            false,
+        )),
+    }
+}
+
 fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match answer(&arguments) {
+        Some((text, true)) => {
+            print!("{text}");
+            return ExitCode::SUCCESS;
+        }
+        Some((text, false)) => {
+            eprint!("{text}");
+            return ExitCode::from(2);
+        }
+        None => {}
+    }
     match build() {
         Ok(page) => {
             println!("{}", page.display());
@@ -136,6 +168,21 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test fails by it")]
 
     use super::*;
+
+    #[test]
+    fn help_and_wrong_arguments_build_nothing() {
+        let answers = |words: &[&str]| {
+            let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
+            answer(&words)
+        };
+        assert_eq!(answers(&[]), None);
+        let (help, is_valid) = answers(&["--help"]).unwrap();
+        assert!(is_valid && help.contains("Usage: cargo page"), "{help}");
+        for wrong in [&["--open"][..], &["a", "--help"]] {
+            let (line, is_valid) = answers(wrong).unwrap();
+            assert!(!is_valid && line.contains(wrong[0]), "{line}");
+        }
+    }
 
     #[test]
     fn the_page_follows_the_target_folder_of_cargo() {

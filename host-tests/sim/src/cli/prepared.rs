@@ -308,7 +308,8 @@ fn drawn(
             let believed = believed.map(|at| [at.power_w, at.x_m, at.y_m].map(f64::from).into());
             (before, believed.into_iter().collect(), Others::Believed)
         };
-    let room = room(mission, aside, &interferers);
+    let shown: Vec<_> = interferers.iter().chain(&others).copied().collect();
+    let room = room(mission, aside, &shown);
     Picture {
         title_method: report.method.clone(),
         distance_m: f64::from(mission.config().distance_m),

@@ -198,7 +198,9 @@ impl Group {
             "lost" => format!("{} lost", one.other.unwrap_or_default()),
             "found" => format!("{} and {} linked", one.relay, one.other.unwrap_or_default()),
             "view accepted" => format!("view: {} relays", one.relays.unwrap_or_default()),
-            "converged" => format!("SIR {:.3}", one.sir.unwrap_or_default()),
+            "converged" => one
+                .sir
+                .map_or_else(|| "spread".to_owned(), |sir| format!("SIR {sir:.3}")),
             "partition" => format!("partition after {}", one.relay),
             "partition ended" => format!("partition after {} ended", one.relay),
             "does not receive" => format!(

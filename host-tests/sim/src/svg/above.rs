@@ -3,7 +3,7 @@
 use super::axis::{self, Frame, Scale};
 use super::canvas::Canvas;
 use super::labels::{Area, Labels, width};
-use super::picture::{ABOVE, BOTTOM, LEFT, Picture, RIGHT, Room, TOP, length};
+use super::picture::{ABOVE, BOTTOM, LEFT, Picture, RIGHT, Room, TOP, length, near};
 use super::{hops, nodes, sources};
 
 /// Edges of the plot, below the axis of the side view.
@@ -12,8 +12,11 @@ const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 const SIZE: f64 = 10.0;
 
-/// Limit of the plot for interferers, in half-widths of the room; farther ones are drawn at its edge.
+/// Limit of the plot for interferers, in half-widths of the room; farther ones are arrows at its edge.
 const FARTHEST: f64 = 2.0;
+
+/// Distance beside the line that is shown toward interferers beyond the limit, in lengths of the line.
+const TOWARD_FAR: f64 = 0.4;
 
 /// Draws the top view; `side` provides the scale along the line.
 pub(super) fn draw(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room) {
@@ -64,9 +67,15 @@ fn upright(seen: &Picture, room: &Room) -> Scale {
     };
     let relays = seen.nodes.iter().map(|(_, y)| *y);
     let interferers = seen.interferers.iter().chain(&seen.others);
-    let sources = interferers.map(|(_, _, y)| *y);
-    for y in relays.chain(sources).filter(|y| y.abs() <= reach) {
-        (low, high) = (low.min(y), high.max(y));
+    let sources = interferers.filter(|(_, x, _)| near(*x, length(seen)));
+    let sources = sources.map(|(_, _, y)| *y).filter(|y| y.is_finite());
+    for y in relays.chain(sources) {
+        let shown = match y {
+            y if y.abs() <= reach => y,
+            y if room.is_line() => (TOWARD_FAR * reach).copysign(y),
+            _ => continue,
+        };
+        (low, high) = (low.min(shown), high.max(shown));
     }
     let margin = 0.12 * (high - low).max(1e-3);
     Scale::new((low - margin, high + margin), (PLOT_TOP, PLOT_BOTTOM))

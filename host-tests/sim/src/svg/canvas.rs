@@ -12,6 +12,7 @@ line,path{fill:none;stroke:#222;stroke-width:1px}\
 .grid{stroke:#e4e4e4}.leader{stroke:#999;stroke-width:.6px}.hop{stroke-linecap:round}\
 .relay{fill:#fff;stroke:#222}.lost{fill:#ddd}.cross{stroke:#222;stroke-width:1.6px}\
 .ground{fill:#222}.source{fill:#cc79a7;stroke:#222;stroke-width:.8px}\
+.beside{fill:#fff;stroke:#cc79a7;stroke-width:2px}\
 .before{fill:#fff;stroke:#cc79a7;stroke-width:.8px;stroke-dasharray:2 1.5}.faint{fill:#888}";
 
 /// Point in picture units; y points downward.

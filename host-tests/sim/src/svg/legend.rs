@@ -4,6 +4,7 @@ use super::canvas::Canvas;
 use super::hops::CLASSES;
 use super::nodes::cross;
 use super::picture::{Picture, bottom};
+use super::sources::{diamond, has_beside};
 
 pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     let row = bottom(picture) - 27.0;
@@ -14,25 +15,22 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture) {
     }
     let row = bottom(picture) - 10.0;
     canvas.text((24.0, row + 3.6), "start", "Numbers at hops: SIR in dB");
-    canvas.disc((197.0, row), 4.0, "relay");
-    canvas.text((210.0, row + 3.6), "start", "relay");
+    canvas.disc((180.0, row), 4.0, "relay");
+    canvas.text((192.0, row + 3.6), "start", "relay");
     let silent = !picture.lost.is_empty();
     if silent || !picture.left_out.is_empty() {
-        canvas.disc((273.0, row), 4.0, "relay lost");
-        cross(canvas, (273.0, row), 5.5);
+        canvas.disc((240.0, row), 4.0, "relay lost");
+        cross(canvas, (240.0, row), 5.5);
         let words = if silent { "silent" } else { "lost" };
-        canvas.text((286.0, row + 3.6), "start", words);
+        canvas.text((252.0, row + 3.6), "start", words);
     }
-    if !picture.interferers.is_empty() {
-        canvas.shape(
-            &[
-                (342.0, row - 6.0),
-                (348.0, row),
-                (342.0, row + 6.0),
-                (336.0, row),
-            ],
-            "source",
-        );
-        canvas.text((355.0, row + 3.6), "start", "interferer (at offset y)");
+    if picture.interferers.is_empty() {
+        return;
+    }
+    canvas.shape(&diamond((306.0, row)), "source");
+    canvas.text((316.0, row + 3.6), "start", "interferer");
+    if has_beside(picture) {
+        canvas.shape(&diamond((384.0, row)), "beside");
+        canvas.text((394.0, row + 3.6), "start", "beside the line");
     }
 }

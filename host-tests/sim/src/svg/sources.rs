@@ -41,13 +41,27 @@ pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pict
     for (power, x, y) in inside {
         let at = frame.x.at(x);
         let tip = format!("interferer: {}", whole((power, x, y)));
-        canvas.marked(&diamond((at, ground)), "source", &tip);
+        let class = if y == 0.0 { "source" } else { "source beside" };
+        canvas.marked(&diamond((at, ground)), class, &tip);
         labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
     }
 }
 
-fn diamond((x, y): Point) -> [Point; 4] {
+pub(super) fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
+}
+
+/// Returns an arrow at the bottom edge `y` of the top view that points down, or at the top edge one that points up.
+fn arrow((x, y): Point, down: bool) -> [Point; 3] {
+    let inward = if down { -1.0 } else { 1.0 };
+    let (tip, back) = (y + 2.0 * inward, y + 10.0 * inward);
+    [(x, tip), (x - 4.5, back), (x + 4.5, back)]
+}
+
+/// Returns true if the side view has a marker of an interferer beside the line.
+pub(super) fn has_beside(picture: &Picture) -> bool {
+    let (inside, _) = sorted(&picture.interferers, length(picture));
+    inside.iter().any(|(_, _, y)| *y != 0.0)
 }
 
 fn whole((power, x, y): Source) -> String {
@@ -151,7 +165,7 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
 /// Markers in the top view: position, label and style.
 pub(super) type Seen = Vec<(Point, String, &'static str)>;
 
-/// Draws the markers of the top view; those outside the range are at the plot's edge.
+/// Draws the markers of the top view; those outside the range are arrows at the plot's edge.
 pub(super) fn from_above(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -166,13 +180,15 @@ pub(super) fn from_above(
         let (inside, _) = sorted(all, length(picture));
         for source @ (power, x, y) in inside {
             let at = frame.at((x, y));
-            canvas.marked(&diamond(at), class, &format!("{tip}: {}", whole(source)));
-            labels.take(Area::around(at, (12.0, 12.0)));
+            let tip = format!("{tip}: {}", whole(source));
             let beyond = if frame.h.holds(y) {
+                canvas.marked(&diamond(at), class, &tip);
                 String::new()
             } else {
+                canvas.marked(&arrow(at, y > 0.0), class, &tip);
                 format!(", y = {} m", plain(y))
             };
+            labels.take(Area::around(at, (12.0, 12.0)));
             seen.push(if class == "before" {
                 (at, picture.others_are.word().to_owned(), "faint halo")
             } else {

@@ -28,6 +28,20 @@ fn what_is_heard_comes_from_an_interferer() {
     assert!(json(&options)["sir"].is_number());
 }
 
+/// Checks the strip of events in a picture of relays that spread evenly at first: they have agreed on no SIR then.
+#[test]
+fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("listen.svg");
+    let name = file.to_str().unwrap();
+    let options = ["--uavs", "3", "--listen", "--listen-for", "30"];
+    let output = chain(&[&options[..], &["--svg", name]].concat());
+    assert!(output.status.success(), "{output:?}");
+    let svg = std::fs::read_to_string(&file).unwrap();
+    assert!(svg.contains(">spread<"), "{svg}");
+    assert!(!svg.contains("SIR 0.000"), "{svg}");
+}
+
 /// The SIR and the optimum are those of the remaining relays.
 #[test]
 fn a_lost_relay_does_not_count() {

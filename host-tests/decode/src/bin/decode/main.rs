@@ -1,6 +1,5 @@
 //! `cargo decode`: prints frames field by field, from a capture, a byte file or a port.
 
-mod key;
 mod options;
 
 use std::fs::File;
@@ -16,6 +15,7 @@ use uav_relay_decode::frame;
 use uav_relay_decode::members::Members;
 use uav_relay_decode::shown::{Shown, json, text};
 use uav_relay_decode::source::{self, Item, Packet, Trouble};
+use uav_relay_scenario::key;
 
 use options::Options;
 
@@ -31,7 +31,8 @@ fn run(options: &Options) -> Result<(), Failure> {
     if let Some(file) = &options.dissector {
         return write_dissector(file, &format);
     }
-    let key = options.key.as_deref().map(key::load).transpose();
+    let key = options.key.as_deref();
+    let key = key.map(|file| key::load("--key", file)).transpose();
     let mut printer = Printer {
         format: &format,
         members: Members::new(key.map_err(Failure::input)?),
@@ -55,6 +56,12 @@ fn run(options: &Options) -> Result<(), Failure> {
             Err(Failure::input(format!("{name}: no valid capture: {error}")))
         }
     }
+}
+
+/// Returns the key at the end of a simulation's capture comment.
+fn of_comment(comment: &str) -> Option<[u8; 32]> {
+    let (_, digits) = comment.rsplit_once(", key ")?;
+    key::parse(digits).ok()
 }
 
 fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
@@ -86,7 +93,7 @@ impl<W: Write> Printer<'_, W> {
         match item {
             Item::Comment(comment) => {
                 // A simulation's capture comment contains the key.
-                if let Some(key) = key::of_comment(comment)
+                if let Some(key) = of_comment(comment)
                     && !self.members.has_key()
                 {
                     self.members = Members::new(Some(key));

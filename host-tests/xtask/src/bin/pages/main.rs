@@ -12,6 +12,8 @@
 //! | `tested` | is run by a test of its own |
 //! | `window` | opens a window |
 //!
+//! Of a block that needs hardware the options of this project's commands are checked: a program must not refuse them (status 2).
+//!
 //! A command must succeed, unless its comment begins with `exit status N`: then it must end with that status.
 //!
 //! Output is compared line by line: every line of the page must occur, in order, with others in between. Trailing spaces are
@@ -20,6 +22,7 @@
 //! The commands of `.cargo/config.toml` are binaries built beforehand, so no block waits for the compiler.
 
 mod compare;
+mod options;
 mod page;
 mod shell;
 
@@ -75,7 +78,7 @@ fn main() -> ExitCode {
 /// Runs every runnable block; returns the number of blocks with different output.
 fn walk(root: &Path, only: &str) -> Result<usize, String> {
     let shell = shell::Shell::build(root)?;
-    let (mut faults, mut run, mut left_out) = (0, 0, 0);
+    let (mut faults, mut run, mut left_out, mut checked) = (0, 0, 0, 0);
     for name in PAGES.into_iter().filter(|name| name.contains(only)) {
         let text =
             std::fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
@@ -85,8 +88,19 @@ fn walk(root: &Path, only: &str) -> Result<usize, String> {
             let Kind::Commands(why_not) = &block.kind else {
                 continue;
             };
-            if why_not.is_some() {
+            if let Some(why_not) = why_not {
                 left_out += 1;
+                if why_not != "hardware" {
+                    continue;
+                }
+                for command in options::own_commands(&block.commands()) {
+                    checked += 1;
+                    let (status, output) = shell.begin(&command)?;
+                    if let Err(fault) = options::accepted(&command, status, &output) {
+                        faults += 1;
+                        println!("{name}:{}: {fault}", block.line);
+                    }
+                }
                 continue;
             }
             run += 1;
@@ -106,6 +120,8 @@ fn walk(root: &Path, only: &str) -> Result<usize, String> {
             }
         }
     }
-    println!("pages: {run} blocks were run, {left_out} cannot be");
+    println!(
+        "pages: {run} blocks were run, {left_out} cannot be; of those the options of {checked} commands were checked"
+    );
     Ok(faults)
 }

@@ -1,8 +1,9 @@
 //! Folder like a clean clone, and a shell in it. It maps `cargo chain` and other aliases to built binaries.
 
 use std::fmt::Write as _;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 
 /// Packages with the programs of the pages.
 const PACKAGES: [&str; 4] = [
@@ -14,6 +15,12 @@ const PACKAGES: [&str; 4] = [
 
 /// Time limit of a block, s.
 const LIMIT_S: u32 = 60;
+
+/// Time limit of a command without its hardware, s.
+const BEGUN_S: u32 = 2;
+
+/// Key files that commands of the pages name, which a user makes first.
+const KEYS: [&str; 2] = ["network.key", "network7.key"];
 
 const NOT_CLONED: [&str; 2] = ["target", ".git"];
 
@@ -67,12 +74,38 @@ impl Shell {
                 std::os::unix::fs::symlink(entry.path(), link).map_err(failed)?;
             }
         }
-        Ok(())
+        for key in KEYS {
+            let file = self.folder.join(key);
+            std::fs::write(&file, "5e".repeat(32)).map_err(failed)?;
+            let owner = std::fs::Permissions::from_mode(0o600);
+            std::fs::set_permissions(&file, owner).map_err(failed)?;
+        }
+        std::os::unix::fs::symlink("examples/drone.toml", self.folder.join("drone.toml"))
+            .map_err(failed)
     }
 
     /// Runs a script like a user, until its first command that fails; returns its output.
     pub(crate) fn run(&self, script: &str) -> Result<String, String> {
-        let limit = format!("{LIMIT_S}");
+        let (status, said) = self.ended(script, LIMIT_S)?;
+        if status.success() {
+            return Ok(said);
+        }
+        let lines: Vec<&str> = said.lines().collect();
+        let last = lines
+            .get(lines.len().saturating_sub(5)..)
+            .unwrap_or_default();
+        Err(format!("ends with {status} after\n  {}", last.join("\n  ")))
+    }
+
+    /// Starts a command without its hardware; returns its exit status, `None` after a signal, and its output.
+    pub(crate) fn begin(&self, command: &str) -> Result<(Option<i32>, String), String> {
+        let (status, said) = self.ended(command, BEGUN_S)?;
+        Ok((status.code(), said))
+    }
+
+    /// Runs a script with a time limit, s; returns its exit status and output.
+    fn ended(&self, script: &str, limit_s: u32) -> Result<(ExitStatus, String), String> {
+        let limit = format!("{limit_s}");
         let script = format!("exec 2>&1\n{}\n{script}\n", self.before);
         let output = Command::new("timeout")
             .args(["--kill-after=5", &limit, "bash", "-e", "-c", &script])
@@ -81,18 +114,7 @@ impl Shell {
             .output()
             .map_err(|error| format!("timeout: {error}"))?;
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        if output.status.success() {
-            return Ok(said);
-        }
-        let lines: Vec<&str> = said.lines().collect();
-        let last = lines
-            .get(lines.len().saturating_sub(5)..)
-            .unwrap_or_default();
-        Err(format!(
-            "ends with {} after\n  {}",
-            output.status,
-            last.join("\n  ")
-        ))
+        Ok((output.status, said))
     }
 }
 
