@@ -22,7 +22,7 @@ fn body_of(message: &Message) -> Vec<u8> {
 }
 
 proptest! {
-    #![proptest_config(config(20_000))]
+    #![proptest_config(config(4000))]
 
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
