@@ -7,6 +7,7 @@ use uav_relay::wire::frame::{self, FrameError, HEADER, Header};
 use uav_relay::wire::message::{Message, MessageError};
 
 use crate::format::{Format, Layout};
+use crate::range;
 use crate::refusal::Refusal;
 use crate::value::Fields;
 use crate::walk::walk;
@@ -81,13 +82,9 @@ fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
         let layout = &format.handshake;
         frame.name = Some(&layout.name);
         let (fields, error) = walk(&layout.fields, opened.body);
+        let outside = range::outside(layout, &fields).map(|_| Refusal::Range);
+        frame.refusal = error.map(Refusal::Malformed).or(outside);
         frame.fields = fields;
-        frame.refusal = error.map(Refusal::Malformed).or_else(|| {
-            let whole = opened.body.split_first_chunk::<8>();
-            let unsaid = whole.is_none_or(|(nonce, _)| *nonce == [0; 8]);
-            let asks = opened.body.last().copied().unwrap_or_default();
-            (unsaid || asks > 1).then_some(Refusal::Range)
-        });
         return;
     }
     let Some((&tag, body)) = opened.body.split_first() else {

@@ -1,21 +1,28 @@
 //! Decoder of uav-relay frames: each field by the tables of `FORMAT.md`, or the reason for rejection.
 //!
+//! `format`, `value`, `walk`, `write` and `range` are the second codec: they share no code with the crate.
+//!
 //! | module | content |
 //! | --- | --- |
 //! | [`mod@format`] | the tables of `FORMAT.md` |
-//! | [`value`], [`walk`] | values of fields; decoding of a body |
+//! | [`value`], [`walk`], [`mod@write`] | values of fields; decoding and encoding of a body |
+//! | [`range`] | ranges of the values |
 //! | [`frame`], [`refusal`] | a decoded frame; reasons for rejection |
 //! | [`members`] | verification of tags |
 //! | [`source`] | frames from a capture or a byte stream |
 //! | [`shown`] | a frame as text and as JSON |
+//! | [`vectors`] | test vectors |
 //! | [`dissector`] | the Wireshark dissector |
 
 pub mod dissector;
 pub mod format;
 pub mod frame;
 pub mod members;
+pub mod range;
 pub mod refusal;
 pub mod shown;
 pub mod source;
 pub mod value;
+pub mod vectors;
 pub mod walk;
+pub mod write;

@@ -1,5 +1,8 @@
 //! Values of fields.
 
+use serde::de::value::{MapDeserializer, SeqDeserializer};
+use serde::de::{self, Deserializer, IntoDeserializer, Visitor};
+use serde::forward_to_deserialize_any;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::format::Field;
@@ -43,6 +46,62 @@ impl<'f> Fields<'f> {
         let mut all = self.0.iter();
         all.find(|(field, _)| field.name == name)
             .map(|(_, value)| value)
+    }
+}
+
+/// Values as they are on the wire: a digest or flags are a number.
+impl<'de> Deserializer<'de> for &Value<'_> {
+    type Error = de::value::Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        match self {
+            Value::Unsigned(number) => visitor.visit_u64(*number),
+            Value::Signed(number) => visitor.visit_i64(*number),
+            Value::Digest(digest) => visitor.visit_u16(*digest),
+            Value::View(view) => visitor.visit_u32(*view),
+            Value::Single(number) => visitor.visit_f32(*number),
+            Value::Double(number) => visitor.visit_f64(*number),
+            Value::Bool(said) => visitor.visit_bool(*said),
+            Value::Flags(bits, _) => visitor.visit_u8(*bits),
+            Value::Word(value, _) => visitor.visit_u8(*value),
+            Value::None => visitor.visit_none(),
+            Value::List(values) => visitor.visit_seq(SeqDeserializer::new(values.iter())),
+            Value::Group(fields) => fields.into_deserializer().deserialize_map(visitor),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        match self {
+            Value::None => visitor.visit_none(),
+            value => visitor.visit_some(value),
+        }
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf unit unit_struct newtype_struct seq tuple
+        tuple_struct map struct enum identifier ignored_any
+    }
+}
+
+impl IntoDeserializer<'_> for &Value<'_> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'a, 'de> IntoDeserializer<'de> for &'a Fields<'_> {
+    type Deserializer = MapDeserializer<
+        'de,
+        Box<dyn Iterator<Item = (&'a str, &'a Value<'a>)> + 'a>,
+        de::value::Error,
+    >;
+
+    fn into_deserializer(self) -> Self::Deserializer {
+        let fields = self.0.iter();
+        let named = fields.map(|(field, value)| (field.name.as_str(), value));
+        MapDeserializer::new(Box::new(named))
     }
 }
 

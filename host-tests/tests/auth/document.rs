@@ -1,41 +1,22 @@
-//! Worked examples of frames with a tag in `FORMAT.md`, byte by byte.
+//! Vectors of frames with a tag, byte by byte.
 
 use host_tests::fixtures::mission;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings};
+use uav_relay_decode::vectors::Vectors;
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
 use super::net::NETWORK;
-
-const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
 
 fn key() -> [u8; 32] {
     std::array::from_fn(|byte| u8::try_from(byte).unwrap())
 }
 
-fn bytes(text: &str) -> Vec<u8> {
-    text.split_whitespace()
-        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
-        .collect()
-}
-
-/// Returns the bytes in the section's table, without the CRC, and the frame on the wire.
+/// Returns the vector's frame without the CRC, and the frame on the wire.
 fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
-    let title = format!("### Worked: {name}\n");
-    let section = DOCUMENT.split(&title).nth(1).unwrap();
-    let mut table = Vec::new();
-    for row in section
-        .lines()
-        .skip_while(|line| !line.starts_with("| ---"))
-        .skip(1)
-        .take_while(|line| line.starts_with('|'))
-    {
-        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
-        assert_eq!(cells[1], table.len().to_string(), "{row}");
-        table.extend(bytes(cells[2].trim_matches('`')));
-    }
-    table.truncate(table.len() - 4);
-    let block = section.split("```").nth(1).unwrap();
-    (table, bytes(block.strip_prefix("text").unwrap()))
+    let mut signed = Vectors::load().unwrap().signed.into_iter();
+    let mut vector = signed.find(|vector| vector.name == name).unwrap();
+    vector.plain.truncate(vector.plain.len() - 4);
+    (vector.plain, vector.wire)
 }
 
 #[test]

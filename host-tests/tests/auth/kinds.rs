@@ -4,6 +4,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Port, Stats};
+use uav_relay_decode::vectors::Vectors;
 use uav_relay_oracle::random::seed;
 
 use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, handshake, nonce, plain};
@@ -152,18 +153,8 @@ pub(crate) struct Attacker {
 
 impl Attacker {
     pub(crate) fn new(stream: u64) -> Self {
-        let text = include_str!("../data/vectors.json");
-        let vectors: serde_json::Value = serde_json::from_str(text).unwrap();
-        let messages: Vec<Plain> = vectors["frames"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|frame| {
-                let hex = frame["body"].as_str().unwrap().replace(' ', "");
-                let byte = |at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
-                Plain((0..hex.len()).step_by(2).map(byte).collect())
-            })
-            .collect();
+        let vectors = Vectors::load().unwrap().frames.into_iter();
+        let messages: Vec<Plain> = vectors.map(|vector| Plain(vector.body)).collect();
         let mut kinds: Vec<u8> = messages.iter().map(|message| message.0[0]).collect();
         kinds.sort_unstable();
         kinds.dedup();

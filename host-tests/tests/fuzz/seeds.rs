@@ -9,9 +9,9 @@
 
 use std::fs;
 
-use serde::Deserialize;
 use uav_relay::MAX_FRAME;
 use uav_relay::{Identity, Instant, Port, Relay, Settings};
+use uav_relay_decode::vectors::{Frame, Vectors};
 use uav_relay_fuzz::input::Input;
 use uav_relay_fuzz::watch::NETWORK;
 use uav_relay_fuzz::{TARGETS, setting};
@@ -23,32 +23,13 @@ const FRAMES: usize = 24;
 
 const MOST_WAKES: u8 = 64;
 
-#[derive(Deserialize)]
-struct Vectors {
-    frames: Vec<Frame>,
-}
-
-#[derive(Deserialize)]
-struct Frame {
-    plain: String,
-    wire: String,
-}
-
-fn hex(text: &str) -> Vec<u8> {
-    (0..text.len())
-        .step_by(2)
-        .map(|at| u8::from_str_radix(&text[at..at + 2], 16).unwrap())
-        .collect()
-}
-
 fn golden() -> Vec<Frame> {
-    let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
-    vectors.frames
+    Vectors::load().unwrap().frames
 }
 
 /// Returns golden frames after two lengths: each alone, then all of them with noise in between.
 fn deframe() -> Vec<Vec<u8>> {
-    let wires: Vec<_> = golden().iter().map(|frame| hex(&frame.wire)).collect();
+    let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();
     let all = [
         &wires[0],
@@ -67,10 +48,7 @@ fn deframe() -> Vec<Vec<u8>> {
 fn frame() -> Vec<Vec<u8>> {
     golden()
         .iter()
-        .map(|frame| {
-            let plain = hex(&frame.plain);
-            plain[..plain.len() - 4].to_vec()
-        })
+        .map(|frame| frame.plain[..frame.plain.len() - 4].to_vec())
         .collect()
 }
 

@@ -5,7 +5,7 @@ use std::io::{Read as _, Write as _};
 use host_tests::firmware::emulator::{Emulator, Life};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::Deserialize;
+use uav_relay_decode::vectors::Vectors;
 use uav_relay_tools::provision::config::LEN;
 
 use crate::fleet::{PATIENCE, image};
@@ -13,23 +13,6 @@ use crate::fleet::{PATIENCE, image};
 #[path = "../../../examples/golden/answer.rs"]
 #[expect(unreachable_pub, reason = "as in the image")]
 mod answer;
-
-#[derive(Deserialize)]
-struct Vectors {
-    frames: Vec<Frame>,
-}
-
-#[derive(Deserialize)]
-struct Frame {
-    name: String,
-    wire: String,
-}
-
-fn bytes(hex: &str) -> Vec<u8> {
-    (0..hex.len() / 2)
-        .map(|at| u8::from_str_radix(&hex[2 * at..2 * at + 2], 16).unwrap())
-        .collect()
-}
 
 /// Returns the host's answer to each frame of `heard`.
 fn here(heard: &[u8]) -> Vec<Vec<u8>> {
@@ -48,12 +31,12 @@ fn here(heard: &[u8]) -> Vec<Vec<u8>> {
 
 #[test]
 fn the_target_makes_of_every_vector_what_this_machine_does() {
-    let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
+    let vectors = Vectors::load().unwrap();
     assert!(vectors.frames.len() >= 20);
     let mut heard = Vec::new();
     for vector in &vectors.frames {
-        let wire = bytes(&vector.wire);
-        assert!(here(&wire)[0].starts_with(&wire), "{}", vector.name);
+        let wire = &vector.wire;
+        assert!(here(wire)[0].starts_with(wire), "{}", vector.name);
         heard.extend(wire);
     }
     // A thousand frames with up to three bytes changed, which are refused for various reasons.
@@ -61,7 +44,7 @@ fn the_target_makes_of_every_vector_what_this_machine_does() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for _ in 0..1_000 {
         let vector = &vectors.frames[rng.random_range(0..vectors.frames.len())];
-        let mut wire = bytes(&vector.wire);
+        let mut wire = vector.wire.clone();
         for _ in 0..rng.random_range(1..=3) {
             let at = rng.random_range(0..wire.len() - 1);
             wire[at] ^= rng.random_range(1..=u8::MAX);

@@ -1,43 +1,47 @@
-//! Second codec, written from the rules in `FORMAT.md` without the crate's code or postcard. CRC and COBS are of other crates.
+//! Second codec: bodies by the tables of `FORMAT.md` (`uav_relay_decode`), CRC and COBS of other crates.
+//!
+//! The names of the tables connect the values of a message here with its bytes, and `message` with the crate's type.
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `codec.rs` | message kinds |
-//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | longer messages: bytes, conversion, ranges |
-//! | `bytes.rs`, `reader.rs`, `limits.rs` | encoding, decoding and ranges of parts |
+//! | `codec.rs` | message kinds; encoding and decoding by the tables |
+//! | `sweep.rs`, `turn.rs`, `seats.rs`, `hearing.rs`, `hello.rs`, `votes.rs` | longer messages, and their conversion |
+//! | `fields.rs` | values that consist of several fields |
 //! | `frame.rs` | frame around a body |
 
-mod bytes;
+pub(crate) mod fields;
 mod frame;
 mod hearing;
 mod hello;
-mod limits;
-mod reader;
 mod seats;
 mod sweep;
 mod turn;
 mod votes;
 
-use serde::Deserialize;
+use std::iter;
+use std::sync::LazyLock;
+
+use serde::de::value::{MapAccessDeserializer, MapDeserializer};
+use serde::{Deserialize, Serialize};
 use uav_relay::guard::Fence;
 use uav_relay::place::CrossSection;
 use uav_relay::wire::message::{Claim, Message, MessageError, Pulse, Pulsed};
+use uav_relay_decode::format::Format;
+use uav_relay_decode::value::Fields;
+use uav_relay_decode::{range, walk, write};
 
 pub(crate) use frame::{header, plain, sealed, wire};
 pub(crate) use hearing::Heard;
 pub(crate) use hello::Greeting;
 pub(crate) use seats::Seats;
-pub(crate) use sweep::{Judged, Swept, narrow, targets, wide};
+pub(crate) use sweep::{Judged, Swept};
 pub(crate) use turn::{Handed, Shifted};
 pub(crate) use votes::{Call, Decided, Proposed, SizedView};
 
 use super::offer::Offer;
-use bytes::{pass, reals, words};
-use limits::is_beside;
-use reader::Reader;
 
 /// Content of a body, by message.
-#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) enum Said {
     Sweep(Swept),
     Verdict(Judged),
@@ -46,15 +50,17 @@ pub(crate) enum Said {
     },
     Heartbeat {
         mission: u16,
-        /// Number of the sender's question, and of the question that it answers; 0 for none.
+        /// Number of the sender's request, and of the answered request; 0 for none.
         ask: u16,
         answer: u16,
     },
     Measured {
+        #[serde(flatten)]
         sweep: Swept,
         upsilon_per_w: f32,
     },
     Aside {
+        #[serde(flatten)]
         sweep: Swept,
         y_m: f32,
     },
@@ -69,11 +75,14 @@ pub(crate) enum Said {
     Offer(Offer),
     Pulse {
         number: u16,
+        #[serde(rename = "view")]
         mission: u16,
+        #[serde(rename = "lease_ds")]
         lease: u16,
     },
     Pulsed {
         number: u16,
+        #[serde(rename = "view")]
         mission: u16,
         done: bool,
     },
@@ -86,33 +95,30 @@ pub(crate) enum Said {
     },
     /// Claim to a node number, or its echo.
     Claim {
+        #[serde(rename = "claim")]
         number: u32,
+        #[serde(rename = "other_claim")]
         heard: u32,
         flags: u8,
     },
 }
 
 /// Fence message of the guard.
-#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Fenced {
+    #[serde(rename = "association")]
     pub(crate) number: u16,
+    #[serde(rename = "line")]
     pub(crate) mission: u16,
     pub(crate) echo: u16,
     pub(crate) fence: u16,
     /// Fence x, final x, y and altitude of the sender, and its distance from the fence, m.
+    #[serde(flatten, with = "fields::places")]
     pub(crate) places: [f32; 5],
     pub(crate) flags: u8,
 }
 
 impl Fenced {
-    fn body(&self) -> Vec<u8> {
-        let mut out = pass(13, [self.number, self.mission]);
-        words(&mut out, &[self.echo, self.fence]);
-        reals(&mut out, &self.places);
-        out.push(self.flags);
-        out
-    }
-
     fn message(&self) -> Message {
         let [x_m, target_m, y_m, altitude_m, apart_m] = self.places;
         Message::Fence {
@@ -129,92 +135,51 @@ impl Fenced {
             },
         }
     }
+}
 
-    fn read(rest: &mut Reader) -> Option<Self> {
-        Some(Self {
-            number: rest.word()?,
-            mission: rest.word()?,
-            echo: rest.word()?,
-            fence: rest.word()?,
-            places: rest.reals()?,
-            flags: rest.byte()?,
-        })
-    }
+/// Tables of `FORMAT.md`.
+pub(crate) static FORMAT: LazyLock<Format> = LazyLock::new(|| Format::load().unwrap());
 
-    fn in_range(&self) -> bool {
-        let [places @ .., apart_m] = self.places;
-        let within = places.iter().all(|place| place.abs() <= 1e7);
-        self.number != 0 && within && (0.0..=1e5).contains(&apart_m) && self.flags < 128
+/// Decodes and checks the fields of a body.
+fn walked(body: &[u8]) -> Result<(&'static str, Fields<'static>), MessageError> {
+    let known = body.split_first();
+    let known = known.and_then(|(&tag, body)| Some((FORMAT.message(tag)?, body)));
+    let (layout, body) = known.ok_or(MessageError::Encoding)?;
+    let (fields, error) = walk::walk(&layout.fields, body);
+    if error.is_some() {
+        return Err(MessageError::Encoding);
     }
+    if range::outside(layout, &fields).is_some() {
+        return Err(MessageError::Value);
+    }
+    Ok((&layout.name, fields))
 }
 
 impl Said {
     pub(crate) fn body(&self) -> Vec<u8> {
-        match self {
-            Self::Sweep(sweep) => sweep.body(0, &[]),
-            Self::Verdict(judged) => judged.body(),
-            Self::Busy { number } => [&[2], &number.to_le_bytes()[..]].concat(),
-            Self::Heartbeat {
-                mission,
-                ask,
-                answer,
-            } => {
-                let mut out = pass(3, [*mission, *ask]);
-                words(&mut out, &[*answer]);
-                out
-            }
-            Self::Measured {
-                sweep,
-                upsilon_per_w,
-            } => sweep.body(4, &[*upsilon_per_w]),
-            Self::Aside { sweep, y_m } => sweep.body(5, &[*y_m]),
-            Self::Gather(seats) => seats.body(6),
-            Self::Gathered(seats) => seats.body(7),
-            Self::Token(handed) => handed.body(),
-            Self::Moved(shifted) => shifted.body(),
-            Self::Hello(greeting) => greeting.body(),
-            Self::Proposal(proposed) => proposed.body(),
-            Self::Decision(decided) => decided.body(),
-            Self::Fence(fenced) => fenced.body(),
-            Self::Offer(offer) => offer.body(),
-            Self::Pulse {
-                number,
-                mission,
-                lease,
-            } => {
-                let mut out = pass(15, [*number, *mission]);
-                words(&mut out, &[*lease]);
-                out
-            }
-            Self::Pulsed {
-                number,
-                mission,
-                done,
-            } => {
-                let mut out = pass(16, [*number, *mission]);
-                out.push(u8::from(*done));
-                out
-            }
-            Self::Sense(heard) => heard.body(17),
-            Self::Sensed(heard) => heard.body(18),
-            Self::Level { mission, power_w } => {
-                let mut out = vec![19];
-                words(&mut out, &[*mission]);
-                reals(&mut out, &[*power_w]);
-                out
-            }
-            Self::Claim {
-                number,
-                heard,
-                flags,
-            } => {
-                let mut out = vec![20];
-                out.extend(number.to_le_bytes());
-                out.extend(heard.to_le_bytes());
-                out.push(*flags);
-                out
-            }
-        }
+        let said = serde_json::to_value(self).unwrap();
+        let (name, fields) = said
+            .as_object()
+            .and_then(|said| said.iter().next())
+            .unwrap();
+        write::write(&FORMAT, name, fields).unwrap_or_else(|error| panic!("{error}: {self:?}"))
+    }
+
+    /// Decodes a body; the error is the reason for refusal.
+    pub(crate) fn read(body: &[u8]) -> Result<Self, MessageError> {
+        let (name, fields) = walked(body)?;
+        Ok(Self::of(name, &fields))
+    }
+
+    /// Returns the message with these fields.
+    pub(crate) fn of(name: &str, fields: &Fields<'_>) -> Self {
+        let one = MapDeserializer::new(iter::once((name, fields)));
+        Self::deserialize(MapAccessDeserializer::new(one)).unwrap()
+    }
+
+    /// Returns the reason for refusal of a body, if any.
+    pub(crate) fn verdict(body: &[u8]) -> Result<(), MessageError> {
+        walked(body).map(|_| ())
     }
 
     /// Converts to the crate's message.
@@ -264,8 +229,7 @@ impl Said {
                 mission,
                 done,
             }),
-            Self::Sense(ref heard) => heard.message(17),
-            Self::Sensed(ref heard) => heard.message(18),
+            Self::Sense(_) | Self::Sensed(_) => Heard::message(self),
             Self::Level { mission, power_w } => Message::Level { mission, power_w },
             Self::Claim {
                 number,
@@ -277,110 +241,6 @@ impl Said {
                 passive: flags % 2 == 1,
                 echo: flags / 2 % 2 == 1,
             }),
-        }
-    }
-
-    /// Decodes a body; the error is the reason for refusal.
-    pub(crate) fn read(body: &[u8]) -> Result<Self, MessageError> {
-        let mut rest = Reader(body);
-        let said = Self::take(&mut rest).ok_or(MessageError::Encoding)?;
-        if !rest.0.is_empty() {
-            return Err(MessageError::Encoding);
-        }
-        if said.in_range() {
-            Ok(said)
-        } else {
-            Err(MessageError::Value)
-        }
-    }
-
-    /// Decodes a message at the start of the rest.
-    fn take(rest: &mut Reader) -> Option<Self> {
-        Some(match rest.byte()? {
-            0 => {
-                let (sweep, []) = Swept::read(rest)?;
-                Self::Sweep(sweep)
-            }
-            1 => Self::Verdict(Judged::read(rest)?),
-            2 => Self::Busy {
-                number: rest.word()?,
-            },
-            3 => Self::Heartbeat {
-                mission: rest.word()?,
-                ask: rest.word()?,
-                answer: rest.word()?,
-            },
-            4 => {
-                let (sweep, [upsilon_per_w]) = Swept::read(rest)?;
-                Self::Measured {
-                    sweep,
-                    upsilon_per_w,
-                }
-            }
-            5 => {
-                let (sweep, [y_m]) = Swept::read(rest)?;
-                Self::Aside { sweep, y_m }
-            }
-            6 => Self::Gather(Seats::read(rest)?),
-            7 => Self::Gathered(Seats::read(rest)?),
-            8 => Self::Token(Handed::read(rest)?),
-            9 => Self::Moved(Shifted::read(rest)?),
-            10 => Self::Hello(Greeting::read(rest)?),
-            11 => Self::Proposal(Proposed::read(rest)?),
-            12 => Self::Decision(Decided::read(rest)?),
-            13 => Self::Fence(Fenced::read(rest)?),
-            14 => {
-                let (offer, behind) = Offer::read(rest.0)?;
-                rest.0 = behind;
-                Self::Offer(offer)
-            }
-            15 => Self::Pulse {
-                number: rest.word()?,
-                mission: rest.word()?,
-                lease: rest.word()?,
-            },
-            16 => Self::Pulsed {
-                number: rest.word()?,
-                mission: rest.word()?,
-                done: rest.bool()?,
-            },
-            17 => Self::Sense(Heard::read(rest)?),
-            18 => Self::Sensed(Heard::read(rest)?),
-            19 => Self::Level {
-                mission: rest.word()?,
-                power_w: rest.real()?,
-            },
-            20 => Self::Claim {
-                number: rest.long()?,
-                heard: rest.long()?,
-                flags: rest.byte()?,
-            },
-            _ => return None,
-        })
-    }
-
-    fn in_range(&self) -> bool {
-        match self {
-            Self::Sweep(sweep) => sweep.in_range(),
-            Self::Measured {
-                sweep,
-                upsilon_per_w,
-            } => sweep.in_range() && (1e-9..=1e32).contains(upsilon_per_w),
-            Self::Aside { sweep, y_m } => sweep.in_range() && is_beside(*y_m),
-            Self::Verdict(judged) => judged.in_range(),
-            Self::Busy { .. } | Self::Heartbeat { .. } | Self::Pulsed { .. } => true,
-            Self::Claim { flags, .. } => *flags < 4,
-            Self::Pulse { lease, .. } => *lease > 0,
-            Self::Gather(seats) | Self::Gathered(seats) => seats.in_range(),
-            Self::Token(handed) => handed.in_range(),
-            Self::Moved(shifted) => shifted.in_range(),
-            Self::Hello(greeting) => greeting.in_range(),
-            Self::Proposal(proposed) => proposed.in_range(),
-            Self::Decision(decided) => decided.in_range(),
-            Self::Fence(fenced) => fenced.in_range(),
-            Self::Offer(offer) => offer.in_range(),
-            Self::Sense(heard) | Self::Sensed(heard) => heard.in_range(),
-            Self::Level { power_w, .. } => (1e-30..=1e6).contains(power_w),
         }
     }
 }

@@ -1,11 +1,11 @@
-//! `FORMAT.md` as a test: annotated examples, ladders, and every row of the rejection table.
+//! `FORMAT.md` as a test: examples, ladders, digest; and every rejected stream of the vectors.
 
 use crc::{CRC_32_ISCSI, Crc};
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame;
 use uav_relay::{Band, Interference, Mission, MissionConfig, Port, Wiring};
+use uav_relay_decode::vectors::bytes;
 
-use super::golden::{bytes, only_frame, vectors};
+use super::golden::vectors;
 use super::receive::{FIELD, counted, relay};
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
@@ -29,31 +29,52 @@ fn code(cell: &str) -> &str {
     cell.strip_prefix('`').unwrap().strip_suffix('`').unwrap()
 }
 
+/// Returns the bytes of the annotated rows and of the code block of an example.
+fn example(section: &str) -> (Vec<u8>, Vec<u8>) {
+    let hex = |text: &str| bytes(&text.split_whitespace().collect::<String>()).unwrap();
+    let mut plain = Vec::new();
+    for row in rows(section) {
+        assert_eq!(row[0], plain.len().to_string(), "offset in {section}");
+        plain.extend(hex(code(row[1])));
+    }
+    let block = section.split("```").nth(1).unwrap();
+    (plain, hex(block.strip_prefix("text").unwrap()))
+}
+
 #[test]
-fn the_annotated_examples_are_golden_vectors() {
-    let vectors = vectors().frames;
-    let mut seen = Vec::new();
+fn the_examples_of_the_document_are_golden_vectors() {
+    let vectors = vectors();
+    let mut seen = 0;
     for section in DOCUMENT.split("### Example: ").skip(1) {
         let name = section.lines().next().unwrap();
-        let vector = vectors.iter().find(|vector| vector.name == name).unwrap();
-        let mut plain = Vec::new();
-        for row in rows(section) {
-            assert_eq!(row[0], plain.len().to_string(), "offset in {name}");
-            plain.extend(bytes(code(row[1])));
-        }
-        assert_eq!(plain, vector.plain(), "{name}");
-        let block = section.split("```").nth(1).unwrap();
-        let wire = bytes(block.strip_prefix("text").unwrap());
-        assert_eq!(wire, vector.wire(), "{name}");
+        let mut frames = vectors.frames.iter();
+        let vector = frames.find(|vector| vector.name == name).unwrap();
+        let (plain, wire) = example(section);
+        assert_eq!((&plain, &wire), (&vector.plain, &vector.wire), "{name}");
         let len = format!("On the wire, {} bytes:", wire.len());
         assert!(section.contains(&len), "{name}");
-        assert!(frame::decode(&only_frame(&wire)).is_ok(), "{name}");
-        seen.push(plain[10]);
+        seen += 1;
     }
-    seen.sort_unstable();
-    seen.dedup();
-    let tags: Vec<u8> = (0..=20).collect();
-    assert_eq!(seen, tags, "each tag has an example");
+    assert_eq!(seen, 2);
+    let section = DOCUMENT.split("### Worked: ").nth(1).unwrap();
+    let signed = &vectors.signed[2];
+    assert_eq!(section.lines().next(), Some(&*signed.name));
+    assert_eq!(
+        example(section),
+        (signed.plain.clone(), signed.wire.clone())
+    );
+}
+
+#[test]
+fn the_vectors_have_each_tag() {
+    let mut tags: Vec<u8> = vectors()
+        .frames
+        .iter()
+        .map(|vector| vector.body[0])
+        .collect();
+    tags.sort_unstable();
+    tags.dedup();
+    assert_eq!(tags, (0..=20).collect::<Vec<u8>>());
 }
 
 #[test]
@@ -70,26 +91,18 @@ fn the_ladders_of_the_document_are_golden_vectors() {
 }
 
 #[test]
-fn every_row_of_the_rejection_table_is_counted_as_it_says() {
-    let section = DOCUMENT.split("## Rejected").nth(1).unwrap();
-    let mut found = 0;
-    for row in rows(section) {
-        let mut stream = Vec::new();
-        for word in code(row[0]).split(' ') {
-            let (byte, times) = word.split_once('*').unwrap_or((word, "1"));
-            stream.extend(bytes(byte).repeat(times.parse().unwrap()));
-        }
-        stream.push(0);
+fn every_rejected_stream_is_counted_as_it_says() {
+    let rejected = vectors().rejected;
+    assert!(rejected.len() >= 224, "{}", rejected.len());
+    for vector in rejected {
         let mut relay = relay(2, 8, Wiring::Pair);
         assert_ne!(digest(relay.mission()), 0x5A3C);
         let now = uav_relay::Instant::ZERO;
-        relay.handle_bytes(now, Port::Upstream, &stream);
-        let mut wanted: Vec<&str> = row[2].split(", ").collect();
+        relay.handle_bytes(now, Port::Upstream, &vector.wire);
+        let mut wanted = vector.counted;
         wanted.sort_unstable();
-        assert_eq!(counted(relay.stats()), wanted, "{}", row[1]);
-        found += 1;
+        assert_eq!(counted(relay.stats()), wanted, "{}", vector.what);
     }
-    assert!(found > 120, "{found}");
 }
 
 /// Returns the digest of a mission with the f32 numbers of its interference, by the document.

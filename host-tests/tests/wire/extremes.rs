@@ -1,270 +1,139 @@
-//! Coverage of the golden vectors: every kind of message with all extremes.
+//! Coverage of the golden vectors: both bounds of every field, every flag, and the longest and shortest messages.
 
-use super::codec::{
-    Call, Decided, Greeting, Handed, Heard, Judged, Proposed, Said, Shifted, SizedView, Swept,
-};
-use super::offer::Offer;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::golden::*;
+use uav_relay_decode::format::{Field, Kind};
+use uav_relay_decode::value::{Fields, Value};
+use uav_relay_decode::{range, walk};
 
-#[test]
-#[expect(clippy::too_many_lines, reason = "a line or more for each message")]
-fn the_vectors_hold_every_kind_and_every_extreme() {
-    let frames = vectors().frames;
-    let some = |what: fn(&Said) -> bool| {
-        assert!(frames.iter().any(|vector| what(&vector.message)));
-    };
-    some(|said| matches!(said, Said::Sweep(sweep) if sweep.reaches.len() == 16));
-    some(|said| matches!(said, Said::Sweep(sweep) if sweep.gap == 0 && sweep.reaches.len() == 1));
-    some(|said| matches!(said, Said::Sweep(sweep) if sweep.reaches.is_empty()));
-    some(|said| matches!(said, Said::Sweep(Swept { gap: 255, .. })));
-    some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor == f32::MIN_POSITIVE));
-    some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor == f32::MAX));
-    some(
-        |said| matches!(said, Said::Verdict(Judged { commit: None, slacks, .. }) if slacks.is_empty()),
-    );
-    some(
-        |said| matches!(said, Said::Verdict(Judged { commit: Some(15), slacks, .. }) if slacks.len() == 16),
-    );
-    some(|said| matches!(said, Said::Busy { .. }));
-    some(|said| {
-        matches!(
-            said,
-            Said::Heartbeat {
-                ask: 1..,
-                answer: 0,
-                ..
-            }
-        )
-    });
-    some(|said| {
-        matches!(
-            said,
-            Said::Heartbeat {
-                ask: 0,
-                answer: 1..,
-                ..
-            }
-        )
-    });
-    some(|said| {
-        matches!(
-            said,
-            Said::Heartbeat {
-                ask: u16::MAX,
-                answer: u16::MAX,
-                ..
-            }
-        )
-    });
-    some(|said| matches!(said, Said::Pulse { lease: 1, .. }));
-    some(|said| {
-        matches!(
-            said,
-            Said::Pulse {
-                lease: u16::MAX,
-                ..
-            }
-        )
-    });
-    some(|said| matches!(said, Said::Pulsed { done: true, .. }));
-    some(|said| matches!(said, Said::Pulsed { done: false, .. }));
-    some(|said| matches!(said, Said::Measured { sweep, .. } if sweep.reaches.len() == 16));
-    some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e-9));
-    some(|said| matches!(said, Said::Measured { upsilon_per_w, .. } if *upsilon_per_w == 1e32));
-    some(|said| matches!(said, Said::Aside { sweep, .. } if sweep.reaches.len() == 16));
-    some(
-        |said| matches!(said, Said::Aside { y_m, sweep } if *y_m == -1e5 && sweep.reaches.is_empty()),
-    );
-    some(|said| matches!(said, Said::Aside { y_m, .. } if *y_m == 1e5));
-    for count in [0, 1, 8] {
-        assert!(frames.iter().any(
-            |vector| matches!(&vector.message, Said::Gather(seats) if seats.seats.len() == count)
-        ));
-        assert!(frames.iter().any(
-            |vector| matches!(&vector.message, Said::Gathered(seats) if seats.seats.len() == count)
-        ));
+use super::codec::FORMAT;
+use super::golden::vectors;
+
+/// Values of each field, by message and name.
+type Seen = BTreeMap<String, BTreeSet<String>>;
+
+/// Returns the name under which a message's fields are collected: one for messages of one layout.
+fn layout_of(message: &str) -> &str {
+    match message {
+        "Measured" | "Aside" => "Sweep",
+        "Gathered" => "Gather",
+        "Sensed" => "Sense",
+        other => other,
     }
-    some(|said| matches!(said, Said::Gather(seats) if seats.after > 0));
-    some(|said| matches!(said, Said::Gather(seats) if seats.seats.contains(&(1000, 1e5, 1e6))));
-    some(|said| matches!(said, Said::Gathered(seats) if seats.seats.contains(&(1, 0.1, 1e-6))));
-    some(
-        |said| matches!(said, Said::Gathered(seats) if seats.seats.iter().any(|seat| seat.1 == 0.0)),
-    );
-    some(|said| matches!(said, Said::Sweep(sweep) if sweep.anchor < 0.0));
-    some(|said| matches!(said, Said::Verdict(Judged { stand: None, .. })));
-    some(|said| matches!(said, Said::Verdict(Judged { stand: Some(x_m), .. }) if *x_m == 0.0));
-    some(|said| matches!(said, Said::Verdict(Judged { stand: Some(x_m), .. }) if *x_m == 1e6));
-    some(|said| matches!(said, Said::Verdict(Judged { own: true, .. })));
-    some(|said| matches!(said, Said::Verdict(Judged { own: false, .. })));
-    some(|said| matches!(said, Said::Token(Handed { turn: 0, .. })));
-    some(|said| matches!(said, Said::Token(Handed { turn: 1, .. })));
-    some(|said| {
-        matches!(
-            said,
-            Said::Token(Handed {
-                turn: 2,
-                columns: 0,
-                ..
-            })
-        )
-    });
-    some(|said| {
-        matches!(
-            said,
-            Said::Token(Handed {
-                turn: 2,
-                columns: 2,
-                rows: 255,
-                ..
-            })
-        )
-    });
-    some(|said| matches!(said, Said::Moved(Shifted { any: true, .. })));
-    some(|said| matches!(said, Said::Moved(Shifted { worst, .. }) if *worst == f32::MAX));
-    let longest = |of_four: bool| {
-        let known = frames
+}
+
+fn note(path: &str, fields: &Fields<'_>, seen: &mut Seen) {
+    for (field, value) in &fields.0 {
+        note_one(&format!("{path}.{}", field.name), value, seen);
+    }
+}
+
+fn note_one(path: &str, value: &Value<'_>, seen: &mut Seen) {
+    let text = match value {
+        Value::None => "none".to_owned(),
+        Value::Bool(said) => said.to_string(),
+        Value::Group(fields) => {
+            note(path, fields, seen);
+            "some".to_owned()
+        }
+        Value::List(values) => {
+            for value in values {
+                note_one(path, value, seen);
+            }
+            format!("{} of it", values.len())
+        }
+        Value::Flags(bits, names) => {
+            let set = (0..names.len()).filter(|bit| bits >> bit & 1 == 1);
+            let set: Vec<String> = set.map(|bit| format!("flag {bit}")).collect();
+            seen.entry(path.to_owned()).or_default().extend(set);
+            return;
+        }
+        Value::Single(number) => format!("{:e}", f64::from(*number) + 0.0),
+        Value::Double(number) => format!("{number:e}"),
+        Value::Unsigned(number) => format!("{:e}", *number as f64),
+        Value::Signed(number) => format!("{:e}", *number as f64),
+        Value::Word(word, _) => format!("{:e}", f64::from(*word)),
+        Value::View(view) => format!("{:e}", f64::from(*view)),
+        Value::Digest(digest) => format!("{:e}", f64::from(*digest)),
+    };
+    seen.entry(path.to_owned()).or_default().insert(text);
+}
+
+/// Returns the values of a field that some vector must have.
+fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut Seen) {
+    let mut want = |text: String| {
+        all.entry(path.to_owned()).or_default().insert(text);
+    };
+    let bounds = || {
+        let (zero, least, most) = range::bounds(&field.range);
+        (zero.then_some(0.0), [least, most])
+    };
+    match kind {
+        Kind::Bool => {
+            for said in ["false", "true"] {
+                want(said.to_owned());
+            }
+        }
+        Kind::Option(of) => {
+            want("none".to_owned());
+            wanted(path, field, of, all);
+        }
+        Kind::List(most, of) => {
+            for count in [0, 1, *most] {
+                want(format!("{count} of it"));
+            }
+            wanted(path, field, of, all);
+        }
+        Kind::Array(_, of) => wanted(path, field, of, all),
+        Kind::Group(fields) => fields
             .iter()
-            .filter(|vector| !of_four || bytes(&vector.body)[0] < 4);
-        known.map(|vector| vector.wire().len()).max()
-    };
-    assert_eq!(longest(true), Some(100));
-    assert_eq!(longest(false), Some(129));
-}
-
-#[test]
-fn the_vectors_hold_every_hello_proposal_and_decision() {
-    const MOST: SizedView = SizedView {
-        id: u32::MAX - 0x17,
-        relays: 1000,
-    };
-    const BEFORE: SizedView = SizedView {
-        id: MOST.id - 1,
-        ..MOST
-    };
-    const LAST: Call = Call {
-        of: (u16::MAX, u16::MAX),
-        view: MOST.id,
-        place: 1000,
-    };
-    let frames = vectors().frames;
-    let some = |what: fn(&Said) -> bool| {
-        assert!(frames.iter().any(|vector| what(&vector.message)));
-    };
-    for flags in [0, 9, 21, 25, 27, 31] {
-        assert!(
-            frames
-                .iter()
-                .any(|vector| matches!(vector.message, Said::Hello(hello) if hello.flags == flags))
-        );
+            .for_each(|field| wanted(&format!("{path}.{}", field.name), field, &field.kind, all)),
+        Kind::Flags(names) => (0..names.len()).for_each(|bit| want(format!("flag {bit}"))),
+        Kind::Words(words) => (0..words.len()).for_each(|word| want(format!("{:e}", word as f64))),
+        // Ranges with a bound: numbers of one, two or four bytes without one are covered by the rest.
+        Kind::F32 | Kind::F64 | Kind::U8 | Kind::U16 | Kind::I32
+            if field.range.contains(" to ") =>
+        {
+            let (zero, bounds) = bounds();
+            for bound in zero.into_iter().chain(bounds) {
+                let single = f64::from(bound as f32);
+                let bound = if *kind == Kind::F32 { single } else { bound };
+                want(format!("{bound:e}"));
+            }
+        }
+        Kind::F32 if field.range.starts_with("0 or more") => {
+            for bound in [0.0, f64::from(f32::MAX)] {
+                want(format!("{bound:e}"));
+            }
+        }
+        _ => {}
     }
-    some(|said| {
-        matches!(said, Said::Hello(hello) if *hello == Greeting {
-            mission: u16::MAX,
-            neighbour: 1000,
-            behind: 1000,
-            newest: u32::MAX,
-            holds: (u16::MAX, u16::MAX),
-            nonce: u16::MAX,
-            hears: 15,
-            flags: 31,
-        })
-    });
-    some(|said| matches!(said, Said::Hello(hello) if hello.holds.1 == 0 && hello.flags & 16 != 0));
-    some(|said| matches!(said, Said::Hello(hello) if hello.holds.1 > 0 && hello.flags & 16 == 0));
-    some(|said| matches!(said, Said::Hello(hello) if hello.hears == 5));
-    some(
-        |said| matches!(said, Said::Proposal(proposal) if proposal.agreed.id == 0 && !proposal.proposer),
-    );
-    some(|said| matches!(said, Said::Proposal(proposal) if proposal.successor.is_none()));
-    some(|said| {
-        matches!(said, Said::Proposal(proposal) if *proposal == Proposed {
-            call: LAST,
-            agreed: BEFORE,
-            votes: 1000,
-            lease_left: u16::MAX,
-            rest: u16::MAX,
-            proposer: true,
-            successor: Some((BEFORE.id, BEFORE)),
-        })
-    });
-    some(|said| matches!(said, Said::Hello(hello) if hello.behind == 1 && hello.nonce == 0));
-    some(|said| matches!(said, Said::Proposal(proposal) if proposal.rest == 0));
-    some(|said| matches!(said, Said::Decision(decision) if decision.view.is_none()));
-    some(|said| matches!(said, Said::Decision(decision) if decision.base.id == 0));
-    some(|said| {
-        matches!(
-            said,
-            Said::Decision(Decided { call, view: Some(view), .. }) if view.id != call.view
-        )
-    });
-    some(|said| {
-        matches!(said, Said::Decision(decision) if *decision == Decided {
-            call: LAST,
-            base: BEFORE,
-            view: Some(MOST),
-            there: 1000,
-            lease_left: u16::MAX,
-        })
-    });
 }
 
 #[test]
-fn the_vectors_hold_offers_of_every_extreme() {
-    let frames = vectors().frames;
-    let some = |what: fn(&Offer) -> bool| {
-        assert!(
-            frames
-                .iter()
-                .any(|vector| matches!(&vector.message, Said::Offer(offer) if what(offer)))
-        );
-    };
-    some(|offer| offer.version == 1 && offer.relays == 1 && offer.distance_m == 1.0);
-    some(|offer| offer.version == u16::MAX && offer.relays == 1000 && offer.distance_m == 1e6);
-    some(|offer| offer.mu_los == 1e30 && offer.mu_nlos == 1e50);
-    some(|offer| offer.mu_los == 1e-3 && offer.mu_nlos == offer.eta);
-    some(|offer| offer.least_m < offer.most_m && offer.eta < offer.mu_nlos);
-    some(|offer| offer.least_m == offer.most_m && offer.eta > offer.mu_los);
-    some(|offer| offer.x_m < 0.0 && offer.interferer_w == 1e-6);
-    some(|offer| offer.y_m < 0.0 && offer.interferer_w == 1e9);
-    some(|offer| offer.left_m == -1e5 && offer.right_m == 1e5);
-    some(|offer| offer.left_m == 0.0 && offer.right_m == 0.0);
-    some(|offer| offer.left_m < 0.0 && offer.right_m == 0.0);
-    some(|offer| offer.noise_w > 0.0);
-    some(|offer| [offer.interferer_w, offer.x_m, offer.y_m] == [0.0; 3]);
-    some(|offer| offer.sites == [0; 6]);
-    some(|offer| offer.sites[..3] == [900_000_000, 1_800_000_000, i32::MAX]);
-    some(|offer| offer.sites[3..] == [-900_000_000, -1_800_000_000, i32::MIN]);
-    some(|offer| offer.sites[..3] != offer.sites[3..]);
-    some(|offer| offer.answer == 0);
-    some(|offer| offer.answer == u16::MAX);
-}
-
-#[test]
-fn the_vectors_hold_hearings_of_every_belief_and_extreme() {
-    let frames = vectors().frames;
-    let some = |what: fn(&Heard) -> bool| {
-        assert!(frames.iter().any(|vector| match &vector.message {
-            Said::Sense(heard) | Said::Sensed(heard) => what(heard),
-            _ => false,
-        }));
-    };
-    some(|heard| heard.kind == 0 && heard.told == 0);
-    some(|heard| heard.kind == 1);
-    some(|heard| heard.kind == 2);
-    some(|heard| heard.kind == 3);
-    some(|heard| heard.kind == 4 && heard.source == [1e9, 1e7, -1e7, 1e6]);
-    some(|heard| heard.kind == 4 && heard.source == [1e-6, -1e7, 1e7, 1e-30]);
-    some(|heard| heard.kind == 4 && heard.source[3] == 0.0);
-    some(|heard| heard.sums == [0.0; 18]);
-    some(|heard| heard.sums.map(f32::abs) == [f32::MAX; 18] && heard.sums[2] < 0.0);
-    // The sums differ, each in its place.
-    some(|heard| {
-        let mut sums = heard.sums.map(f32::to_bits);
-        sums.sort_unstable();
-        sums.windows(2).all(|two| two[0] < two[1])
-    });
-    some(|heard| heard.receiver == [1e6, 1e9] && heard.off == 4094);
-    some(|heard| heard.receiver[0] == 1e-30);
-    some(|heard| heard.receiver == [0.0, 0.0] && heard.off == 0);
+fn the_vectors_hold_both_bounds_of_every_field() {
+    let (mut seen, mut all) = (Seen::new(), Seen::new());
+    for layout in &FORMAT.messages {
+        for field in &layout.fields {
+            let path = format!("{}.{}", layout_of(&layout.name), field.name);
+            wanted(&path, field, &field.kind, &mut all);
+        }
+    }
+    let mut lengths: BTreeMap<String, usize> = BTreeMap::new();
+    for vector in vectors().frames {
+        let layout = FORMAT.message(vector.body[0]).unwrap();
+        let (fields, _) = walk::walk(&layout.fields, &vector.body[1..]);
+        note(layout_of(&layout.name), &fields, &mut seen);
+        let longest = lengths.entry(vector.message).or_default();
+        *longest = vector.wire.len().max(*longest);
+    }
+    let mut count = 0;
+    for (path, wanted) in &all {
+        let seen = seen.get(path).cloned().unwrap_or_default();
+        count += wanted.len();
+        let missing: Vec<&String> = wanted.difference(&seen).collect();
+        assert!(missing.is_empty(), "{path}: {missing:?}");
+    }
+    assert!(count > 150, "{count}");
+    assert_eq!([lengths["Sweep"], lengths["Offer"]], [100, 129]);
 }

@@ -1,91 +1,33 @@
-//! Golden vectors in both directions: `data/vectors.json`, from an independent Python program.
-//!
-//! It encodes bodies by the byte tables (tags 0 and 2 also by the postcard implementation pohlednice 0.2.1), CRC bit by bit,
-//! COBS by definition, and ladders with each step rounded.
+//! Golden vectors in both directions, by the crate and by the second codec.
 
-use serde::Deserialize;
+use serde_json::Value;
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
+use uav_relay_decode::vectors::{Frame, Vectors};
+use uav_relay_decode::{range, walk, write};
 
-use super::codec::{self, Said};
-
-#[derive(Deserialize)]
-pub(crate) struct Vectors {
-    pub(crate) frames: Vec<Frame>,
-    pub(crate) ladders: Vec<LadderVector>,
-}
-
-#[derive(Deserialize)]
-pub(crate) struct Frame {
-    pub(crate) name: String,
-    header: Addresses,
-    pub(crate) message: Said,
-    pub(crate) body: String,
-    plain: String,
-    wire: String,
-}
-
-#[derive(Deserialize)]
-struct Addresses {
-    network: u16,
-    sender: u16,
-    destination: u16,
-    counter: u32,
-}
-
-#[derive(Deserialize)]
-pub(crate) struct LadderVector {
-    anchor: String,
-    gap: u8,
-    growth: u8,
-    pub(crate) targets: Vec<String>,
-}
-
-impl Frame {
-    pub(crate) fn header(&self) -> Header {
-        let Addresses {
-            network,
-            sender,
-            destination,
-            counter,
-        } = self.header;
-        Header {
-            network,
-            sender,
-            destination,
-            counter,
-        }
-    }
-
-    pub(crate) fn plain(&self) -> Vec<u8> {
-        bytes(&self.plain)
-    }
-
-    pub(crate) fn wire(&self) -> Vec<u8> {
-        bytes(&self.wire)
-    }
-}
+use super::codec::{self, FORMAT, Said};
 
 pub(crate) fn vectors() -> Vectors {
-    let vectors: Vectors = serde_json::from_str(include_str!("../data/vectors.json")).unwrap();
-    assert!(vectors.frames.len() >= 69 && vectors.ladders.len() >= 10);
+    let vectors = Vectors::load().unwrap();
+    assert!(vectors.frames.len() >= 92 && vectors.ladders.len() >= 12);
     vectors
 }
 
-/// Decodes hexadecimal digits.
-pub(crate) fn bytes(hex: &str) -> Vec<u8> {
-    let digits: Vec<u32> = hex
-        .chars()
-        .filter(|digit| !digit.is_whitespace())
-        .map(|digit| digit.to_digit(16).unwrap())
-        .collect();
-    assert_eq!(digits.len() % 2, 0, "{hex}");
-    digits
-        .chunks(2)
-        .map(|pair| u8::try_from(pair[0] << 4 | pair[1]).unwrap())
-        .collect()
+fn header(vector: &Frame) -> Header {
+    Header {
+        network: vector.header.network,
+        sender: vector.header.sender,
+        destination: vector.header.destination,
+        counter: vector.header.counter,
+    }
+}
+
+/// Returns the vector's message as the second codec decodes it.
+pub(crate) fn said(vector: &Frame) -> Said {
+    Said::read(&vector.body).unwrap()
 }
 
 pub(crate) fn only_frame(wire: &[u8]) -> Vec<u8> {
@@ -97,14 +39,38 @@ pub(crate) fn only_frame(wire: &[u8]) -> Vec<u8> {
     deframer.push(*end).unwrap().unwrap().to_vec()
 }
 
+/// Returns true if the values are the same, however their numbers are written.
+fn is_same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+            a == b || a as f32 == b as f32
+        }
+        (Value::Array(a), Value::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_same(a, b))
+        }
+        (Value::Object(a), Value::Object(b)) => {
+            let same = |(name, a)| b.get(name).is_some_and(|b| is_same(a, b));
+            a.len() == b.len() && a.iter().all(same)
+        }
+        _ => a == b,
+    }
+}
+
 #[test]
 fn the_vectors_follow_from_the_rules() {
     for vector in vectors().frames {
-        let name = &vector.name;
-        assert_eq!(vector.message.body(), bytes(&vector.body), "{name}");
-        let plain = codec::plain(vector.header(), &bytes(&vector.body));
-        assert_eq!(plain, vector.plain(), "{name}");
-        assert_eq!(codec::wire(&plain), vector.wire(), "{name}");
+        let (name, body) = (&vector.name, &vector.body);
+        let written = write::write(&FORMAT, &vector.message, &vector.fields);
+        assert_eq!(written.as_ref(), Ok(body), "{name}");
+        let layout = FORMAT.message(body[0]).unwrap();
+        let (fields, error) = walk::walk(&layout.fields, &body[1..]);
+        assert_eq!(error, None, "{name}");
+        let shown = serde_json::to_value(&fields).unwrap();
+        assert!(is_same(&shown, &vector.fields), "{name}: {shown}");
+        assert_eq!(said(&vector).body(), *body, "{name}");
+        assert_eq!(codec::plain(header(&vector), body), vector.plain, "{name}");
+        assert_eq!(codec::wire(&vector.plain), vector.wire, "{name}");
     }
 }
 
@@ -112,13 +78,13 @@ fn the_vectors_follow_from_the_rules() {
 fn the_crate_writes_the_vectors() {
     for vector in vectors().frames {
         let name = &vector.name;
-        let message = vector.message.message();
+        let message = said(&vector).message();
         let mut body = [0; MAX_BODY];
         let len = message.encode(&mut body).unwrap();
-        assert_eq!(body[..len], bytes(&vector.body), "{name}");
+        assert_eq!(body[..len], vector.body, "{name}");
         let mut frame = [0xAA; MAX_FRAME];
-        let len = frame::encode(vector.header(), &message, &mut frame);
-        assert_eq!(frame[..len], vector.wire(), "{name}");
+        let len = frame::encode(header(&vector), &message, &mut frame);
+        assert_eq!(frame[..len], vector.wire, "{name}");
         assert!(frame[len..].iter().all(|&byte| byte == 0xAA), "{name}");
     }
 }
@@ -127,16 +93,12 @@ fn the_crate_writes_the_vectors() {
 fn the_crate_reads_the_vectors() {
     for vector in vectors().frames {
         let name = &vector.name;
-        let body = bytes(&vector.body);
-        let message = Message::decode(&body).unwrap();
-        assert_eq!(message, vector.message.message(), "{name}");
-        let plain = only_frame(&vector.wire());
-        assert_eq!(plain, vector.plain(), "{name}");
-        assert_eq!(
-            frame::decode(&plain),
-            Ok((vector.header(), message)),
-            "{name}"
-        );
+        let message = Message::decode(&vector.body).unwrap();
+        assert_eq!(message, said(&vector).message(), "{name}");
+        let plain = only_frame(&vector.wire);
+        assert_eq!(plain, vector.plain, "{name}");
+        let read = frame::decode(&plain);
+        assert_eq!(read, Ok((header(&vector), message)), "{name}");
     }
 }
 
@@ -150,7 +112,7 @@ fn the_ladders_of_the_file_are_met_to_the_bit() {
             bits.map(|bits| format!("{bits:08x}")).collect()
         };
         assert_eq!(hex(&ladder.targets()), vector.targets);
-        let by_the_rules = codec::targets(anchor, vector.gap, vector.growth);
+        let by_the_rules = range::targets(anchor, vector.gap, vector.growth);
         assert_eq!(hex(&by_the_rules), vector.targets);
     }
 }

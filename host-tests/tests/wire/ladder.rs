@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use uav_relay::optimiser::ladder::Ladder;
+use uav_relay_decode::range::targets;
 
-use super::codec::targets;
 use super::config;
 use super::strategies::ladders;
 

@@ -1,4 +1,4 @@
-//! Wire format compared with golden vectors and a second codec written from `FORMAT.md`.
+//! Wire format compared with golden vectors and a second codec by the tables of `FORMAT.md`.
 //!
 //! Random tests use the environment variable `SEED` (1 if unset), which each prints.
 
@@ -7,23 +7,20 @@ use uav_relay_oracle::random::seed;
 
 mod adopted;
 mod anything;
-mod bodies;
-mod bounds;
 mod calls;
 mod codec;
 mod damage;
-mod decoded;
 mod document;
 mod duplicate;
 mod extremes;
 mod forming;
 mod gathered;
-mod gathering;
 mod golden;
 mod ground;
 mod kinds;
 mod ladder;
 mod lies;
+mod mutations;
 mod offer;
 mod offered;
 mod random;

@@ -1,13 +1,13 @@
 //! Second codec for uploads: contents of an offer, its bytes and ranges.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use uav_relay::wire::message::Message;
 use uav_relay::{Band, Interference, Interferer, Profile, Sites, Upload};
 
-use super::codec::{narrow, wide};
+use super::codec::{Said, fields};
 
 /// Mission with its version, in order of transmission.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Offer {
     pub(crate) version: u16,
     /// Digest of the mission loaded before flight.
@@ -18,21 +18,29 @@ pub(crate) struct Offer {
     pub(crate) tx_power_w: f32,
     pub(crate) altitude_m: f32,
     pub(crate) power_w: f32,
+    #[serde(rename = "interferer_power_w")]
     pub(crate) interferer_w: f32,
+    #[serde(rename = "interferer_x_m")]
     pub(crate) x_m: f32,
+    #[serde(rename = "interferer_y_m")]
     pub(crate) y_m: f32,
     pub(crate) tolerance: f32,
     pub(crate) mu_los: f64,
     pub(crate) mu_nlos: f64,
     pub(crate) eta: f64,
+    #[serde(rename = "altitude_min_m")]
     pub(crate) least_m: f32,
+    #[serde(rename = "altitude_max_m")]
     pub(crate) most_m: f32,
     /// Lateral room to the left, at most 0, and to the right, at least 0.
+    #[serde(rename = "lateral_min_m")]
     pub(crate) left_m: f32,
+    #[serde(rename = "lateral_max_m")]
     pub(crate) right_m: f32,
     /// Noise power at every receiver; 0 for none.
     pub(crate) noise_w: f32,
     /// Latitude, longitude and height of Tx, then of Rx; all 0 for none.
+    #[serde(flatten, with = "fields::sites")]
     pub(crate) sites: [i32; 6],
     /// Number of the hello that it answers; 0 for none.
     pub(crate) answer: u16,
@@ -58,7 +66,6 @@ pub(crate) const LEFT: usize = 75;
 pub(crate) const RIGHT: usize = 79;
 pub(crate) const NOISE: usize = 83;
 pub(crate) const SITES: usize = 87;
-pub(crate) const ANSWER: usize = 111;
 
 /// Length of the body, and of the part stored across a reboot.
 pub(crate) const BYTES: usize = 113;
@@ -66,40 +73,7 @@ pub(crate) const KEPT: usize = 111;
 
 impl Offer {
     pub(crate) fn body(&self) -> Vec<u8> {
-        let mut out = vec![14];
-        for word in [self.version, self.base, self.relays] {
-            out.extend(word.to_le_bytes());
-        }
-        for number in [
-            self.distance_m,
-            self.min_separation_m,
-            self.tx_power_w,
-            self.altitude_m,
-            self.power_w,
-            self.interferer_w,
-            self.x_m,
-            self.y_m,
-            self.tolerance,
-        ] {
-            out.extend(number.to_le_bytes());
-        }
-        for number in [self.mu_los, self.mu_nlos, self.eta] {
-            out.extend(number.to_le_bytes());
-        }
-        for number in [
-            self.least_m,
-            self.most_m,
-            self.left_m,
-            self.right_m,
-            self.noise_w,
-        ] {
-            out.extend(number.to_le_bytes());
-        }
-        for number in self.sites {
-            out.extend(number.to_le_bytes());
-        }
-        out.extend(self.answer.to_le_bytes());
-        out
+        Said::Offer(*self).body()
     }
 
     /// Encodes the stored part, without the answered hello.
@@ -109,81 +83,8 @@ impl Offer {
         body
     }
 
-    /// Decodes an offer after its tag. Returns it with the remaining bytes.
-    pub(crate) fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
-        let (bytes, rest) = bytes.split_at_checked(BYTES - 1)?;
-        let word = |at: usize| u16::from_le_bytes([bytes[at - 1], bytes[at]]);
-        let real = |at: usize| f32::from_le_bytes(bytes[at - 1..at + 3].try_into().unwrap());
-        let long = |at: usize| f64::from_le_bytes(bytes[at - 1..at + 7].try_into().unwrap());
-        let offer = Self {
-            version: word(1),
-            base: word(3),
-            relays: word(RELAYS),
-            distance_m: real(DISTANCE),
-            min_separation_m: real(SEPARATION),
-            tx_power_w: real(TX_POWER),
-            altitude_m: real(ALTITUDE),
-            power_w: real(POWER),
-            interferer_w: real(INTERFERER),
-            x_m: real(X),
-            y_m: real(Y),
-            tolerance: real(TOLERANCE),
-            mu_los: long(MU_LOS),
-            mu_nlos: long(MU_NLOS),
-            eta: long(ETA),
-            least_m: real(LEAST),
-            most_m: real(MOST),
-            left_m: real(LEFT),
-            right_m: real(RIGHT),
-            noise_w: real(NOISE),
-            sites: std::array::from_fn(|k| real(SITES + 4 * k).to_bits().cast_signed()),
-            answer: word(ANSWER),
-        };
-        Some((offer, rest))
-    }
-
-    pub(crate) fn in_range(&self) -> bool {
-        let powers = [self.tx_power_w, self.power_w];
-        (1..=u16::MAX).contains(&self.version)
-            && (1..=1000).contains(&self.relays)
-            && (1.0..=1e6).contains(&self.distance_m)
-            && (0.0..=1e5).contains(&self.min_separation_m)
-            && self.fits()
-            && powers.iter().all(|power| (1e-6..=1e6).contains(power))
-            && (self.is_unknown() || self.has_interferer())
-            && (1e-6..=0.1).contains(&self.tolerance)
-            && (1e-3..=1e30).contains(&self.mu_los)
-            && (self.mu_los..=1e20 * self.mu_los).contains(&self.mu_nlos)
-            && (self.mu_los..=self.mu_nlos).contains(&self.eta)
-            && (0.1..=1e5).contains(&self.least_m)
-            && (self.least_m..=1e5).contains(&self.most_m)
-            && (self.least_m..=self.most_m).contains(&self.altitude_m)
-            && (-1e5..=0.0).contains(&self.left_m)
-            && (0.0..=1e5).contains(&self.right_m)
-            && (0.0..=1.0).contains(&self.noise_w)
-            && [0, 3]
-                .iter()
-                .all(|at| self.sites[*at].unsigned_abs() <= 900_000_000)
-            && [1, 4]
-                .iter()
-                .all(|at| self.sites[*at].unsigned_abs() <= 1_800_000_000)
-    }
-
     fn is_unknown(&self) -> bool {
         [self.interferer_w, self.x_m, self.y_m].map(f32::to_bits) == [0; 3]
-    }
-
-    fn has_interferer(&self) -> bool {
-        (1e-6..=1e9).contains(&self.interferer_w)
-            && [self.x_m, self.y_m].iter().all(|at| at.abs() <= 1e7)
-            && f64::from(self.noise_w) * self.eta / f64::from(self.interferer_w) <= 1e12
-    }
-
-    /// Returns true if the relays have room between Tx and Rx.
-    fn fits(&self) -> bool {
-        let rounding = narrow(wide(self.distance_m) / 2_097_152.0);
-        let step = narrow(wide(self.min_separation_m) + wide(rounding));
-        narrow(f64::from(self.relays - 1) * wide(step)) <= self.distance_m
     }
 
     /// Returns the mission's digest: CRC-32C of the mission, and of that with the sites, if any.

@@ -6,7 +6,7 @@ use uav_relay::wire::auth::TAG;
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
 
-use super::codec::{self, Said, plain, sealed, wire};
+use super::codec::{self, FORMAT, Said, plain, sealed, wire};
 use super::config;
 use super::golden::only_frame;
 use super::offered::offers;
@@ -22,7 +22,7 @@ fn body_of(message: &Message) -> Vec<u8> {
 }
 
 proptest! {
-    #![proptest_config(config(2000))]
+    #![proptest_config(config(4000))]
 
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
@@ -36,6 +36,10 @@ proptest! {
         prop_assert_eq!(head_read, head);
         prop_assert_eq!(body_of(&message_read), said.body());
         prop_assert_eq!(message_read, message);
+        let decoded = uav_relay_decode::frame::read(&FORMAT, &frame[..len], len);
+        prop_assert_eq!((decoded.refusal, decoded.header), (None, Some(head)));
+        let fields = Said::of(decoded.name.unwrap(), &decoded.fields);
+        prop_assert_eq!(fields.body(), said.body());
     }
 
     /// Checks the overhead: header, CRC, a byte of stuffing and the delimiter.

@@ -5,8 +5,9 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::frame::Header;
+use uav_relay_decode::range::targets;
 
-use super::codec::{Handed, Judged, Said, Seats, Shifted, Swept, targets};
+use super::codec::{Handed, Judged, Said, Seats, Shifted, Swept};
 use super::offered::offers;
 use super::view_strategies::{formings, heard, pulses};
 

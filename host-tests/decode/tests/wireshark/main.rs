@@ -24,6 +24,7 @@ use uav_relay_decode::dissector;
 use uav_relay_decode::format::Format;
 use uav_relay_decode::frame;
 use uav_relay_decode::refusal::Refusal;
+use uav_relay_decode::vectors::Vectors;
 
 const DISSECTOR: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -114,24 +115,9 @@ fn random_frames_of_every_kind_say_what_cargo_decode_says() {
 }
 
 fn rejected() -> Vec<Vec<u8>> {
-    let document = include_str!("../../../../src/wire/FORMAT.md");
-    let (_, section) = document.split_once("\n## Rejected").unwrap();
-    let rows = section.lines().filter_map(|line| line.strip_prefix("| `"));
-    let mut all = Vec::new();
-    for row in rows {
-        let mut stream = Vec::new();
-        for word in row.split('`').next().unwrap().split(' ') {
-            let (byte, times) = word.split_once('*').unwrap_or((word, "1"));
-            let byte = u8::from_str_radix(byte, 16).unwrap();
-            stream.extend(vec![byte; times.parse().unwrap()]);
-        }
-        let pieces = stream
-            .split(|byte| *byte == 0)
-            .filter(|piece| !piece.is_empty());
-        all.extend(pieces.map(|piece| [piece, &[0]].concat()));
-    }
-    assert!(all.len() > 150, "{}", all.len());
-    all
+    let vectors = Vectors::load().unwrap().rejected;
+    assert!(vectors.len() > 150, "{}", vectors.len());
+    vectors.into_iter().map(|vector| vector.wire).collect()
 }
 
 #[test]

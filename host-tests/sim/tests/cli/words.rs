@@ -1,144 +1,87 @@
 //! Error messages for invalid options: one line that names the allowed values, and exit status 2.
 
+use std::fmt::Write as _;
 use std::io::Read as _;
 use std::process::{Command, Stdio};
 
 use super::{example, json, refusal};
 
+const WRONG: &[&str] = &[
+    "--uavs abc",
+    "--uavs 0",
+    "--uavs -3",
+    "--uavs 99999999999999999999",
+    "--uavs 3.5",
+    "--seed x",
+    "--seed -1",
+    "--rounds -1",
+    "--closed-loop 3x",
+    "--baud 1e5",
+    "--forge 0",
+    "--replay many",
+    "--samples 1000001",
+    "--method foo",
+    "--method alin",
+    "--air foo",
+    "--upload 20 --upload-from moon",
+    "--uav 3",
+    "three",
+    "--svg -",
+    "--capture -",
+    "--loss -0.1",
+    "--uavs 999",
+    "--boot 3@1 --kill 3@5",
+];
+
+const IGNORED: &[&str] = &[
+    "--epsilon 0.2",
+    "--epsilon 0.2 --method joint",
+    "--explore 5",
+    "--rounds 5 --method joint",
+    "--grid 3x4",
+    "--no-predict --method align-step",
+    "--tolerance 0.01 --method align-step",
+    "--closed-loop 2",
+    "--burst 3",
+    "--samples 5",
+    "--shadow 0",
+    "--move-interferer 1,-2",
+    "--listen-for 30",
+    "--takeover 1@5",
+    "--upload-from tx",
+    "--no-store",
+    "--upload 20 --no-store",
+    "--kill 3@5 --kill 3@9",
+    "--soak 30 --kill 3@30",
+    "--soak 30 --kill 3@5 --boot 3@31",
+    "--soak 30 --partition 3@40-50",
+    "--soak 30 --deaf 3:4@40",
+    "--soak 30 --upload 40:uav_w=2",
+    "--soak 30 --fly --takeover 3@40",
+];
+
+/// Returns each of `cases` with its error line.
+fn refusals(cases: &[&str]) -> String {
+    let mut all = String::new();
+    for case in cases {
+        let (status, line) = refusal(&case.split(' ').collect::<Vec<_>>());
+        assert_eq!(status, 2, "{case}: {line}");
+        write!(all, "{case}\n    {line}").unwrap();
+    }
+    all
+}
+
 #[test]
 fn what_is_wrong_is_named_with_what_is_allowed() {
-    let whole = |option: &str, value: &str, range: &str| {
-        let line = format!(
-            "invalid value '{value}' for '{option}': must be a whole number within {range}"
-        );
-        (
-            format!("{} {value}", option.split(' ').next().unwrap()),
-            line,
-        )
-    };
-    let mut cases = vec![
-        whole("--uavs <N>", "abc", "1 to 1000"),
-        whole("--uavs <N>", "0", "1 to 1000"),
-        whole("--uavs <N>", "-3", "1 to 1000"),
-        whole("--uavs <N>", "99999999999999999999", "1 to 1000"),
-        whole("--uavs <N>", "3.5", "1 to 1000"),
-        whole("--seed <S>", "x", "0 to 18446744073709551615"),
-        whole("--seed <S>", "-1", "0 to 18446744073709551615"),
-        whole("--rounds <K>", "-1", "1 to 65535"),
-        whole("--closed-loop <R>", "3x", "1 to 100"),
-        whole("--baud <B>", "1e5", "300 to 10000000"),
-        whole("--forge <N>", "0", "1 to 100000"),
-        whole("--replay <N>", "many", "1 to 100000"),
-        whole("--samples <K>", "1000001", "1 to 1000000"),
-    ];
-    let one_of = "must be one of align, align-step, adjust, joint, stochastic, stochastic-step";
-    let not_a_file =
-        "must be the name of a file: standard output has the report; a file of this name is ./-";
-    for (arguments, line) in [
-        ("--method foo", format!("invalid value 'foo' for '--method <M>': {one_of}")),
-        ("--method alin", format!("invalid value 'alin' for '--method <M>': {one_of}; did you mean align?")),
-        ("--air foo", "invalid value 'foo' for '--air <A>': must be one of csma, aloha, ideal".to_owned()),
-        ("--upload 20 --upload-from moon", "invalid value 'moon' for '--upload-from <END>': must be one of tx, rx".to_owned()),
-        ("--uav 3", "unexpected argument '--uav' found; did you mean --uavs?".to_owned()),
-        ("three", "unexpected argument 'three' found; --help lists what there is".to_owned()),
-        ("--svg -", format!("invalid value '-' for '--svg <FILE>': {not_a_file}")),
-        ("--capture -", format!("invalid value '-' for '--capture <FILE>': {not_a_file}")),
-        ("--loss -0.1", "invalid value '-0.1' for '--loss <P>': must be a number within 0.0 to 0.9".to_owned()),
-        ("--uavs 999", "--uavs 999: must be within 1 to 250 without a --scenario: relays keep 4 m apart on 1000 m".to_owned()),
-        ("--boot 3@1 --kill 3@5", "--boot 3@1: must be after --kill 3@5".to_owned()),
-    ] {
-        cases.push((arguments.to_owned(), line));
-    }
-    for (arguments, line) in cases {
-        let arguments: Vec<&str> = arguments.split(' ').collect();
-        assert_eq!(refusal(&arguments), (2, line + "\n"), "{arguments:?}");
-    }
+    insta::assert_snapshot!(refusals(WRONG));
 }
 
 #[test]
 fn an_option_that_would_be_ignored_is_refused() {
+    insta::assert_snapshot!(refusals(IGNORED));
     let field = example("field.toml");
-    for (arguments, option, needs) in [
-        (
-            "--epsilon 0.2",
-            "--epsilon 0.2",
-            "align-step and stochastic-step",
-        ),
-        (
-            "--epsilon 0.2 --method joint",
-            "--epsilon 0.2",
-            "--method joint has no fixed step",
-        ),
-        (
-            "--explore 5",
-            "--explore 5",
-            "--method align has no rounds; adjust has",
-        ),
-        ("--rounds 5 --method joint", "--rounds 5", "adjust"),
-        ("--grid 3x4", "--grid 3x4", "adjust"),
-        (
-            "--no-predict --method align-step",
-            "--no-predict",
-            "has a fixed step",
-        ),
-        (
-            "--tolerance 0.01 --method align-step",
-            "--tolerance 0.01",
-            "--epsilon",
-        ),
-        ("--closed-loop 2", "--closed-loop", "--method align"),
-        ("--burst 3", "--burst 3", "--loss"),
-        ("--samples 5", "--samples 5", "--listen"),
-        ("--shadow 0", "--shadow 0", "--listen"),
-        (
-            "--move-interferer 1,-2",
-            "--move-interferer 1,-2",
-            "--listen",
-        ),
-        ("--listen-for 30", "--listen-for 30", "--listen"),
-        ("--takeover 1@5", "--takeover 1@", "--fly"),
-        ("--upload-from tx", "--upload-from tx", "--upload"),
-        ("--no-store", "--no-store", "--upload"),
-        ("--upload 20 --no-store", "--no-store", "--boot"),
-        ("--kill 3@5 --kill 3@9", "--kill 3@9", "--kill 3@5"),
-        ("--soak 30 --kill 3@30", "--kill 3@30", "--soak 30"),
-        (
-            "--soak 30 --kill 3@5 --boot 3@31",
-            "--boot 3@31",
-            "--soak 30",
-        ),
-        (
-            "--soak 30 --partition 3@40-50",
-            "--partition 3@40",
-            "--soak 30",
-        ),
-        ("--soak 30 --deaf 3:4@40", "--deaf 3:4", "--soak 30"),
-        (
-            "--soak 30 --upload 40:uav_w=2",
-            "--upload 40:uav_w=2",
-            "--soak 30",
-        ),
-        (
-            "--soak 30 --fly --takeover 3@40",
-            "--takeover 3",
-            "--soak 30",
-        ),
-    ] {
-        let arguments: Vec<&str> = arguments.split(' ').collect();
-        let (status, line) = refusal(&arguments);
-        assert_eq!(status, 2, "{arguments:?}: {line}");
-        let (named, rest) = line.split_at(option.len());
-        assert_eq!(named, option, "{line}");
-        assert!(rest.contains(needs), "{needs} in {line}");
-    }
-    let (_, line) = refusal(&[
-        "--scenario",
-        &field,
-        "--method",
-        "stochastic-step",
-        "--tolerance",
-        "0.01",
-    ]);
+    let method = ["--method", "stochastic-step", "--tolerance", "0.01"];
+    let (_, line) = refusal(&[&["--scenario", &field], &method[..]].concat());
     assert!(
         line.starts_with("--tolerance 0.01: would be ignored"),
         "{line}"

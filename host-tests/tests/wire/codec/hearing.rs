@@ -1,49 +1,45 @@
 //! Interference measurements and estimates, in both directions.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use uav_relay::Interferer;
 use uav_relay::sensing::belief::{Belief, Spread, Told};
 use uav_relay::wire::message::{Heard as Taken, Message};
 
-use super::bytes::{pass, reals, words};
-use super::reader::Reader;
+use super::{Said, fields};
 
 /// Content of a Sense or Sensed message.
-#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Heard {
     pub(crate) number: u16,
+    #[serde(rename = "view")]
     pub(crate) mission: u16,
     /// Number and kind of the current estimate.
+    #[serde(rename = "belief_number")]
     pub(crate) told: u16,
+    #[serde(rename = "belief")]
     pub(crate) kind: u8,
     /// Power, X and Y of the source, and its power at the receiver.
+    #[serde(flatten, with = "fields::source")]
     pub(crate) source: [f32; 4],
+    #[serde(flatten, with = "fields::sums")]
     pub(crate) sums: [f32; 18],
     /// Power at the receiver, and its number of measurements.
+    #[serde(flatten, with = "fields::receiver")]
     pub(crate) receiver: [f32; 2],
+    #[serde(rename = "left_out")]
     pub(crate) off: u16,
 }
 
 impl Heard {
-    pub(super) fn body(&self, tag: u8) -> Vec<u8> {
-        let mut out = pass(tag, [self.number, self.mission]);
-        words(&mut out, &[self.told]);
-        out.push(self.kind);
-        reals(&mut out, &self.source);
-        reals(&mut out, &self.sums);
-        reals(&mut out, &self.receiver);
-        words(&mut out, &[self.off]);
-        out
-    }
-
     /// Decodes the message by the crate, because only relays can add sums.
-    pub(super) fn message(&self, tag: u8) -> Message {
-        let message = Message::decode(&self.body(tag)).unwrap();
-        let ((17, Message::Sense(hearing)) | (18, Message::Sensed(hearing))) = (tag, &message)
+    pub(super) fn message(said: &Said) -> Message {
+        let message = Message::decode(&said.body()).unwrap();
+        let ((Said::Sense(own), Message::Sense(hearing))
+        | (Said::Sensed(own), Message::Sensed(hearing))) = (said, &message)
         else {
-            panic!("{tag}: {message:?}");
+            panic!("{message:?}");
         };
-        assert!(self.is(hearing), "{hearing:?}");
+        assert!(own.is(hearing), "{hearing:?}");
         message
     }
 
@@ -70,43 +66,5 @@ impl Heard {
             && format!("{:?}", hearing.sums) == sums
             && [hearing.receiver.power_w, hearing.receiver.count] == self.receiver
             && hearing.off == self.off
-    }
-
-    pub(super) fn read(rest: &mut Reader) -> Option<Self> {
-        Some(Self {
-            number: rest.word()?,
-            mission: rest.word()?,
-            told: rest.word()?,
-            kind: rest.byte()?,
-            source: rest.reals()?,
-            sums: rest.reals()?,
-            receiver: rest.reals()?,
-            off: rest.word()?,
-        })
-    }
-
-    pub(super) fn in_range(&self) -> bool {
-        let power = |power_w: f32| power_w.to_bits() == 0 || (1e-30..=1e6).contains(&power_w);
-        let [power_w, x_m, y_m, receiver_w] = self.source;
-        let believed = match self.kind {
-            0..=3 => self.source.map(f32::to_bits) == [0; 4],
-            4 => {
-                (1e-6..=1e9).contains(&power_w)
-                    && x_m.abs() <= 1e7
-                    && y_m.abs() <= 1e7
-                    && power(receiver_w)
-            }
-            _ => false,
-        };
-        let [first, .., squares, places, measurements, age] = self.sums;
-        let [heard_w, count] = self.receiver;
-        believed
-            && self.sums.iter().all(|sum| sum.is_finite())
-            && [first, squares, places, measurements, age]
-                .iter()
-                .all(|sum| *sum >= 0.0)
-            && power(heard_w)
-            && (0.0..=1e9).contains(&count)
-            && self.off <= 4094
     }
 }

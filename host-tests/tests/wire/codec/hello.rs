@@ -1,37 +1,29 @@
 //! Hello message.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use uav_relay::ViewId;
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{Hello, Message};
 
-use super::bytes::{pass, words};
-use super::limits::is_count;
-use super::reader::Reader;
+use super::fields;
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(crate) struct Greeting {
     pub(crate) mission: u16,
     pub(crate) neighbour: u16,
     pub(crate) behind: u16,
+    #[serde(rename = "newest_view")]
     pub(crate) newest: u32,
     /// Digest and version of the held mission.
+    #[serde(flatten, with = "fields::holds")]
     pub(crate) holds: (u16, u16),
+    #[serde(rename = "offer_number")]
     pub(crate) nonce: u16,
     pub(crate) hears: u8,
     pub(crate) flags: u8,
 }
 
 impl Greeting {
-    pub(super) fn body(self) -> Vec<u8> {
-        let mut out = pass(10, [self.mission, self.neighbour]);
-        words(&mut out, &[self.behind]);
-        out.extend(self.newest.to_le_bytes());
-        words(&mut out, &[self.holds.0, self.holds.1, self.nonce]);
-        out.extend([self.hears, self.flags]);
-        out
-    }
-
     pub(super) fn flag(self, bit: u8) -> bool {
         self.flags >> bit & 1 == 1
     }
@@ -52,23 +44,6 @@ impl Greeting {
             flies: self.flag(4),
             whole: self.flag(5),
             refused: self.flag(6),
-        })
-    }
-
-    pub(super) fn in_range(self) -> bool {
-        self.neighbour <= 1000 && is_count(self.behind) && self.hears <= 15 && self.flags <= 127
-    }
-
-    pub(super) fn read(rest: &mut Reader) -> Option<Self> {
-        Some(Self {
-            mission: rest.word()?,
-            neighbour: rest.word()?,
-            behind: rest.word()?,
-            newest: rest.long()?,
-            holds: (rest.word()?, rest.word()?),
-            nonce: rest.word()?,
-            hears: rest.byte()?,
-            flags: rest.byte()?,
         })
     }
 }

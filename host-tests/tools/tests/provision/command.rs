@@ -77,123 +77,39 @@ fn toml(points: usize) -> String {
 }
 
 #[test]
-fn what_cannot_be_done_is_said_in_one_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("block.bin");
-    let out = out.to_str().unwrap();
-    let fields = [3, 17].map(|points| {
-        let file = folder.path().join(format!("{points}.toml"));
-        std::fs::write(&file, toml(points)).unwrap();
-        file.to_str().unwrap().to_owned()
-    });
-    let [field, long_field] = fields.each_ref().map(String::as_str);
-    let plain = ["--uavs", "5", "--index", "1", "--out", out];
-    for (arguments, words) in [
-        (&["--method", "stochastic"][..], "'--method <M>'"),
-        (
-            &["--rounds", "0"],
-            "must be a whole number within 1 to 65535",
-        ),
-        (&["--explore=-1"], "must be a number within 0.0 to 100000.0"),
-        (
-            &["--explore", "NaN"],
-            "must be a number within 0.0 to 100000.0",
-        ),
-        (
-            &["--explore", "100001"],
-            "must be a number within 0.0 to 100000.0",
-        ),
-        (
-            &["--samples", "99"],
-            "must be a whole number within 100 to 1000000",
-        ),
-        (
-            &["--samples", "100"],
-            "--samples 100: is for a scenario with a [field]",
-        ),
-        (
-            &["--scenario", field, "--method", "altitude"],
-            "3.toml: method must be align in a field",
-        ),
-        (
-            &["--scenario", long_field],
-            "17.toml: field: a drone has room for 16 points, and these are 17",
-        ),
-    ] {
-        let arguments = [&plain[..], arguments].concat();
-        let text = refusal(&arguments);
-        assert!(text.contains(words), "{arguments:?}: {text}");
-    }
-    assert!(!Path::new(out).exists());
-}
-
-#[test]
 fn what_is_wrong_is_said_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("block.bin");
-    let out = out.to_str().unwrap();
-    for (arguments, words) in [
-        (
-            &["--uavs", "5", "--index", "6", "--out", out][..],
-            "--index 6: must be within 1 to 5",
-        ),
-        (
-            &["--uavs", "5", "--index", "0", "--out", out],
-            "'--index <I>'",
-        ),
-        (&["--uavs", "5", "--out", out], "--index <I>"),
-        (
-            &[
-                "--uavs",
-                "5",
-                "--index",
-                "1",
-                "--network",
-                "65536",
-                "--out",
-                out,
-            ],
-            "--network",
-        ),
-        (
-            &[
-                "--uavs",
-                "5",
-                "--index",
-                "1",
-                "--tolerance",
-                "2",
-                "--out",
-                out,
-            ],
-            "must be a number within 1e-6 to 0.1",
-        ),
-        (
-            &["--uavs", "600", "--index", "1", "--out", out],
-            "no placement",
-        ),
-        (
-            &["--uavs", "5", "--index", "1", "--out", "/nowhere/block.bin"],
-            "--out cannot be written",
-        ),
-        (
-            &[
-                "--scenario",
-                "/nowhere.toml",
-                "--uavs",
-                "5",
-                "--index",
-                "1",
-                "--out",
-                out,
-            ],
-            "/nowhere.toml",
-        ),
-    ] {
-        let text = refusal(arguments);
-        assert!(text.contains(words), "{arguments:?}: {text}");
+    let name = folder.path().to_str().unwrap();
+    for points in [3, 17] {
+        std::fs::write(folder.path().join(format!("{points}.toml")), toml(points)).unwrap();
     }
-    assert!(!Path::new(out).exists());
+    let relay_1 = "--uavs 5 --index 1 --out FOLDER/block.bin";
+    let mut all = String::new();
+    for case in [
+        format!("{relay_1} --method stochastic"),
+        format!("{relay_1} --rounds 0"),
+        format!("{relay_1} --explore=-1"),
+        format!("{relay_1} --explore NaN"),
+        format!("{relay_1} --explore 100001"),
+        format!("{relay_1} --samples 99"),
+        format!("{relay_1} --samples 100"),
+        format!("{relay_1} --scenario FOLDER/3.toml --method altitude"),
+        format!("{relay_1} --scenario FOLDER/17.toml"),
+        format!("{relay_1} --network 65536"),
+        format!("{relay_1} --tolerance 2"),
+        format!("{relay_1} --scenario /nowhere.toml"),
+        "--uavs 5 --index 6 --out FOLDER/block.bin".to_owned(),
+        "--uavs 5 --index 0 --out FOLDER/block.bin".to_owned(),
+        "--uavs 5 --out FOLDER/block.bin".to_owned(),
+        "--uavs 600 --index 1 --out FOLDER/block.bin".to_owned(),
+        "--uavs 5 --index 1 --out /nowhere/block.bin".to_owned(),
+    ] {
+        let options = case.replace("FOLDER", name);
+        let line = refusal(&options.split(' ').collect::<Vec<_>>());
+        write!(all, "{case}\n    {}", line.replace(name, "FOLDER")).unwrap();
+    }
+    insta::assert_snapshot!(all);
+    assert!(!folder.path().join("block.bin").exists());
 }
 
 /// A channel at the firmware's data rate carries 25 relays; more are refused with the numbers.
