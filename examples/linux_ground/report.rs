@@ -216,6 +216,11 @@ pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Groun
         Progress::Adopted { by } => format!(
             "relay {by} flies version {version}, and not all relays of its view are known to"
         ),
+        // The ground has only asked so far.
+        Progress::Idle => format!(
+            "no relay has reported the mission that it flies: {}",
+            why(plan, ground.stats())
+        ),
         _ => format!(
             "no relay is known to hold version {version}: {}",
             why(plan, ground.stats())

@@ -172,7 +172,7 @@ impl Uploading {
             None => {}
         }
         let is_late = self.late_at.is_some_and(|at| at <= now);
-        is_late.then(|| Err(report::late(plan, version, Progress::Offering, ground).into()))
+        is_late.then(|| Err(report::late(plan, version, Progress::Idle, ground).into()))
     }
 
     /// Builds the upload from the flown mission and shows its changes.

@@ -1,8 +1,9 @@
-//! Bench of examples/LINUX.md, run as printed on the page.
+//! Scripts of examples/LINUX.md that are marked as tested, run as printed on the page.
 
+use std::io::{BufRead as _, BufReader};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use host_tests::python;
 
@@ -26,15 +27,61 @@ while True:
         os.write(masters[1 - masters.index(ready)], os.read(ready, 4096))
 "#;
 
+/// Replaces socat in a script of the page where it is not installed.
+fn with_socat(script: &str, folder: &Path) -> String {
+    if Command::new("socat").arg("-V").output().is_ok() {
+        return script.to_owned();
+    }
+    let file = folder.join("socat.py");
+    std::fs::write(&file, SOCAT).unwrap();
+    script.replace("socat ", &format!("python3 {} ", file.display()))
+}
+
+/// Returns the script of the first block ```` ```LANGUAGE tested ```` under a heading of the page.
+fn block(heading: &str, language: &str) -> String {
+    let section = PAGE.split(heading).nth(1).unwrap();
+    let script = section.split(&format!("```{language} tested\n")).nth(1);
+    script.unwrap().split("```").next().unwrap().to_owned()
+}
+
+/// Runs the two relays of the page's beginning until both have agreed; a user ends them by Ctrl-C.
+#[test]
+fn two_relays_on_one_computer_agree() {
+    let script = block("## The companion of a drone", "sh");
+    assert!(script.contains("cargo companion --index 1") && script.contains("--upstream b"));
+    let script = script.replace("cargo companion", companion().to_str().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let script = with_socat(&script, folder.path());
+    let mut running = Command::new("timeout")
+        .args(["--kill-after=5", "60", "sh", "-c", &script])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(running.stdout.take().unwrap()).lines();
+    let mut agreed = [false; 2];
+    for line in lines.map_while(Result::ok) {
+        println!("{line}");
+        for (relay, agreed) in ["relay 1", "relay 2"].iter().zip(&mut agreed) {
+            *agreed |= line.contains(&format!("{relay}  converged: target SIR 1.616563 "));
+        }
+        if agreed == [true; 2] {
+            break;
+        }
+    }
+    // `timeout` passes the signal on to all processes of the script.
+    let process = rustix::process::Pid::from_child(&running);
+    rustix::process::kill_process(process, rustix::process::Signal::TERM).unwrap();
+    running.wait().unwrap();
+    assert_eq!(agreed, [true; 2]);
+}
+
 /// Runs the bench twice in one folder: files of the first run must not disturb the second.
 #[test]
 fn the_bench_of_the_page_runs_twice() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let bench = PAGE.split("### Two boxes on a bench").nth(1).unwrap();
-    let script = bench.split("```bash tested\n").nth(1).unwrap();
-    let script = script.split("```").next().unwrap();
+    let mut script = block("### Two boxes on a bench", "bash");
     assert!(!script.contains("sleep 2"), "it waits for what it needs");
-    let mut script = script.to_owned();
     for (name, is) in [
         ("bench/bin/python", python::interpreter().as_path()),
         ("target/release/linux_companion", companion()),
@@ -49,11 +96,7 @@ fn the_bench_of_the_page_runs_twice() {
     std::fs::write(&key, "5e".repeat(32)).unwrap();
     // Programs refuse a key that other users can read; the page sets the permissions before.
     std::fs::set_permissions(&key, std::fs::Permissions::from_mode(0o600)).unwrap();
-    if Command::new("socat").arg("-V").output().is_err() {
-        let file = folder.path().join("socat.py");
-        std::fs::write(&file, SOCAT).unwrap();
-        script = script.replace("socat ", &format!("python3 {} ", file.display()));
-    }
+    let script = with_socat(&script, folder.path());
     for run in 1..=2 {
         let output = Command::new("timeout")
             .args(["--kill-after=5", "180", "bash", "-e", "-c", &script])

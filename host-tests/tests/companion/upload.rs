@@ -224,7 +224,7 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
     let more = ["--end", "tx", "--tty", wire.tty(0), "--timeout", "2"];
     let Ended { status, stderr, .. } = ground(&files, "7", &more).end();
     assert_eq!((status, stderr.len()), (Some(1), 1), "{stderr:?}");
-    let line = "--timeout 2: no relay is known to hold version 7: ";
+    let line = "--timeout 2: no relay has reported the mission that it flies: ";
     assert!(stderr[0].starts_with(line), "{stderr:?}");
     assert!(stderr[0].ends_with("; 0 frames refused"), "{stderr:?}");
 }

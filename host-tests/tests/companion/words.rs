@@ -132,7 +132,7 @@ fn upload_fails(files: &Files, tty: &str, key: &str, more: &[&str], why: &str) {
     all.extend(options.iter().map(String::as_str));
     let line = said(Relay::ground(&all), 1);
     assert!(
-        line.starts_with("--timeout 8: no relay is known to hold version 3: "),
+        line.starts_with("--timeout 8: no relay has reported the mission that it flies: "),
         "{line}"
     );
     assert!(line.contains(why), "{more:?}: {line}");
