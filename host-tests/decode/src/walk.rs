@@ -1,6 +1,8 @@
 //! Decodes a body field by field.
 
-use crate::format::{Field, Kind};
+use crate::format::{Field, Format, Kind, Layout};
+use crate::range;
+use crate::refusal::Refusal;
 use crate::value::{Fields, Value};
 
 struct Rest<'b>(&'b [u8]);
@@ -38,6 +40,23 @@ impl Rest<'_> {
             1 => Ok(true),
             other => Err(format!("its {what} is {other:02x}: must be 00 or 01")),
         }
+    }
+}
+
+/// Decodes a message from its tag on.
+///
+/// # Errors
+/// The reason for which a receiver rejects it, by the tables alone.
+pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Fields<'f>), Refusal> {
+    let (&tag, body) = body
+        .split_first()
+        .ok_or_else(|| Refusal::Malformed("there is no body".to_owned()))?;
+    let layout = format.message(tag).ok_or(Refusal::UnknownTag(tag))?;
+    let (fields, error) = walk(&layout.fields, body);
+    match error {
+        Some(error) => Err(Refusal::Malformed(error)),
+        None if range::outside(layout, &fields).is_some() => Err(Refusal::Range),
+        None => Ok((layout, fields)),
     }
 }
 

@@ -1,11 +1,15 @@
 //! Fuzz target: arbitrary bytes with a valid CRC. A frame that can be decoded is encoded identically.
 
-use uav_relay::sensing::belief::Belief;
+use std::sync::LazyLock;
+
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
-use uav_relay::wire::message::{Message, Successor};
-use uav_relay::{Identity, Instant, Mission, Port, Relay, Stats, ViewId};
+use uav_relay::wire::message::{Message, MessageError};
+use uav_relay::{Identity, Instant, Port, Relay, Stats};
+use uav_relay_decode::format::Format;
+use uav_relay_decode::refusal::Refusal;
+use uav_relay_decode::walk;
 
 use super::cobs::stuffed;
 use super::input::Input;
@@ -22,8 +26,8 @@ const SIGNS: u8 = 8;
 /// Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
 ///
 /// # Panics
-/// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a message has a number out of its
-/// range.
+/// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a body is not accepted or rejected
+/// as the tables of `FORMAT.md` say.
 pub fn frame(data: &[u8]) {
     let mut plain = data.to_vec();
     sealed(&mut plain);
@@ -32,10 +36,12 @@ pub fn frame(data: &[u8]) {
     flipped(&plain);
     taken_apart(&plain);
     signed(&plain);
+    if let Ok(opened) = frame::open(&plain) {
+        judged(opened.body);
+    }
     let Ok((header, message)) = frame::decode(&plain) else {
         return;
     };
-    look_at(&message);
     let mut again = [0; MAX_FRAME];
     let len = frame::encode(header, &message, &mut again);
     if header.sender > MAX_NODE || header.destination > MAX_NODE {
@@ -210,113 +216,20 @@ fn flipped(plain: &[u8]) {
     assert_eq!(frame::decode(&plain), Err(refusal));
 }
 
-fn look_at(message: &Message) {
-    match message {
-        Message::Sweep(sweep) => {
-            let targets = sweep.ladder.targets();
-            assert_eq!(targets.len(), sweep.ladder.len());
-            let rising = targets.is_sorted();
-            assert!(
-                rising && targets.iter().all(|&sir| is_target(sir)),
-                "{targets:?}"
-            );
-            assert!(sweep.reaches.len() <= targets.len());
-            assert!(is_beside(sweep.relay.at.y_m) && is_flown(sweep.relay.at.altitude_m));
-            assert!((1e-6..=1e6).contains(&sweep.relay.power_w));
-            let across = sweep.chosen || sweep.relay.at.y_m.to_bits() == 0;
-            assert!(across && !(sweep.chosen && sweep.measured_per_w.is_some()));
-        }
-        Message::Gather(roster) | Message::Gathered(roster) => {
-            let indices = roster.seats.iter().map(|seat| seat.index);
-            assert!(indices.clone().is_sorted_by(|a, b| a < b));
-            assert!(
-                indices
-                    .clone()
-                    .all(|index| index > roster.after && index <= Mission::MAX_RELAYS)
-            );
-            for seat in &roster.seats {
-                assert!(seat.held_m.to_bits() == 0 || is_flown(seat.held_m));
-                assert!((1e-6..=1e6).contains(&seat.power_w));
-            }
-        }
-        Message::Sense(hearing) | Message::Sensed(hearing) => {
-            assert!(hearing.sums.count() >= 0.0 && hearing.sums.age_s() >= 0.0);
-            if let Belief::Source { source, receiver_w } = hearing.told.belief {
-                assert!(source.is_valid() && receiver_w >= 0.0);
-            }
-        }
-        Message::Token(token) => {
-            assert!(token.place.x_m.is_finite() && token.place.altitude_m > 0.0);
-        }
-        Message::Moved(moved) => {
-            assert!(moved.place.x_m.is_finite() && moved.place.altitude_m > 0.0);
-        }
-        Message::Verdict(answer) => {
-            assert!(answer.verdict.slacks.iter().all(|slack| slack.is_finite()));
-            assert!(answer.stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m)));
-        }
-        Message::Hello(hello) => {
-            assert!(
-                hello.neighbour <= Mission::MAX_RELAYS && hello.hears < 16,
-                "{hello:?}"
-            );
-        }
-        Message::Proposal(proposal) => {
-            let poll = proposal.poll;
-            let agreed = poll.agreed;
-            assert!(is_count(proposal.place) && is_proposed(proposal.view));
-            assert!(agreed.id == ViewId::LOADED || is_proposed(agreed.id));
-            assert!(
-                is_count(agreed.relays) && poll.votes <= agreed.relays,
-                "{poll:?}"
-            );
-            if let Some(Successor { proposal, view }) = poll.successor {
-                assert!(is_proposed(proposal) && is_proposed(view.id) && is_count(view.relays));
-            }
-        }
-        Message::Decision(decision) => {
-            assert!(is_count(decision.place) && is_proposed(decision.proposal));
-            let base = decision.base;
-            assert!(is_count(decision.there) && is_count(base.relays));
-            assert!(base.id == ViewId::LOADED || is_proposed(base.id));
-            let view = decision.view;
-            assert!(view.is_none_or(|view| is_proposed(view.id) && is_count(view.relays)));
-        }
-        Message::Pulse(pulse) => assert!(pulse.lease > 0),
-        Message::Fence { fence, .. } => {
-            let across = fence.across;
-            let places = [fence.x_m, fence.target_m, across.y_m, across.altitude_m];
-            assert!(fence.association != 0 && places.iter().all(|place| place.abs() <= 1e7));
-            assert!((0.0..=1e5).contains(&fence.apart_m) && fence.flags < 128);
-        }
-        Message::Offer { upload, .. } => {
-            let same = Mission::try_new(*upload.config()).is_ok();
-            assert!(same && upload.version() > 0, "{upload:?}");
-        }
-        Message::Level { power_w, .. } => assert!((1e-30..=1e6).contains(power_w)),
-        Message::Busy { .. }
-        | Message::Heartbeat { .. }
-        | Message::Pulsed(_)
-        | Message::Claim(_) => {}
-    }
-}
-
-fn is_count(relays: u16) -> bool {
-    (1..=Mission::MAX_RELAYS).contains(&relays)
-}
-
-fn is_proposed(view: ViewId) -> bool {
-    view.number() > 0 && is_count(view.proposer())
-}
-
-fn is_target(sir: f32) -> bool {
-    (f32::MIN_POSITIVE..=f32::MAX).contains(&sir)
-}
-
-fn is_beside(y_m: f32) -> bool {
-    y_m.abs() <= 1e5
-}
-
-fn is_flown(altitude_m: f32) -> bool {
-    (0.1..=1e5).contains(&altitude_m)
+/// Checks that a body is accepted or rejected as the tables of `FORMAT.md` say.
+fn judged(body: &[u8]) {
+    static FORMAT: LazyLock<Option<Format>> = LazyLock::new(|| Format::load().ok());
+    let Some(format) = &*FORMAT else {
+        unreachable!("a test loads the tables");
+    };
+    let by_the_tables = match walk::message(format, body) {
+        Ok(_) => Ok(()),
+        Err(Refusal::Range) => Err(MessageError::Value),
+        Err(_) => Err(MessageError::Encoding),
+    };
+    assert_eq!(
+        Message::decode(body).map(|_| ()),
+        by_the_tables,
+        "{body:02x?}"
+    );
 }

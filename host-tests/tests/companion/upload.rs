@@ -1,5 +1,7 @@
 //! Upload of a mission from a ground station to relays that store it, and fly it after a restart.
 
+use std::fmt::Write as _;
+
 use rustix::process::Signal;
 use uav_relay::Upload;
 use uav_relay_scenario::mission;
@@ -304,128 +306,51 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
     }
 }
 
-/// Wrong options of the ground station, and parts of the error line.
-fn wrong() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
-    let wrong: &[(&[&str], &[&str])] = &[
-        (&["--version", "0"], &["--version", "'0'", "1 to 65535"]),
-        (
-            &["--version", "65536"],
-            &["--version", "'65536'", "1 to 65535"],
-        ),
-        (&["--end", "up"], &["--end", "'up'", "tx, rx"]),
-        (&["--timeout", "0"], &["--timeout", "'0'", "1 to 86400"]),
-        (
-            &["--baud", "1199"],
-            &["--baud", "'1199'", "1200 to 4000000"],
-        ),
-        (&["--of", "0"], &["--of", "'0'", "1 to 1000"]),
-        (
-            &["--new-interferer", "80,500"],
-            &["--new-interferer", "'80,500'", "P,X,Y"],
-        ),
-        (
-            &["--new-altitude", "0"],
-            &["--new-altitude", "'0'", "0.1 to 10000.0"],
-        ),
-        (
-            &["--min-separation", "501"],
-            &["--min-separation 501", "--distance 1000"],
-        ),
-        (
-            &["--site-tx", "47.4,8.54,420", "--site-rx", "47.41,8.55,431"],
-            &["--distance 1000", "must be 1343.795 m"],
-        ),
-        (
-            &["--new-site-rx", "47.41,8.56,431"],
-            &["--site-tx", "not provided"],
-        ),
-        (
-            &[SITED, &["--new-site-rx", "47.41"]].concat(),
-            &["--new-site-rx", "'47.41'", "LAT,LON,AMSL"],
-        ),
-        (
-            &["--key-file", "nowhere"],
-            &["--key-file nowhere", "cannot be read"],
-        ),
-    ];
-    wrong
-        .iter()
-        .map(|(options, parts)| (options.to_vec(), parts.to_vec()))
-        .collect()
-}
-
-const SITED: &[&str] = &[
-    "--site-tx",
-    "47.4,8.54,420",
-    "--site-rx",
-    "47.41,8.55,431",
-    "--distance",
-    "1343.795",
+/// Wrong options of the ground station. `SITED` stands for the options of [`SITED`].
+const WRONG: &[&str] = &[
+    "--version 0",
+    "--version 65536",
+    "--end up",
+    "--timeout 0",
+    "--baud 1199",
+    "--of 0",
+    "--new-interferer 80,500",
+    "--new-altitude 0",
+    "--min-separation 501",
+    "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431",
+    "--new-site-rx 47.41,8.56,431",
+    "SITED --new-site-rx 47.41",
+    "--key-file nowhere",
 ];
 
+const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
+
 /// Wrong options that depend on the mission in flight, which the ground station requests first.
-fn unfit() -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
-    let unfit: &[(&[&str], &[&str])] = &[
-        (
-            &["--new-band", "30,300"],
-            &["--new-band 30,300", "LEAST to MOST", "--new-altitude 20"],
-        ),
-        (
-            &["--new-min-separation", "1001"],
-            &["--new-min-separation 1001", "--new-distance 1000", "--of 2"],
-        ),
-        (
-            &[SITED, &["--new-distance", "1343.8"]].concat(),
-            &[
-                "--new-distance 1343.8",
-                "that of --distance",
-                "--new-site-tx",
-            ],
-        ),
-        (
-            &[SITED, &["--new-site-rx", "47.4,8.54,420"]].concat(),
-            &["--new-site-rx", "0.00 m apart", "10 to 100000 m"],
-        ),
-        (
-            &[SITED, &["--new-site-rx", "47.39,8.55,431"]].concat(),
-            &["--new-site-rx", "turns the line by 111.", "0 to 60.0"],
-        ),
-        // Both sites remain valid with latitude and longitude swapped.
-        (
-            &[
-                SITED,
-                &[
-                    "--new-site-tx",
-                    "8.54,47.4,420",
-                    "--new-site-rx",
-                    "8.55,47.41,431",
-                ],
-            ]
-            .concat(),
-            &[
-                "--new-site-rx",
-                "km from the one that is flown along",
-                "must be within 102 km",
-                "are latitude and longitude swapped?",
-            ],
-        ),
-        (
-            &[SITED, &["--new-site-tx", "48.9,8.54,420"]].concat(),
-            &["--new-site-tx", "m apart", "10 to 100000 m"],
-        ),
-        (
-            &[
-                SITED,
-                &["--new-site-rx", "47.41,8.56,431", "--new-distance", "1000"],
-            ]
-            .concat(),
-            &["--new-distance 1000", "must be 187", "be left out"],
-        ),
-    ];
-    unfit
-        .iter()
-        .map(|(options, parts)| (options.to_vec(), parts.to_vec()))
-        .collect()
+const UNFIT: &[&str] = &[
+    "--new-band 30,300",
+    "--new-min-separation 1001",
+    "SITED --new-distance 1343.8",
+    "SITED --new-site-rx 47.4,8.54,420",
+    "SITED --new-site-rx 47.39,8.55,431",
+    // Both sites remain valid with latitude and longitude swapped.
+    "SITED --new-site-tx 8.54,47.4,420 --new-site-rx 8.55,47.41,431",
+    "SITED --new-site-tx 48.9,8.54,420",
+    "SITED --new-site-rx 47.41,8.56,431 --new-distance 1000",
+];
+
+/// Returns the error line of a ground station with wrong options.
+fn refusal(options: &str) -> String {
+    let options = options.replace("SITED", SITED);
+    let options: Vec<&str> = options.split_whitespace().collect();
+    let Ended {
+        status, mut stderr, ..
+    } = Relay::ground(&options).end();
+    assert_eq!(
+        (status, stderr.len()),
+        (Some(2), 1),
+        "{options:?}: {stderr:?}"
+    );
+    stderr.remove(0)
 }
 
 #[test]
@@ -445,57 +370,33 @@ fn an_upload_that_does_not_fit_what_is_flown_is_named() {
         relay.line("started: ");
         (relay, spare)
     });
-    for (options, parts) in unfit() {
-        let sited = options.contains(&"--site-tx");
-        let mut all = vec!["--of", "2", "--version", "1", "--yes", "--end", "tx"];
-        all.extend(["--tty", wires[usize::from(sited)].tty(0)]);
-        let own = files[usize::from(sited)].options("key", "ground");
-        all.extend(own.iter().map(String::as_str));
-        all.extend(["--timeout", "20"]);
-        all.extend(&options);
-        let Ended { status, stderr, .. } = Relay::ground(&all).end();
-        assert_eq!((status, stderr.len()), (Some(2), 1), "{all:?}: {stderr:?}");
-        for part in parts {
-            assert!(
-                stderr[0].contains(part),
-                "{all:?}: {part} not in {stderr:?}"
-            );
-        }
+    let mut all = String::new();
+    for case in UNFIT {
+        let at = usize::from(case.contains("SITED"));
+        let tty = wires[at].tty(0);
+        let own = files[at].options("key", "ground").join(" ");
+        let good = format!("--of 2 --version 1 --yes --end tx --tty {tty} --timeout 20 {own}");
+        writeln!(all, "{case}\n    {}", refusal(&format!("{good} {case}"))).unwrap();
     }
+    insta::assert_snapshot!(all);
 }
 
 #[test]
 fn wrong_options_of_the_ground_are_named() {
     let files = Files::new();
-    let good = files.options("key", "ground");
-    for (wrong, parts) in wrong() {
-        let mut all = vec![
-            "--tty",
-            "a",
-            "--end",
-            "tx",
-            "--of",
-            "3",
-            "--version",
-            "1",
-            "--yes",
-        ];
-        all.extend(good.iter().map(String::as_str));
+    let mut all = String::new();
+    for case in WRONG {
+        let good = "--tty a --end tx --of 3 --version 1 --yes ".to_owned();
+        let mut good = good + &files.options("key", "ground").join(" ");
         // A duplicate option would be another mistake.
-        if let Some(at) = all.iter().position(|option| *option == wrong[0]) {
-            all.drain(at..at + 2);
+        let option = case.split(' ').next().unwrap();
+        if let Some((before, after)) = good.split_once(&format!("{option} ")) {
+            let after = after.split_once(' ').unwrap_or_default().1;
+            good = format!("{before}{after}");
         }
-        all.extend(wrong);
-        let Ended { status, stderr, .. } = Relay::ground(&all).end();
-        assert_eq!((status, stderr.len()), (Some(2), 1), "{all:?}: {stderr:?}");
-        for part in parts {
-            assert!(
-                stderr[0].contains(part),
-                "{all:?}: {part} not in {}",
-                stderr[0]
-            );
-        }
+        writeln!(all, "{case}\n    {}", refusal(&format!("{good} {case}"))).unwrap();
     }
+    insta::assert_snapshot!(all);
     let Ended { status, stderr, .. } = Relay::ground(&[]).end();
     assert_eq!(status, Some(2));
     for option in [

@@ -27,8 +27,9 @@ use uav_relay::guard::Fence;
 use uav_relay::place::CrossSection;
 use uav_relay::wire::message::{Claim, Message, MessageError, Pulse, Pulsed};
 use uav_relay_decode::format::Format;
+use uav_relay_decode::refusal::Refusal;
 use uav_relay_decode::value::Fields;
-use uav_relay_decode::{range, walk, write};
+use uav_relay_decode::{walk, write};
 
 pub(crate) use frame::{header, plain, sealed, wire};
 pub(crate) use hearing::Heard;
@@ -142,17 +143,11 @@ pub(crate) static FORMAT: LazyLock<Format> = LazyLock::new(|| Format::load().unw
 
 /// Decodes and checks the fields of a body.
 fn walked(body: &[u8]) -> Result<(&'static str, Fields<'static>), MessageError> {
-    let known = body.split_first();
-    let known = known.and_then(|(&tag, body)| Some((FORMAT.message(tag)?, body)));
-    let (layout, body) = known.ok_or(MessageError::Encoding)?;
-    let (fields, error) = walk::walk(&layout.fields, body);
-    if error.is_some() {
-        return Err(MessageError::Encoding);
+    match walk::message(&FORMAT, body) {
+        Ok((layout, fields)) => Ok((&layout.name, fields)),
+        Err(Refusal::Range) => Err(MessageError::Value),
+        Err(_) => Err(MessageError::Encoding),
     }
-    if range::outside(layout, &fields).is_some() {
-        return Err(MessageError::Value);
-    }
-    Ok((&layout.name, fields))
 }
 
 impl Said {

@@ -1,6 +1,7 @@
 //! Steps from a plan to the blocks of all drones, without entering a number twice.
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -245,66 +246,40 @@ fn what_does_not_go_together_is_said_in_one_line() {
     planned(&["--uavs", "3", "--out", &file]);
     let written = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&old, written.replace("uav_w = 1.0 ", "uav_w = 2.0 ")).unwrap();
-    let [several, relays] =
-        ["several.toml", "scenario.toml"].map(|name| text(&example().with_file_name(name)));
-    let all = ["--all", "--out-dir", &dir];
-    for (arguments, words) in [
-        (&["--scenario", &file, "--uavs", "4"][..], "--uavs 4: "),
-        (
-            &["--scenario", &file, "--method", "joint"],
-            "has a [plan] with another method, align",
-        ),
-        (
-            &["--scenario", &file, "--tolerance", "0.01"],
-            "has a [plan] with tolerance = 0.0001",
-        ),
-        (
-            &["--scenario", &old],
-            "[plan] is of another scenario: relays in this one settle up to ",
-        ),
-        (
-            &[],
-            "--uavs: is missing, and so are [plan] and network.relays in default scenario; allowed: 1 to 1000",
-        ),
-        (&["--uavs", "3", "--index", "1"], "--index"),
-        (
-            &["--uavs", "3", "--rounds", "4"],
-            "--rounds: is for --method adjust",
-        ),
-        (
-            &["--uavs", "3", "--explore", "4"],
-            "--explore: is for --method adjust",
-        ),
-        (
-            &["--uavs", "3", "--stand-in"],
-            "--stand-in: is for a scenario with several [[interferer]]",
-        ),
-        (
-            &["--scenario", &relays, "--uavs", "3"],
-            "[[relay]] index = 5: there is no such relay in a chain of 3; allowed: 1 to 3",
-        ),
-        (
-            &["--scenario", &several, "--uavs", "8"],
-            "% less than the best places: one interferer stands for all on board",
-        ),
-        (
-            &["--uavs", "3.5"],
-            "must be a whole number within 1 to 1000",
-        ),
-        (
-            &["--uavs", "3", "--network", "x"],
-            "must be a whole number within 0 to 65535",
-        ),
-        (
-            &["--uavs", "3", "--method", "algn"],
-            "must be one of align, joint, adjust; did you mean align?",
-        ),
-        (&["--uavs", "3", "--epoch", "4"], "--key-file"),
+    let places = [
+        (text(folder.path()), "FOLDER"),
+        (text(example().parent().unwrap()), "EXAMPLES"),
+    ];
+    let mut lines = String::new();
+    for case in [
+        "--scenario FOLDER/plan.toml --uavs 4",
+        "--scenario FOLDER/plan.toml --method joint",
+        "--scenario FOLDER/plan.toml --tolerance 0.01",
+        "--scenario FOLDER/old.toml",
+        "",
+        "--uavs 3 --index 1",
+        "--uavs 3 --rounds 4",
+        "--uavs 3 --explore 4",
+        "--uavs 3 --stand-in",
+        "--scenario EXAMPLES/scenario.toml --uavs 3",
+        "--scenario EXAMPLES/several.toml --uavs 8",
+        "--uavs 3.5",
+        "--uavs 3 --network x",
+        "--uavs 3 --method algn",
+        "--uavs 3 --epoch 4",
     ] {
-        let line = refusal(&[arguments, &all].concat());
-        assert!(line.contains(words), "{arguments:?}: {line}");
-        assert!(!Path::new(&dir).exists(), "{arguments:?}");
+        let mut options = format!("{case} --all --out-dir {dir}");
+        for (place, name) in &places {
+            options = options.replace(name, place);
+        }
+        let mut line = refusal(&options.split_whitespace().collect::<Vec<_>>());
+        for (place, name) in &places {
+            line = line.replace(place, name);
+        }
+        write!(lines, "{case}\n    {line}").unwrap();
+        assert!(!Path::new(&dir).exists(), "{case}");
     }
+    insta::assert_snapshot!(lines);
     let line = refusal(&["--uavs", "3", "--index", "1", "--out", &file, "--force"]);
     assert!(line.contains("--all"), "{line}");
 }
