@@ -18,6 +18,8 @@
 //! So a link that finds OFFBOARD or GUIDED granted engages nothing and streams nothing: the pilot chooses another mode first, and is told so.
 //! A PX4's failsafe is ended by the pilot's choice of a mode alone. Nothing else changes a state: no setpoint, no message of a neighbour.
 
+use crate::flight::autopilot::vehicle::Kind;
+
 /// Who flies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -77,6 +79,132 @@ impl State {
     /// Whether the relay's setpoint is flown.
     pub const fn is_flown(self) -> bool {
         matches!(self, Self::Engaged)
+    }
+}
+
+/// What the autopilot is doing.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FlightMode {
+    /// OFFBOARD or GUIDED: the relay may say where to fly.
+    Companion,
+    /// A mode that is flown with the sticks.
+    Sticks,
+    /// It holds its place: Hold, LOITER.
+    Hold,
+    /// It stops and holds its place: BRAKE.
+    Brake,
+    /// It returns: RTL, SMART_RTL.
+    Return,
+    /// It lands.
+    Land,
+    /// Another mode: a mission, a take-off.
+    Other,
+}
+
+impl FlightMode {
+    /// Returns the mode by its number.
+    pub(super) const fn of(kind: Kind, custom_mode: u32) -> Self {
+        match kind {
+            Kind::Px4 => match (custom_mode >> 16 & 0xFF, custom_mode >> 24) {
+                (6, _) => Self::Companion,
+                (4, 3) => Self::Hold,
+                (4, 5) => Self::Return,
+                (4, 6) => Self::Land,
+                (4, _) => Self::Other,
+                _ => Self::Sticks,
+            },
+            Kind::ArduCopter => match custom_mode {
+                4 => Self::Companion,
+                5 => Self::Hold,
+                6 | 21 | 27 => Self::Return,
+                9 => Self::Land,
+                17 => Self::Brake,
+                0 | 1 | 2 | 7 | 11 | 13 | 14 | 15 | 16 => Self::Sticks,
+                _ => Self::Other,
+            },
+        }
+    }
+}
+
+/// Why the drone is not flown by the relay any more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ReleaseCause {
+    /// Another mode was chosen, by the pilot or by a ground station.
+    Chosen,
+    /// The autopilot's failsafe.
+    Failsafe,
+    /// The autopilot's fence was breached.
+    Fence,
+    /// The link was interrupted or late: a PX4 may be in its failsafe, which a stream of targets would end.
+    Link,
+}
+
+/// A release: its cause, and the mode that the autopilot has now.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Release {
+    /// Why.
+    pub cause: ReleaseCause,
+    /// What the autopilot does now.
+    pub mode: FlightMode,
+}
+
+impl Release {
+    /// Returns the line for the operator, in two parts.
+    pub(super) const fn text(self) -> [&'static str; 2] {
+        let mode = match self.mode {
+            FlightMode::Companion => "relay: released",
+            FlightMode::Sticks => "relay: released to the sticks",
+            FlightMode::Hold => "relay: released, holds its place",
+            FlightMode::Brake => "relay: released, BRAKE",
+            FlightMode::Return => "relay: released, returns (RTL)",
+            FlightMode::Land => "relay: released, lands",
+            FlightMode::Other => "relay: released, another mode",
+        };
+        let cause = match self.cause {
+            ReleaseCause::Chosen => "",
+            ReleaseCause::Failsafe => ": failsafe",
+            ReleaseCause::Fence => ": fence",
+            ReleaseCause::Link => ": link interrupted",
+        };
+        [mode, cause]
+    }
+}
+
+/// Why the pilot cannot engage the drone, or why the mode was found but not used.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum WaitReason {
+    /// The autopilot is in its failsafe. It ends when the pilot chooses a mode.
+    Failsafe,
+    /// Bytes from the autopilot come late.
+    Link,
+    /// OFFBOARD or GUIDED was not chosen before this link: another mode has to be chosen first.
+    Found,
+    /// No mode that the pilot has chosen was seen yet.
+    Unseen,
+    /// There is no position, or none near the line.
+    Position,
+    /// The relay is not ready ([`handle_ready`](super::Autopilot::handle_ready)).
+    NotReady,
+}
+
+impl WaitReason {
+    /// Returns the line for the operator.
+    pub(super) const fn text(self) -> &'static str {
+        match self {
+            Self::Failsafe => "relay: waits, the autopilot is in a failsafe",
+            Self::Link => "relay: waits, the autopilot's link is late",
+            Self::Found => "relay: waits, take another mode first",
+            Self::Unseen => "relay: waits, no mode was chosen yet",
+            Self::Position => "relay: waits, no position near the line",
+            Self::NotReady => "relay: waits, not in order with its neighbours",
+        }
     }
 }
 

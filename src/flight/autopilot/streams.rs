@@ -3,7 +3,7 @@
 //!
 //! One request is under way at a time, so that an answer (COMMAND_ACK), which does not say for which message it is, belongs to that request.
 
-use super::kind::Kind;
+use super::vehicle::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 

@@ -4,8 +4,8 @@
 //! cannot sign. An autopilot with a key ignores whoever has none, in silence, so the firmware is told of what does not fit, each kind
 //! once: three heartbeats of an autopilot in a row tell that it is no accident.
 
-use super::kind::Kind;
 use super::vehicle::AUTOPILOT;
+use super::vehicle::Kind;
 use crate::flight::mavlink::incoming::{Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
