@@ -18,7 +18,7 @@
 //! % loss.
 
 use crate::time::Duration;
-use crate::wire::frame::MAX_SWEEP;
+use crate::wire::MAX_SWEEP;
 
 /// Maximum number of frames that two neighbours exchange in `probe_after`.
 const FRAMES: u64 = 8;

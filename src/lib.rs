@@ -70,7 +70,9 @@ mod wire;
 #[doc(hidden)]
 pub mod wire;
 
-pub use self::settings::WithoutQuorum;
+pub use without_quorum::WithoutQuorum;
+mod without_quorum;
+
 pub use channel::Channel;
 pub use channel_load::{ChannelFull, ChannelLoad};
 pub use event::Event;
@@ -88,7 +90,8 @@ pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
-pub use settings::{Adjust, Identity, Listen, Measure, Method, Settings, SetupError, Wiring};
+pub use sensing::Listen;
+pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
 pub use side::Side;
 pub use stats::Stats;
 pub use time::{Duration, Instant};

@@ -6,9 +6,10 @@ use crate::mission::{Mission, Profile};
 use crate::optimiser::joint::MOST_SOLVED;
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
-use crate::place::Placement;
+use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
+use crate::without_quorum::WithoutQuorum;
 
 /// Time for computing and for the buffers of a link, in the `hop_time` of a preset.
 const LATENCY: Duration = Duration::from_millis(10);
@@ -86,63 +87,6 @@ pub struct Measure {
     pub i_max_w: f32,
     /// Samples to take at one position before the estimate is used, 100 to 1 000 000.
     pub samples: u32,
-}
-
-/// Estimation of an unknown interferer from the relays' measurements.
-///
-/// ```
-/// use uav_relay::{Listen, Settings};
-///
-/// // Eight relays follow an interferer that moves.
-/// let settings = Settings { listen: Some(Listen::following(8)), ..Settings::default() };
-/// assert!(settings.listen.is_some_and(|listen| listen.is_valid()));
-/// ```
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Listen {
-    /// Interval between an agreement and the leader's next collection of measurements; above 0. While the collections change
-    /// nothing, the interval grows, up to 64 times.
-    pub every: Duration,
-    /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. From ten times
-    /// `every` on, the interferer is assumed to be stationary: after five estimates the chain moves again only for a deviation
-    /// that is significant even over 64 tests.
-    pub half_life: Duration,
-    /// Relative error of a measurement, 1e-3 to 1: 1 / sqrt(number of independent samples in it).
-    pub relative_error: f32,
-}
-
-impl Default for Listen {
-    /// Every 5 s, half-life 60 s, error 3 % (a thousand samples).
-    fn default() -> Self {
-        Self {
-            every: Duration::from_millis(5_000),
-            half_life: Duration::from_millis(60_000),
-            relative_error: 0.03,
-        }
-    }
-}
-
-impl Listen {
-    /// Returns settings for a moving interferer: every second, with a half-life of 0.1 s + 16 s / `relays`.
-    pub const fn following(relays: u16) -> Self {
-        let relays = if relays > 0 { relays as u64 } else { 1 };
-        Self {
-            every: Duration::from_millis(1_000),
-            half_life: Duration::from_millis(16_000 / relays + 100),
-            relative_error: 0.03,
-        }
-    }
-
-    /// Returns true if the interferer is assumed to be stationary.
-    pub(crate) const fn is_for_one_that_stands(&self) -> bool {
-        self.half_life.as_micros() / 10 >= self.every.as_micros()
-    }
-
-    /// Returns true if all values are within their ranges.
-    pub fn is_valid(&self) -> bool {
-        let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
-        timed && (1e-3..=1.0).contains(&self.relative_error)
-    }
 }
 
 /// Settings that a firmware may choose.
@@ -431,46 +375,6 @@ pub(crate) fn check(
         return Err(SetupError::Guard);
     }
     Ok(())
-}
-
-/// Behaviour of a relay while its part of the chain has no quorum and must not block the other part.
-///
-/// Set it to the same value on all relays: relays that leave then keep their order and distances.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum WithoutQuorum {
-    /// Hold the agreed position.
-    #[default]
-    Hold,
-    /// Leave the line from the agreed position, along y and upward. With a guard, only within its geofence
-    /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
-    Leave {
-        /// Lateral offset, m: -1e4 to 1e4.
-        y_m: f32,
-        /// Climb, m: 0 to 1e4.
-        up_m: f32,
-    },
-}
-
-impl WithoutQuorum {
-    pub(crate) fn is_valid(self) -> bool {
-        match self {
-            Self::Hold => true,
-            Self::Leave { y_m, up_m } => (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m),
-        }
-    }
-
-    /// Returns the position to take without a quorum; `place` is the agreed one.
-    pub(crate) fn place(self, place: Placement) -> Placement {
-        match self {
-            Self::Hold => place,
-            Self::Leave { y_m, up_m } => Placement {
-                y_m: place.y_m + y_m,
-                altitude_m: place.altitude_m + up_m,
-                ..place
-            },
-        }
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! association cannot count in a later one.
 //! [`Fence`] is the message of an association.
 
-use crate::guard::config::GuardConfig;
+use crate::guard::config::{GuardConfig, is_place};
 use crate::guard::own::Own;
 use crate::place::{CrossSection, Placement};
 use crate::side::Side;
@@ -495,9 +495,6 @@ pub struct Fence {
     pub flags: u8,
 }
 
-/// Maximum distance of a position from Tx, m.
-const FARTHEST_M: f32 = 1e7;
-
 impl Fence {
     /// Flag: the sender has arrived at its position across the line.
     pub const STILL: u8 = 1;
@@ -563,9 +560,4 @@ pub enum HoldReason {
     Pending,
     /// Another relay of the chain is not in order with its neighbours, so all relays hold their positions.
     Halted,
-}
-
-/// Returns true if `x_m` is a valid position along x, m; false for NaN.
-pub(super) fn is_place(x_m: f32) -> bool {
-    x_m.abs() <= FARTHEST_M
 }

@@ -3,10 +3,8 @@
 use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
-use crate::settings::WithoutQuorum;
 use crate::time::Duration;
-
-use super::association::is_place;
+use crate::without_quorum::WithoutQuorum;
 
 /// Default `lag`: stopping time of the autopilot link's default pace.
 const LAG: Duration = Duration::from_millis(9_800);
@@ -186,4 +184,12 @@ impl GuardConfig {
     pub(super) fn rounding(&self) -> f32 {
         4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
     }
+}
+
+/// Maximum distance of a position from Tx, m.
+const FARTHEST_M: f32 = 1e7;
+
+/// Returns true if `x_m` is a valid position along x, m; false for NaN.
+pub(super) fn is_place(x_m: f32) -> bool {
+    x_m.abs() <= FARTHEST_M
 }

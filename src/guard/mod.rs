@@ -95,10 +95,9 @@ use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Instant, Jitter};
 
-use self::association::is_place;
 pub use self::association::{Fence, HoldReason};
 use association::Association;
-use config::{Geofence, GuardConfig};
+use config::{Geofence, GuardConfig, is_place};
 use follower::FenceFollower;
 use own::{Own, ReachableInterval};
 use owner::FenceOwner;

@@ -8,8 +8,6 @@ use crate::field::{Field, InNoise};
 use crate::place::{CrossSection, Station};
 use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
-use crate::sensing::belief::{Belief, Spread};
-use crate::wire::digest::digest;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -488,13 +486,6 @@ impl Mission {
         &self.config
     }
 
-    /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
-    ///
-    /// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
-    pub fn digest(&self) -> u16 {
-        digest(self)
-    }
-
     /// Number of relays N.
     pub const fn relays(&self) -> u16 {
         self.config.relays
@@ -707,22 +698,17 @@ impl Mission {
         }
     }
 
-    /// Returns the mission with the interference of `belief`, or with `own` if that refers to the mission.
+    /// Returns the mission with another `interference`, of which the receiver hears `receiver_w` if that is above 0. With `halved` the
+    /// first hop, or the last one, is half as long as the others.
     ///
     /// # Errors
-    /// [`MissionError`] if the estimated interference is out of range.
-    pub(crate) fn believing(
+    /// [`MissionError`] if the interference is out of range.
+    pub(crate) fn with_interference(
         &self,
-        own: Interference,
-        belief: &Belief,
+        interference: Interference,
+        receiver_w: f32,
+        halved: [bool; 2],
     ) -> Result<Self, MissionError> {
-        let (interference, spread, receiver_w) = match *belief {
-            Belief::Mission => (own, Spread::Even, 0.0),
-            Belief::Unknown(spread) => (Interference::Unknown, spread, 0.0),
-            Belief::Source { source, receiver_w } => {
-                (Interference::Source(source), Spread::Even, receiver_w)
-            }
-        };
         let config = MissionConfig {
             interference,
             ..self.config
@@ -733,12 +719,12 @@ impl Mission {
             let heard = f64::from(receiver_w) + f64::from(config.noise_w);
             mission.receiver_gain_per_w = 1.0 / (eta * heard);
         }
-        match spread {
-            Spread::Even => {}
-            Spread::TowardTx => {
-                mission.tx_gain = PowerRatio::new(mission.tx_gain.wide() * HALF_AS_LONG);
-            }
-            Spread::TowardRx => mission.receiver_gain_per_w *= HALF_AS_LONG,
+        let [first, last] = halved;
+        if first {
+            mission.tx_gain = PowerRatio::new(mission.tx_gain.wide() * HALF_AS_LONG);
+        }
+        if last {
+            mission.receiver_gain_per_w *= HALF_AS_LONG;
         }
         Ok(mission)
     }

@@ -2,7 +2,6 @@
 
 use crate::mission::{Band, Heading, Interference, Mission};
 use crate::node::circulation::Path;
-use crate::node::view::electorate::Held;
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::time::{Duration, Instant};
@@ -150,6 +149,35 @@ impl<'a> Context<'a> {
             Band::at(altitude_m)
         } else {
             self.mission().config().band
+        }
+    }
+}
+
+/// Remaining leases of other relays, as far as this relay knows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Held {
+    /// Longest lease of members of this relay's view that rely on this relay.
+    pub(crate) lease_left: Duration,
+    /// Accepted view, and the longest lease of members of earlier views. `None` if a member may not have accepted `view`.
+    pub(crate) view: ViewId,
+    pub(crate) rest: Option<Duration>,
+}
+
+impl Held {
+    #[cfg(test)]
+    pub(crate) const NONE: Self = Self {
+        lease_left: Duration::from_micros(0),
+        view: ViewId::LOADED,
+        rest: Some(Duration::from_micros(0)),
+    };
+
+    /// Returns the wait for leases of views before `view`, in tenths of a second.
+    pub(crate) fn rest_of(self, view: ViewId) -> u16 {
+        if view == ViewId::LOADED {
+            0
+        } else {
+            let known = self.rest.filter(|_| view == self.view);
+            known.map_or(u16::MAX, tenths)
         }
     }
 }

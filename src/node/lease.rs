@@ -29,9 +29,9 @@
 //! for at most a quarter of `dead_after`.
 
 use super::circulation::{Circulation, Reply};
+use super::context::Held;
 use super::context::{Context, Effects, News, Peer};
 use super::context::{PAUSE, earliest, longest_lease, tenths};
-use super::view::electorate::Held;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;

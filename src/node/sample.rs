@@ -24,7 +24,7 @@ pub enum Sample {
     },
     /// Mean interference power at a position on the way or at the setpoint.
     ///
-    /// It is averaged until its relative error is that of [`Listen`](crate::settings::Listen). It excludes the signals of the
+    /// It is averaged until its relative error is that of [`Listen`](crate::sensing::Listen). It excludes the signals of the
     /// chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
         /// Position of the drone: at most 100 D from the transmitter in each coordinate.

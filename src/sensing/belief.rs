@@ -18,9 +18,9 @@
 use super::doubt::{judge_ends, v_at_end};
 use super::fit::{Fit, FoundSource, Unfit, misfit};
 use super::sums::{EndsOff, Level, Levels, Sums, coefficients, expected_v, is_level, terms};
-use crate::mission::{Interferer, Mission};
+use crate::mission::{Interference, Interferer, Mission, MissionError};
 use crate::place::Placement;
-use crate::settings::Listen;
+use crate::sensing::Listen;
 use crate::time::{Duration, Instant};
 
 /// Interference estimate of the chain.
@@ -39,6 +39,28 @@ pub enum Belief {
         /// Interference power at the receiver, W. 0 if it has not measured: then the source's path loss over the ground is used.
         receiver_w: f32,
     },
+}
+
+impl Belief {
+    /// Returns `mission` with this interference, or with `own` if the estimate refers to the mission.
+    ///
+    /// # Errors
+    /// [`MissionError`] if the estimated interference is out of range.
+    pub(crate) fn mission(
+        &self,
+        mission: &Mission,
+        own: Interference,
+    ) -> Result<Mission, MissionError> {
+        let (interference, spread, receiver_w) = match *self {
+            Self::Mission => (own, Spread::Even, 0.0),
+            Self::Unknown(spread) => (Interference::Unknown, spread, 0.0),
+            Self::Source { source, receiver_w } => {
+                (Interference::Source(source), Spread::Even, receiver_w)
+            }
+        };
+        let halved = [Spread::TowardTx, Spread::TowardRx].map(|toward| toward == spread);
+        mission.with_interference(interference, receiver_w, halved)
+    }
 }
 
 /// Spacing of relays without an estimate.

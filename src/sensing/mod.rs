@@ -36,3 +36,62 @@ pub(crate) mod sums;
 pub mod sums;
 
 pub use fit::Unfit;
+
+use crate::time::Duration;
+
+/// Estimation of an unknown interferer from the relays' measurements.
+///
+/// ```
+/// use uav_relay::{Listen, Settings};
+///
+/// // Eight relays follow an interferer that moves.
+/// let settings = Settings { listen: Some(Listen::following(8)), ..Settings::default() };
+/// assert!(settings.listen.is_some_and(|listen| listen.is_valid()));
+/// ```
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Listen {
+    /// Interval between an agreement and the leader's next collection of measurements; above 0. While the collections change
+    /// nothing, the interval grows, up to 64 times.
+    pub every: Duration,
+    /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. From ten times
+    /// `every` on, the interferer is assumed to be stationary: after five estimates the chain moves again only for a deviation
+    /// that is significant even over 64 tests.
+    pub half_life: Duration,
+    /// Relative error of a measurement, 1e-3 to 1: 1 / sqrt(number of independent samples in it).
+    pub relative_error: f32,
+}
+
+impl Default for Listen {
+    /// Every 5 s, half-life 60 s, error 3 % (a thousand samples).
+    fn default() -> Self {
+        Self {
+            every: Duration::from_millis(5_000),
+            half_life: Duration::from_millis(60_000),
+            relative_error: 0.03,
+        }
+    }
+}
+
+impl Listen {
+    /// Returns settings for a moving interferer: every second, with a half-life of 0.1 s + 16 s / `relays`.
+    pub const fn following(relays: u16) -> Self {
+        let relays = if relays > 0 { relays as u64 } else { 1 };
+        Self {
+            every: Duration::from_millis(1_000),
+            half_life: Duration::from_millis(16_000 / relays + 100),
+            relative_error: 0.03,
+        }
+    }
+
+    /// Returns true if the interferer is assumed to be stationary.
+    pub(crate) const fn is_for_one_that_stands(&self) -> bool {
+        self.half_life.as_micros() / 10 >= self.every.as_micros()
+    }
+
+    /// Returns true if all values are within their ranges.
+    pub fn is_valid(&self) -> bool {
+        let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
+        timed && (1e-3..=1.0).contains(&self.relative_error)
+    }
+}

@@ -1,6 +1,5 @@
 //! Serial link: received bytes, transmit queue, driver-enable pin, and counters of local faults.
 
-use super::READ_LIMIT;
 use super::port::{Fault, SerialPort};
 use crate::relay::{Port, Relay};
 use crate::stats::bump;
@@ -9,6 +8,10 @@ use crate::wire::frame::MAX_FRAME;
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
+
+/// Largest number of bytes, or of failed reads, that one poll takes from one port.
+#[doc(hidden)] // public because the documentation of public functions links to it
+pub const READ_LIMIT: usize = 64;
 
 /// Capacity for two frames: one in transmission, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;

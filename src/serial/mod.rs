@@ -98,6 +98,8 @@ pub mod queue;
 
 use embedded_hal::digital::OutputPin;
 
+#[doc(hidden)]
+pub use link::READ_LIMIT;
 pub use link::SerialStats;
 #[cfg(feature = "async")]
 pub(crate) use link::byte_time;
@@ -110,10 +112,6 @@ use crate::relay::{Port, Relay, Transmit};
 use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::FrameLink;
-
-/// Largest number of bytes, or of failed reads, that one poll takes from one port.
-#[doc(hidden)] // public because the documentation of public functions links to it
-pub const READ_LIMIT: usize = 64;
 
 /// Two serial ports, one to each neighbour, full duplex unless a link has a pin.
 #[derive(Debug)]

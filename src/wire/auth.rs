@@ -12,6 +12,9 @@ pub const TAG: usize = 8;
 /// True with the feature `auth`; without it no node has credentials and no frame has a tag.
 pub(crate) const AUTH: bool = cfg!(feature = "auth");
 
+/// Room for a tag in a frame, bytes; 0 without the feature `auth`.
+pub(crate) const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
+
 /// Secret key that the members of a network share.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key([u8; 32]);

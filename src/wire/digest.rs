@@ -11,6 +11,15 @@ pub fn digest(mission: &Mission) -> u16 {
     of(mission.config())
 }
 
+impl Mission {
+    /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
+    ///
+    /// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
+    pub fn digest(&self) -> u16 {
+        digest(self)
+    }
+}
+
 pub(super) fn of(c: &MissionConfig) -> u16 {
     let mut crc = CRC_32C.digest();
     crc.update(&c.relays.to_le_bytes());

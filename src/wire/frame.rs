@@ -1,9 +1,9 @@
 //! Frame: header, body, CRC, then COBS and a zero byte as delimiter.
 
 use super::CRC_32C;
-pub use super::MAX_NODE;
-use super::auth::{AUTH, Signer, TAG};
+use super::auth::{AUTH, Signer, TAG, TAG_ROOM};
 use super::message::{MAX_BODY, Message, MessageError};
+pub use super::{MAX_NODE, MAX_SWEEP};
 
 /// Version of the format, in the top four bits of the first word.
 pub const VERSION: u8 = 1;
@@ -13,17 +13,11 @@ pub const HEADER: usize = 10;
 
 const CHECK: usize = 4;
 
-/// Room for a tag, bytes; 0 without the feature `auth`.
-const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
-
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
 /// Maximum length of a frame on the wire. COBS adds one byte below 254 bytes, the delimiter another one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
-
-/// Maximum length of a sweep on the wire, with sixteen targets.
-pub const MAX_SWEEP: usize = 100 + TAG_ROOM;
 
 /// Flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;

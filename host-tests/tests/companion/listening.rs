@@ -66,8 +66,8 @@ fn a_radio_on_the_autopilots_link_is_heard() {
     let mut flight = Flight::listening("arducopter", &LISTENING);
     flight.takes_off();
     flight.drone.order("noise 150");
-    flight
-        .relay
-        .line("estimate: interference unknown; the relays spread toward the transmitter to measure it");
+    flight.relay.line(
+        "estimate: interference unknown; the relays spread toward the transmitter to measure it",
+    );
     assert!(flight.targets_for(Duration::from_millis(100)).is_empty());
 }

@@ -12,7 +12,7 @@
 
 use heapless::Vec;
 
-use super::event::{AutopilotEvent, MOST, RelayNumbers};
+use super::report::{AutopilotEvent, MOST, RelayNumbers};
 use crate::event::Event;
 use crate::flight::mavlink::frame::Address;
 use crate::side::Side;

@@ -1,10 +1,7 @@
-//! Reports of the autopilot: its state, the drone's position, and what a SiK radio hears there.
+//! The autopilot as it is known: its kind, its reports and its clock, the delay of the link, the drone's position, and what a SiK radio hears.
 
-use super::clock::RemoteClock;
-use super::echo::Echo;
-use super::kind::Kind;
-use super::mode::FlightMode;
-use super::state::Observed;
+use super::state::FlightMode;
+use crate::flight::autopilot::state::Observed;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::{Incoming, Received, noise_w};
@@ -374,5 +371,420 @@ impl RadioNoise {
     pub(super) fn take(&mut self) -> Option<Sample> {
         let (at, power_w) = self.0.take()?;
         Some(Sample::Heard { at, power_w })
+    }
+}
+
+/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
+const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
+
+/// Kind of autopilot.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Kind {
+    /// PX4: OFFBOARD grants control, for as long as targets are streamed.
+    Px4,
+    /// ArduCopter: GUIDED grants control, and a target holds for good.
+    ArduCopter,
+}
+
+impl Kind {
+    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`.
+    pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
+        match autopilot {
+            12 => Some(Self::Px4),
+            3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),
+            _ => None,
+        }
+    }
+}
+
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// Maximum age of the newest answered question; beyond it the link counts as late.
+const LATE: Duration = Duration::from_millis(1_500);
+
+const GIVES_UP: Duration = Duration::from_millis(10_000);
+
+/// Maximum age of a question whose answer counts.
+const OLDEST: Duration = Duration::from_millis(60_000);
+
+/// Low bits of a question that hold the link's tag. The higher bits hold µs, for 200 days. The autopilot only returns them.
+const SHIFT: u32 = 20;
+const TAG: u32 = 0xA_52A5;
+
+/// Echoes (TIMESYNC): upper bound of a message's age, by the link itself and without a common clock.
+///
+/// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose
+/// time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in order: a message
+/// received after an answer was sent after the question, so it is not older than the question.
+///
+/// A question has a tag, drawn at each start of the companion. An answer buffered since before a restart therefore does not count.
+///
+/// An autopilot that has not answered within [`GIVES_UP`] of the first question does not support echoes. Then only the time stamps
+/// of its positions show their ages. Until then a link that has just started counts as late. An autopilot that has answered once
+/// counts as late whenever it does not answer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Echo {
+    /// Low bits of every question.
+    tag: u32,
+    due: Option<Instant>,
+    /// Time of the first question.
+    begun_at: Option<Instant>,
+    /// Time of the newest answered question.
+    asked_at: Option<Instant>,
+}
+
+impl Default for Echo {
+    fn default() -> Self {
+        Self {
+            tag: TAG,
+            due: None,
+            begun_at: None,
+            asked_at: None,
+        }
+    }
+}
+
+impl Echo {
+    /// Draws the tag from `seed`.
+    pub(super) const fn seed(&mut self, seed: u32) {
+        self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
+    }
+
+    /// Forgets all questions and answers.
+    pub(super) fn restart(&mut self) {
+        *self = Self {
+            tag: self.tag,
+            ..Self::default()
+        };
+    }
+
+    /// Returns the question to send at `now`.
+    pub(super) fn take(&mut self, now: Instant) -> Option<u64> {
+        if self.due.is_some_and(|due| due > now) {
+            return None;
+        }
+        self.due = Some(now + PERIOD);
+        self.begun_at = self.begun_at.or(Some(now));
+        Some(now.as_micros() << SHIFT | u64::from(self.tag))
+    }
+
+    /// Processes an answer.
+    pub(super) fn hear(&mut self, now: Instant, question: u64) {
+        let asked_at = Instant::from_micros(question >> SHIFT);
+        let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
+        if is_own && now.since(asked_at) < OLDEST {
+            self.asked_at = self.asked_at.max(Some(asked_at));
+        }
+    }
+
+    /// Returns the earliest time at which a message received now was sent, if that is known.
+    pub(super) const fn floor(&self) -> Option<Instant> {
+        self.asked_at
+    }
+
+    /// Returns true while messages may be too old to rely on.
+    pub(super) fn is_late(&self, now: Instant) -> bool {
+        match (self.asked_at, self.begun_at) {
+            (Some(at), _) => now.since(at) >= LATE,
+            (None, Some(at)) => now.since(at) < GIVES_UP,
+            (None, None) => true,
+        }
+    }
+
+    /// Returns the time of the next question or check.
+    pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
+        let late = self.asked_at.map(|at| at + LATE).filter(|at| *at > now);
+        let all = [self.due, late, self.begun_at.map(|at| at + GIVES_UP)];
+        all.into_iter().flatten().filter(|at| *at > now).min()
+    }
+}
+
+/// Backward step of the autopilot's clock that shows a restart.
+const RESTARTED_US: i64 = 2_000_000;
+
+/// Half of the window of the anchor, which is the minimum delay of the last one to two halves.
+const HALF: Duration = Duration::from_millis(4_000);
+
+/// Minimum number of messages in each half. A gap and the burst after it then do not move the anchor.
+const LEAST: u8 = 8;
+
+/// Assumed maximum drift of the clocks: one part in 2^10. With more drift the anchor lags behind by the drift of two halves.
+const DRIFT: u32 = 10;
+
+/// Minimum difference between the relay's clock and the autopilot's, µs. It is that of the message with the minimum delay.
+///
+/// A message can be late because the link is slow, and it can seem late because the autopilot's clock has lost time. An anchor that
+/// is never renewed takes the second for the first for good. An anchor that is renewed within 4 s to 8 s of messages corrects this,
+/// and a late message then counts as late for that long.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RemoteClock {
+    known: Option<Known>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    /// Minimum difference in the previous half, and in the present one.
+    least: [i64; 2],
+    since: Instant,
+    messages: u8,
+    /// Time of the last message on both clocks, the autopilot's in µs.
+    last: (Instant, i64),
+}
+
+impl RemoteClock {
+    /// Returns the time at which a message was created, on the relay's clock. The message arrived at `now` and was created
+    /// `boot_ms` after the autopilot's start. Returns `None` if the autopilot has restarted.
+    pub(super) fn hear(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
+        let said = i64::from(boot_ms) * 1_000;
+        let difference = now.as_micros().cast_signed().saturating_sub(said);
+        let known = self.known.get_or_insert(Known {
+            least: [difference; 2],
+            since: now,
+            messages: 0,
+            last: (now, said),
+        });
+        let (before, said_before) = core::mem::replace(&mut known.last, (now, said));
+        let back = said_before.saturating_sub(said);
+        if back > RESTARTED_US {
+            self.known = None;
+            self.hear(now, boot_ms);
+            return None;
+        }
+        // Messages arrive in order: a clock that goes back has lost time, and the link is not slower for that.
+        let lost = back.max(0);
+        let drifted = (now.since(before).as_micros() >> DRIFT).cast_signed();
+        if now.since(known.since) >= HALF && known.messages >= LEAST {
+            let [_, this] = known.least;
+            known.least = [this, difference];
+            known.since = now;
+            known.messages = 0;
+        }
+        known.messages = known.messages.saturating_add(1);
+        known.least = known.least.map(|least| least + lost + drifted);
+        let [_, this] = &mut known.least;
+        *this = difference.min(*this);
+        let [earlier, this] = known.least;
+        let late = difference.saturating_sub(earlier.min(this)).max(0);
+        let now = now.as_micros();
+        Some(Instant::from_micros(
+            now.saturating_sub(late.cast_unsigned()),
+        ))
+    }
+}
+
+/// Returns milliseconds, which wrap after 49 days as the autopilot's do. The division has two steps with instructions of the
+/// target: a 64-bit division takes a kilobyte of flash.
+#[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
+pub(super) const fn millis(micros: u64) -> u32 {
+    let high = (micros >> 16) as u32;
+    let low = ((high % 1_000) << 16) | (micros & 0xFFFF) as u32;
+    ((high / 1_000) << 16).wrapping_add(low / 1_000)
+}
+
+/// Minimum time between two events.
+const AGAIN: Duration = Duration::from_millis(10_000);
+
+/// Maximum age of a position that is used.
+const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
+
+/// Position of a drone that has no place along its line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct OffLine {
+    /// Position that the autopilot reports.
+    pub at: Geodetic,
+    /// Distance along the ground to the nearest point of the line, m.
+    pub away_m: u32,
+}
+
+impl OffLine {
+    /// Returns the distance of a drone at `at` from the line `axis`. `None` for a place that is not on earth. Constant work.
+    pub fn new(at: Geodetic, axis: &Axis) -> Option<Self> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "no distance on earth is longer"
+        )]
+        let away_m = axis.away_m(at)? as u32;
+        Some(Self { at, away_m })
+    }
+}
+
+/// Detection of a drone so far from its line that it has no place along it.
+///
+/// Sites with latitude and longitude swapped are valid places, and nothing else shows the mistake.
+///
+/// | position | effect |
+/// | --- | --- |
+/// | near the line | re-arms the report on the ground |
+/// | off the line, on the ground | reported once |
+/// | off the line, in the air | reported at most once in 10 s |
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Astray {
+    newest: Option<(Instant, Geodetic)>,
+    told_at: Option<Instant>,
+    /// True once it was reported on the ground.
+    told_on_ground: bool,
+}
+
+impl Astray {
+    /// Records a position off the line; returns true if it has to be reported.
+    pub(super) fn hear(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
+        self.newest = Some((now, at));
+        let is_wanted = is_in_air || !self.told_on_ground;
+        let is_due = self.told_at.is_none_or(|told| now.since(told) >= AGAIN);
+        if !is_wanted || !is_due {
+            return false;
+        }
+        self.told_at = Some(now);
+        self.told_on_ground |= !is_in_air;
+        true
+    }
+
+    /// Records a position near the line.
+    pub(super) const fn returned(&mut self) {
+        self.newest = None;
+        self.told_on_ground = false;
+    }
+
+    /// Returns the newest position if it was off the line.
+    pub(super) fn newest(&self, now: Instant) -> Option<Geodetic> {
+        let fresh = self
+            .newest
+            .filter(|(at, _)| now.since(*at) < STALE_OFF_LINE);
+        fresh.map(|(_, at)| at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Echo;
+    use crate::time::{Duration, Instant};
+
+    #[test]
+    fn an_answer_to_a_question_of_another_start_is_none() {
+        let at = |ms| Instant::from_millis(ms);
+        let mut before = Echo::default();
+        before.seed(1);
+        let asked = before.take(at(5_000)).expect("the first question");
+        let mut after = Echo::default();
+        after.seed(2);
+        after.restart();
+        let own = after.take(at(5_100)).expect("the first question");
+        after.hear(at(5_200), asked);
+        assert_eq!(after.floor(), None);
+        after.hear(at(5_200), own);
+        assert_eq!(after.floor(), Some(at(5_100)));
+        assert!(
+            !after.is_late(at(5_200)) && after.is_late(at(5_100) + Duration::from_millis(1_500))
+        );
+    }
+}
+
+#[cfg(test)]
+mod clock_tests {
+    use super::{RemoteClock, millis};
+    use crate::time::Instant;
+
+    const fn at(ms: u64) -> Instant {
+        Instant::from_millis(ms)
+    }
+
+    /// Returns the apparent age of each message of a flight, ms. `said` gives the autopilot's clock at a time, `delay` the link's
+    /// delay.
+    fn ages(said: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
+        let mut clock = RemoteClock::default();
+        let mut all = heapless::Vec::new();
+        for made in (0..80_000).step_by(200) {
+            let came = at(made + delay(made));
+            let boot_ms = u32::try_from(said(made)).expect("short");
+            let true_at = clock.hear(came, boot_ms).expect("no restart");
+            all.push(came.since(true_at).as_micros() / 1_000)
+                .expect("room");
+        }
+        all
+    }
+
+    #[test]
+    fn what_comes_late_was_true_earlier() {
+        let mut clock = RemoteClock::default();
+        assert_eq!(clock.hear(at(10_000), 500), Some(at(10_000)));
+        assert_eq!(clock.hear(at(10_200), 700), Some(at(10_200)));
+        let late = clock.hear(at(10_480), 900).expect("no restart");
+        assert_eq!(at(10_480).since(late).as_micros() / 1_000, 79, "80 ms late");
+        // A faster message shows that all earlier ones were late.
+        assert_eq!(clock.hear(at(10_550), 1_100), Some(at(10_550)));
+        let late = clock.hear(at(10_800), 1_300).expect("no restart");
+        assert_eq!(at(10_800).since(late).as_micros() / 1_000, 49, "50 ms late");
+    }
+
+    #[test]
+    fn a_clock_that_drifts_is_followed() {
+        let mut clock = RemoteClock::default();
+        // The relay's is faster by 500 in a million: it gains half a second.
+        for i in 0..5_000_u32 {
+            let now = Instant::from_micros(u64::from(i) * 200_100);
+            let true_at = clock.hear(now, i * 200).expect("the same start");
+            assert!(now.since(true_at).as_micros() <= 100, "{i}");
+        }
+    }
+
+    /// Checks a simulator on a loaded machine.
+    #[test]
+    fn a_clock_that_runs_one_percent_slow_is_never_blind() {
+        let ages = ages(|ms| ms - ms / 100, |_| 5);
+        let most = ages.iter().max();
+        assert!(most.is_some_and(|most| *most < 120), "{most:?} ms");
+    }
+
+    #[test]
+    fn a_clock_that_stops_for_a_moment_is_followed_within_eight_seconds() {
+        let ages = ages(
+            |ms| if ms < 20_000 { ms } else { ms - 1_500 },
+            |ms| if (20_000..20_001).contains(&ms) { 5 } else { 6 },
+        );
+        assert!(ages.iter().skip(145).all(|age| *age < 20), "{ages:?}");
+    }
+
+    /// Checks that a link with a growing delay is not trusted at first.
+    #[test]
+    fn a_delay_that_grows_is_late_at_first() {
+        let ages = ages(|ms| ms, |ms| if ms < 20_000 { 5 } else { 1_500 });
+        assert!(ages.iter().skip(101).take(15).all(|age| *age > 1_000));
+        assert!(ages.iter().skip(145).all(|age| *age < 20));
+    }
+
+    /// Checks messages that a cable delivers at once after 7 s: the age of the first one is 7 s.
+    #[test]
+    fn a_burst_after_a_gap_is_old() {
+        let held = 20_000..27_000;
+        let ages = ages(
+            |ms| ms,
+            |ms| if held.contains(&ms) { 27_000 - ms } else { 5 },
+        );
+        for (i, age) in ages.iter().enumerate().skip(100).take(35) {
+            let expected = 27_000 - 200 * u64::try_from(i).expect("small");
+            assert!(age.abs_diff(expected) < 40, "{i}: {age}, {expected}");
+        }
+        assert!(ages.iter().skip(136).all(|age| *age < 40));
+    }
+
+    #[test]
+    fn a_clock_that_begins_anew_is_noticed_once() {
+        let mut clock = RemoteClock::default();
+        assert!(clock.hear(at(100_000), 90_000).is_some());
+        assert_eq!(clock.hear(at(101_000), 50), None);
+        assert_eq!(clock.hear(at(101_200), 250), Some(at(101_200)));
+    }
+
+    #[test]
+    fn milliseconds_are_those_of_a_division() {
+        let mut micros = 0_u64;
+        for step in 0..40_000_u64 {
+            let wrapped = u32::try_from(micros / 1_000 % (1 << 32));
+            assert_eq!(Ok(millis(micros)), wrapped, "{micros}");
+            micros = (micros * 3 + step) % (1 << 48);
+        }
     }
 }

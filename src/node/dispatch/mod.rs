@@ -200,11 +200,12 @@ impl Node {
     /// Bases the active mission on the new interference estimate.
     fn believe(&mut self) {
         let told = self.layers.round.sensing().told();
-        let believing = self
-            .member
-            .mission
-            .believing(self.member.interference, &told.belief);
-        if let Ok(mission) = believing {
+        let Member {
+            mission,
+            interference,
+            ..
+        } = &self.member;
+        if let Ok(mission) = told.belief.mission(mission, *interference) {
             self.member.mission = mission;
             self.raise(Event::Believed);
         }

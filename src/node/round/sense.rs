@@ -7,7 +7,7 @@
 //! | too few measurements, and all three spreads tried | start again with the even spread; double the period |
 //! | better estimate found | increment its number; send it in a pass; then agree on new positions |
 //! | inconsistent measurements | start passes that exclude one relay after the other, see [`doubt`](crate::sensing) |
-//! | estimate unchanged in four passes | hold positions; double the period, up to 64 times [`Listen::every`](crate::settings::Listen) |
+//! | estimate unchanged in four passes | hold positions; double the period, up to 64 times [`Listen::every`](crate::sensing::Listen) |
 //!
 //! A relay that has missed a sensing pass cannot join the next pass, because the numbers are not consecutive. So all relays that
 //! agree on positions have the same estimate.
@@ -18,12 +18,12 @@ use crate::node::context::PAUSE;
 use crate::node::context::{Context, Member, Sensed};
 use crate::node::sample::Sample;
 use crate::place::Placement;
+use crate::sensing::Listen;
 use crate::sensing::belief::{Belief, Knowledge, Spread, Told, review};
 use crate::sensing::doubt::{Next, Trial, is_absurd, is_deaf, is_off};
 use crate::sensing::fit::{Unfit, expected_at};
 use crate::sensing::sums::{Average, Listener, left};
 use crate::sensing::sums::{EndsOff, Level, Levels, Sums, UNIT_W, is_level, terms};
-use crate::settings::Listen;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;

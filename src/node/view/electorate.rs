@@ -38,8 +38,7 @@
 //! view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it decides beside
 //! the two that remember. A relay that loses its record during a proposal may also forward the proposal on a second route.
 
-use crate::node::context::tenths;
-use crate::time::Duration;
+use crate::node::context::{Held, tenths};
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
@@ -59,34 +58,6 @@ pub(crate) struct Electorate {
     pub(super) voted: [ViewId; VOTES],
     /// Leader of the initial view; the half of the initial chain with this node counts as the larger one.
     pub(super) elder: u16,
-}
-
-/// Remaining leases of other relays, as far as this relay knows.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Held {
-    /// Longest lease of members of this relay's view that rely on this relay.
-    pub(crate) lease_left: Duration,
-    /// Accepted view, and the longest lease of members of earlier views. `None` if a member may not have accepted `view`.
-    pub(crate) view: ViewId,
-    pub(crate) rest: Option<Duration>,
-}
-
-impl Held {
-    #[cfg(test)]
-    pub(super) const NONE: Self = Self {
-        lease_left: Duration::from_micros(0),
-        view: ViewId::LOADED,
-        rest: Some(Duration::from_micros(0)),
-    };
-
-    fn rest_of(self, view: ViewId) -> u16 {
-        if view == ViewId::LOADED {
-            0
-        } else {
-            let known = self.rest.filter(|_| view == self.view);
-            known.map_or(u16::MAX, tenths)
-        }
-    }
 }
 
 /// Decision of the last relay.

@@ -221,7 +221,7 @@ mod tests {
     use super::{Electorate, RecordError, ViewRecord};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
-    use crate::node::view::electorate::Held;
+    use crate::node::context::Held;
     use crate::relay::Relay;
     use crate::settings::{Identity, Settings, Wiring};
     use crate::time::Instant;

@@ -3,9 +3,10 @@
 use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::circulation::{SUSPICIOUS, Stage};
+use crate::node::context::Held;
 use crate::node::context::{Context, Decided, Effects, Member, News, Proposer};
 use crate::node::view::change::{Proposed, ViewChange};
-use crate::node::view::electorate::{Electorate, Held};
+use crate::node::view::electorate::Electorate;
 use crate::settings::Settings;
 use crate::time::Instant;
 use crate::view::{View, ViewId};

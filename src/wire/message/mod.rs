@@ -20,7 +20,7 @@ pub use self::round::{
 pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
 
 use self::parts::{Word, read, tag, write};
-use super::upload::{UPLOAD as UPLOADS, Upload};
+use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
 /// Maximum body of a sweep: sixteen targets with a measured field or with a lateral offset.
@@ -35,7 +35,7 @@ const LONG: usize = if cfg!(feature = "sensing") {
 
 /// Length of an upload as a body and as stored, bytes: an offer without its last two bytes.
 #[cfg(feature = "upload")]
-pub use self::offer::UPLOAD;
+pub use self::offer::UPLOAD_LENGTH;
 
 /// Maximum body: an offer, measurements, or without those features a sweep.
 #[cfg(feature = "upload")]
@@ -184,7 +184,7 @@ impl Message {
             // Messages of a missing feature are never sent.
             Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
             Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
-            Self::Level { .. } if !(cfg!(feature = "sensing") && UPLOADS) => None,
+            Self::Level { .. } if !(cfg!(feature = "sensing") && UPLOAD) => None,
             Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
@@ -233,7 +233,7 @@ impl Message {
                 Err(MessageError::Value)
             }
             tag::SENSE | tag::SENSED if !cfg!(feature = "sensing") => Err(MessageError::Value),
-            tag::LEVEL if UPLOADS && !cfg!(feature = "sensing") => Err(MessageError::Value),
+            tag::LEVEL if UPLOAD && !cfg!(feature = "sensing") => Err(MessageError::Value),
             tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
             tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
@@ -271,7 +271,7 @@ impl Message {
                 let (upload, answer) = offer::decode(body)?;
                 Ok(Self::Offer { upload, answer })
             }
-            tag::LEVEL if UPLOADS => {
+            tag::LEVEL if UPLOAD => {
                 let (mission, power_w) = round::decode_level(body)?;
                 Ok(Self::Level { mission, power_w })
             }

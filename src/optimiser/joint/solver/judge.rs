@@ -3,7 +3,7 @@
 //! After a target the next start follows, with its initial shape. After the last start the polish follows: each relay in turn
 //! tries another position, where the derivatives show no gain.
 
-use super::passes::{Seat, SolverContext, far_off, last_of};
+use super::chain::{Seat, SolverContext, far_off, last_of};
 use super::{Purpose, Solver, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};

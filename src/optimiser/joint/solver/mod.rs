@@ -9,24 +9,26 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules; a segment of the chain, and the profile of one relay |
+//! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 //!
 //! This file has the state of a solver, its current work and its purpose, and one portion of its work.
 
+mod chain;
 mod judge;
 mod passes;
 
-use self::passes::{Mark, SEGMENT, STAGES, SolverContext, Stage};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
 use crate::optimiser::joint::site::Cell;
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
+use chain::{Mark, SEGMENT, STAGES, SolverContext, Stage};
 use core::task::Poll;
 
-pub use self::passes::Seat;
+pub use chain::Seat;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct ForwardPass {

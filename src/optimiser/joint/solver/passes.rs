@@ -2,27 +2,19 @@
 //!
 //! A plain pass changes nothing, or gives a chain its initial shape. A pass with the sweep's rules finds the relays' positions,
 //! and whether they have to hold back.
-//!
-//! # Chain as seen by the passes: senders, fixed altitudes, and the ceilings of the first and the last hop
-//!
-//! Powers and rooms of the relays are given as [`Seat`]. A chain is stored in segments, with the value function at the end of
-//! each, and the policies of one.
 
-use core::task::Poll;
-
-use crate::mission::{Interferer, Mission, Profile};
+use super::chain::{SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of};
+use super::{ForwardPass, Purpose, Solver, Work};
+use crate::mission::Mission;
 use crate::optimiser::joint::ascent::AscentStep;
 use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
-use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Cell, Room, Site};
-use crate::optimiser::joint::solver::{ForwardPass, Purpose, Solver, Work};
 use crate::optimiser::joint::starts::Start;
 use crate::optimiser::spacing::{Hop, Stand};
 use crate::place::{CrossSection, Placement};
-use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
-use crate::sir::{Sender, square};
+use core::task::Poll;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     pub(super) fn look_back(&mut self, mission: &Mission) -> Work {
@@ -365,205 +357,5 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             };
         }
         Some(place_m)
-    }
-}
-
-#[derive(Clone, Copy)]
-pub(super) struct SolverContext<'a, F> {
-    pub(super) mission: &'a Mission,
-    pub(super) interferer: &'a Interferer,
-    pub(super) seat_of: &'a F,
-    pub(super) gain: PowerRatio,
-}
-
-impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
-    pub(super) fn distance_m(&self) -> f32 {
-        self.mission.config().distance_m
-    }
-
-    /// Returns the sender of relay `index`, at `from`.
-    pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
-        if index <= 1 {
-            return Sender::transmitter(self.mission);
-        }
-        let power_w = (self.seat_of)(index - 1).power_w;
-        let common = power_w.to_bits() == self.mission.config().common.power_w.to_bits();
-        Sender {
-            at: from.cross_section(),
-            gain: if common {
-                self.gain
-            } else {
-                self.mission.relay_gain(power_w)
-            },
-        }
-    }
-
-    /// Returns gamma / A of the hop from `from` to relay `index`, with the noise at `from` included.
-    pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
-        let m = self.interferer;
-        let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
-        let noise = self.mission.noise_at_a_metre();
-        self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
-    }
-
-    /// Returns the fixed altitude of relay `index`, if it has one while other relays choose.
-    pub(super) fn held_at(&self, index: u16) -> Option<f32> {
-        let Room { band, .. } = (self.seat_of)(index).room;
-        let free = !self.mission.config().band.is_single();
-        (free && band.is_single()).then_some(band.least_m)
-    }
-
-    pub(super) fn holds(&self) -> bool {
-        (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
-    }
-
-    /// Returns the altitude of relay `index`, interpolated between the relays with a fixed altitude.
-    pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
-        let relays = self.mission.relays();
-        let held = |index: u16| Some((index, self.held_at(index)?));
-        let before = (1..=index).rev().find_map(held);
-        let after = (index..=relays).find_map(held);
-        let least_m = self.mission.config().band.least_m;
-        let end = |at, other: Option<(u16, f32)>| {
-            (at, other.filter(|_| level).map_or(least_m, |(_, h)| h))
-        };
-        let (from, low) = before.unwrap_or(end(0, after));
-        let (to, high) = after.unwrap_or(end(relays + 1, before));
-        let share = f32::from(index - from) / f32::from((to - from).max(1));
-        low + share * (high - low)
-    }
-
-    /// Returns relay `index`, which receives from `from`.
-    pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
-        let sender = self.sender(index, from);
-        Site::new(self.mission, self.interferer, sender, index <= 1, room)
-    }
-
-    /// Returns the slack of the last relay at `at`, and its derivatives.
-    pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
-        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
-        site::tail(self.mission, power_w, room, target, at)
-    }
-
-    /// Returns the ceiling of the chain, in ln gamma: the smaller of those of the first and the last hop.
-    pub(super) fn ceiling(&self) -> f32 {
-        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
-        let first = (self.seat_of)(1).room;
-        let first = site::first_most(self.mission, self.interferer, first);
-        let last = site::last_most(self.mission, power_w, room);
-        libm::logf(first.min(last).clamp(1e-30, 1e30))
-    }
-
-    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. The largest gain of any hop.
-    pub(super) fn floor(&self) -> f32 {
-        let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
-        let relay = own.fold(0.0, f32::max);
-        let gain = self.mission.relay_gain(relay).value();
-        libm::logf(self.mission.tx_gain().value().max(gain)) + 0.01
-    }
-}
-
-/// Returns the cross-section in `room`, right above Rx, with the best SIR from Tx.
-pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
-    let tx = Sender::transmitter(chain.mission);
-    let mut best = (0.0, CrossSection::default());
-    for y_m in [room.lateral.least_m, 0.0, room.lateral.most_m] {
-        for altitude_m in [room.band.least_m, room.band.most_m] {
-            let at = room.nearest(CrossSection { y_m, altitude_m });
-            let sir = tx.sir_at(chain.mission, 0.0, at.at(chain.distance_m()));
-            if sir > best.0 {
-                best = (sir, at);
-            }
-        }
-    }
-    best.1
-}
-
-pub(super) const SEGMENT: usize = 10;
-/// Relays of a segment in memory; 0 without the feature `altitude`.
-pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
-    SEGMENT
-} else {
-    0
-};
-pub(super) const SEGMENT_RELAYS: u16 = 10;
-
-/// State of the chain at a segment: the position before it and the value function at its end.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Mark {
-    /// x of the relay before the segment, m.
-    pub(super) x_m: f32,
-    /// Value function at the last relay of the segment, without the parts for the backward pass only.
-    pub(super) slope: Triple,
-    pub(super) bend: [f32; 6],
-}
-
-impl Mark {
-    pub(super) fn look(&mut self, outlook: &Outlook) {
-        let [[xx, xy, xh], [_, yy, yh], [_, _, hh]] = outlook.bend;
-        self.slope = outlook.slope;
-        self.bend = [xx, xy, xh, yy, yh, hh];
-    }
-
-    pub(super) fn outlook(&self) -> Outlook {
-        let [xx, xy, xh, yy, yh, hh] = self.bend;
-        Outlook {
-            slope: self.slope,
-            bend: [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]],
-            ..Outlook::default()
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stage {
-    pub(super) x_m: f32,
-    pub(super) policy: Brief,
-}
-
-pub(super) fn last_of(mission: &Mission) -> u8 {
-    let last = (usize::from(mission.relays()) - 1) / SEGMENT;
-    u8::try_from(last).unwrap_or(u8::MAX)
-}
-
-/// Returns position and index of the relays in `segment`.
-pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
-    let first = u16::from(segment) * SEGMENT_RELAYS;
-    // Counted in u16 at both ends, since zipping two ranges backward may panic.
-    (0..SEGMENT_RELAYS)
-        .map(move |k| (usize::from(k), first + 1 + k))
-        .filter(move |(_, index)| *index <= relays)
-}
-
-/// Known profile of one relay: its room and its power.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Seat {
-    /// Allowed region across the line.
-    pub room: Room,
-    /// Transmit power, W.
-    pub power_w: f32,
-}
-
-impl Seat {
-    /// Returns the seat of a relay without a profile of its own.
-    pub const fn common(mission: &Mission) -> Self {
-        Self {
-            room: Room::of(mission),
-            power_w: mission.config().common.power_w,
-        }
-    }
-
-    /// Returns the seat of a relay with the profile `own`, at its altitude if it `holds` that.
-    pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
-        let room = Room::of(mission);
-        Self {
-            room: if holds {
-                room.at_altitude(own.altitude_m)
-            } else {
-                room
-            },
-            power_w: own.power_w,
-        }
     }
 }

@@ -1,0 +1,43 @@
+//! Behaviour of a relay while its part of the chain has no quorum.
+
+use crate::place::Placement;
+
+/// Behaviour of a relay while its part of the chain has no quorum and must not block the other part.
+///
+/// Set it to the same value on all relays: relays that leave then keep their order and distances.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum WithoutQuorum {
+    /// Hold the agreed position.
+    #[default]
+    Hold,
+    /// Leave the line from the agreed position, along y and upward. With a guard, only within its geofence
+    /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
+    Leave {
+        /// Lateral offset, m: -1e4 to 1e4.
+        y_m: f32,
+        /// Climb, m: 0 to 1e4.
+        up_m: f32,
+    },
+}
+
+impl WithoutQuorum {
+    pub(crate) fn is_valid(self) -> bool {
+        match self {
+            Self::Hold => true,
+            Self::Leave { y_m, up_m } => (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m),
+        }
+    }
+
+    /// Returns the position to take without a quorum; `place` is the agreed one.
+    pub(crate) fn place(self, place: Placement) -> Placement {
+        match self {
+            Self::Hold => place,
+            Self::Leave { y_m, up_m } => Placement {
+                y_m: place.y_m + y_m,
+                altitude_m: place.altitude_m + up_m,
+                ..place
+            },
+        }
+    }
+}
