@@ -10,14 +10,14 @@ use uav_relay::CRC_32C;
 use uav_relay::{Instant, RecordError, Relay, ViewRecord};
 
 use crate::gate::Gate;
-use crate::kept::Kept;
 use crate::relay::Refusal;
+use crate::stored::StoredFile;
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--view-file";
 
 pub(crate) struct Views {
-    kept: Option<Kept>,
+    kept: Option<StoredFile>,
     stored: Option<ViewRecord>,
     writing: Option<ViewRecord>,
     /// Record of the last write, successful or not.
@@ -48,7 +48,7 @@ impl Views {
             },
         };
         Ok(Self {
-            kept: file.map(|file| Kept::new(OPTION, file)).transpose()?,
+            kept: file.map(|file| StoredFile::new(OPTION, file)).transpose()?,
             stored,
             writing: None,
             tried: None,
@@ -82,7 +82,7 @@ impl Views {
         self.gate.set(is_stored || is_tried);
     }
 
-    pub(crate) const fn kept(&self) -> Option<&Kept> {
+    pub(crate) const fn kept(&self) -> Option<&StoredFile> {
         self.kept.as_ref()
     }
 

@@ -214,7 +214,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
         let all = [&["--index", "1", "--shared", channel.tty(0)], more].concat();
         let relay = start(file, &all);
         let mut said = overrides(relay);
-        let shared = format!("--shared {} counts, and not --upstream ", channel.tty(0));
+        let shared = format!("--shared {} replaces --upstream ", channel.tty(0));
         let last = said.pop().unwrap();
         assert!(last.starts_with(&shared), "{last}");
         said
@@ -227,9 +227,9 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
     assert_eq!(
         others,
         [
-            format!("--altitude 23 counts, and not 33.3 of {name}"),
-            format!("--interferer 80,1,2 counts, and not 55.5,987.6,-321 of {name}"),
-            format!("--network 12 counts, and not 4711 of {name}"),
+            format!("--altitude 23 replaces 33.3 of {name}"),
+            format!("--interferer 80,1,2 replaces 55.5,987.6,-321 of {name}"),
+            format!("--network 12 replaces 4711 of {name}"),
         ]
     );
     // The same number in another notation is no difference, and neither is a value that the file lacks.
@@ -263,8 +263,8 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
     assert_eq!(
         said,
         [
-            format!("--altitude 25 counts, and not 20 of {name}"),
-            format!("--interferer 80,500,400 counts, and not [field] of {name}"),
+            format!("--altitude 25 replaces 20 of {name}"),
+            format!("--interferer 80,500,400 replaces [field] of {name}"),
         ]
     );
 

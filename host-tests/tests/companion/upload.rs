@@ -298,7 +298,7 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
             "--version 5: relay 1, or one beyond it, refuses it: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band"
         );
         assert_eq!(ended.stderr, [line]);
-        let own = "upload refused: its altitudes must be within the relay's own geofence, ";
+        let own = "upload refused: the altitudes must be within the relay's own geofence, ";
         relays[0].line(&format!("{own}{range}"));
         assert!(!relays[0].has_said("adopted: ") && !relays[1].has_said("adopted: "));
     }

@@ -6,9 +6,9 @@ use uav_relay::Mission;
 use uav_relay::planning::single::{Found, aside, theorems};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
 /// Power of the relay, W.
@@ -64,7 +64,7 @@ pub struct PowerRatio {
     pub both_altitude_m: f32,
 }
 
-fn mission(offset_m: f64, room_m: f64) -> Result<Mission, Trouble> {
+fn mission(offset_m: f64, room_m: f64) -> Result<Mission, FigureError> {
     let scenario = Scenario {
         altitude_m: ALTITUDES_M.0,
         altitude_min_m: ALTITUDES_M.0,
@@ -77,16 +77,16 @@ fn mission(offset_m: f64, room_m: f64) -> Result<Mission, Trouble> {
     paper::mission(&scenario, 1)
 }
 
-fn some<C>(found: Option<(Found, C)>) -> Result<Found, Trouble> {
-    let (found, _) = found.ok_or(Trouble::Unsettled("a single relay"))?;
+fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
+    let (found, _) = found.ok_or(FigureError::Unsettled("a single relay"))?;
     Ok(found)
 }
 
 /// Returns the best positions at the lowest altitude for each offset, every `step_m` of room.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
         for room_m in (0..=MOST_ROOM_M).step_by(usize::from(step_m)) {
@@ -108,13 +108,13 @@ pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
 /// Returns the SIRs with and without lateral and vertical freedom. The interferer's offset rises by `step_m`.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn gains(step_m: u16) -> Result<Vec<PowerRatio>, Trouble> {
+/// [`FigureError`].
+pub fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
 }
 
-fn gain(offset: u16) -> Result<PowerRatio, Trouble> {
+fn gain(offset: u16) -> Result<PowerRatio, FigureError> {
     let offset_m = f64::from(offset);
     let mission = mission(offset_m, ROOM_M)?;
     let common = mission.config().common;
@@ -139,8 +139,8 @@ fn taken() -> Vec<String> {
 /// Returns the figure of the positions.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn places_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn places_sheet() -> Result<Sheet, FigureError> {
     let rows = data(ROOM_STEP_M)?;
     let lines = |of: fn(&Row) -> (f64, f64)| -> Vec<Line> {
         let line = |(index, offset): (usize, f64)| {
@@ -193,8 +193,8 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
 /// Returns the figure of the gain.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn gains_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {
         let points = rows

@@ -5,9 +5,9 @@ use serde::Serialize;
 use uav_relay::planning::fleet::Fewest;
 
 use super::chart::{Axis, Chart, Line, Look};
+use super::error::FigureError;
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
 /// Largest target, linear SIR; every whole number from 1 to it is computed.
@@ -44,21 +44,21 @@ pub struct Row {
 /// Returns the fewest relays by target and position of the interferer, with relays of 1 W.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError::Mission`].
+pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &PLACES_M.map(|place| (place, 1.0)))
 }
 
 /// Returns the fewest relays by target and power of the relays, with the interferer at (500, 400) m.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn by_power(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError::Mission`].
+pub fn by_power(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &POWERS_W.map(|power| ((500.0, 400.0), power)))
 }
 
-fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, Trouble> {
-    let of = |&((x_m, y_m), relay_w): &((f64, f64), f64)| -> Result<Vec<Row>, Trouble> {
+fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, FigureError> {
+    let of = |&((x_m, y_m), relay_w): &((f64, f64), f64)| -> Result<Vec<Row>, FigureError> {
         let scenario = Scenario {
             uav_w: relay_w,
             ..paper::with_interferer(paper::multi_hop(), x_m, y_m)
@@ -74,7 +74,7 @@ fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, Tr
         };
         Ok(targets.iter().map(row).collect())
     };
-    let rows: Result<Vec<Vec<Row>>, Trouble> = scenarios.par_iter().map(of).collect();
+    let rows: Result<Vec<Vec<Row>>, FigureError> = scenarios.par_iter().map(of).collect();
     Ok(rows?.concat())
 }
 
@@ -107,8 +107,8 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
 /// Returns the figure by position of the interferer.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn by_place_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     let rows = by_place(&all_targets())?;
     let at = |target: u16| {
         PLACES_M.map(|place| {
@@ -146,8 +146,8 @@ pub fn by_place_sheet() -> Result<Sheet, Trouble> {
 /// Returns the figure by power of the relays.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn by_power_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn by_power_sheet() -> Result<Sheet, FigureError> {
     let rows = by_power(&all_targets())?;
     Ok(Sheet {
         name: "fewest-by-power",

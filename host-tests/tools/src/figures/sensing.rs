@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
-use crate::listening::followed::{self, mean};
 use crate::listening::found::{self, LAST, hypothetical, quantile, shadowed, shares, unknown};
-use crate::listening::wild::Wild;
+use crate::listening::moving::{self, mean};
+use crate::listening::scene::RandomScene;
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Random scenes per line.
@@ -46,7 +46,7 @@ pub struct Followed {
     pub stayed_linear: f64,
 }
 
-type Run = fn(&Wild) -> Result<Setup, Trouble>;
+type Run = fn(&RandomScene) -> Result<Setup, FigureError>;
 
 /// Kinds of scene: name, relays, sources, setup.
 const KINDS: [(&str, u16, usize, Run); 6] = [
@@ -61,8 +61,8 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
 /// Returns the share by agreement, in `scenes` scenes each.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, Trouble> {
+/// [`FigureError`].
+pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
         let each: found::Shares = shares(scenes, relays, sources, run)?;
@@ -82,12 +82,12 @@ pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, Trouble> {
 /// Returns the share by speed, in `scenes` scenes each.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, Trouble> {
+/// [`FigureError`].
+pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {
         for speed_mps in SPEEDS_MPS {
-            let shares = followed::shares(scenes, relays, speed_mps)?;
+            let shares = moving::shares(scenes, relays, speed_mps)?;
             rows.push(Followed {
                 relays,
                 speed_mps,
@@ -102,8 +102,8 @@ pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, Trouble> {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {
         let of = found.iter().filter(|row| row.scene == *what);

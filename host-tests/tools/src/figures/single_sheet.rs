@@ -1,10 +1,10 @@
 //! Figure of one relay, with the table of its average gains.
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
 use super::single::{ALTITUDES_M, REALISATIONS, Row, SEED, data};
 use super::single_gains::{self, RELAY_W, TX_W};
-use super::trouble::Trouble;
 use crate::baseline::random::DRAWS;
 use uav_relay_sim::report::db;
 
@@ -32,8 +32,8 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
 /// Returns the figure, with the table of average gains.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let altitudes: Vec<u32> = (ALTITUDES_M.0..=ALTITUDES_M.1).collect();
     let rows = data(&REALISATIONS, &altitudes, DRAWS)?;
     let gains = single_gains::data(&TX_W, &RELAY_W, &altitudes, DRAWS)?;

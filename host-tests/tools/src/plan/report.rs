@@ -7,10 +7,10 @@ use serde::Serialize;
 use uav_relay_scenario::Noise;
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
-use super::ask::Number;
 use super::found::{Plan, Why};
 use super::noise::NoiseReport;
 use super::rate::{self, BestRate};
+use super::request::Number;
 use super::unit::Unit;
 
 /// The hypothetical interferer that replaces several.

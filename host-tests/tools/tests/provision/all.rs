@@ -142,7 +142,7 @@ fn a_plan_goes_to_every_drone() {
     // Existing blocks stay without --force; with it nothing of a larger flight remains.
     let again = refusal(&words);
     assert!(
-        again.contains("relay1.bin is there already; --force"),
+        again.contains("relay1.bin exists already; --force"),
         "{again}"
     );
     let small = folder.path().join("small.toml");
@@ -245,8 +245,8 @@ fn what_does_not_go_together_is_said_in_one_line() {
     planned(&["--uavs", "3", "--out", &file]);
     let written = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&old, written.replace("uav_w = 1.0 ", "uav_w = 2.0 ")).unwrap();
-    let [several, relays] =
-        ["several.toml", "scenario.toml"].map(|name| text(&example().with_file_name(name)));
+    let [several, relays] = ["multi_interferer.toml", "scenario.toml"]
+        .map(|name| text(&example().with_file_name(name)));
     let all = ["--all", "--out-dir", &dir];
     for (arguments, words) in [
         (&["--scenario", &file, "--uavs", "4"][..], "--uavs 4: "),
@@ -285,7 +285,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         ),
         (
             &["--scenario", &several, "--uavs", "8"],
-            "% less than the best places: one interferer stands for all on board",
+            "% less than the best places: on board one hypothetical interferer replaces all",
         ),
         (
             &["--uavs", "3.5"],
@@ -314,7 +314,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
 fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let folder = tempfile::tempdir().unwrap();
     let [out, dir] = ["block.bin", "blocks"].map(|name| text(&folder.path().join(name)));
-    let several = text(&example().with_file_name("several.toml"));
+    let several = text(&example().with_file_name("multi_interferer.toml"));
     let report = planned(&["--scenario", &several, "--uavs", "8", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let loss = report["hypothetical"]["loss"].as_f64().unwrap();
