@@ -87,7 +87,14 @@ fn three_with_one_file_settle_where_the_simulated_chain_does() {
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Folder::new();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    for name in ["scenario", "altitudes", "side", "field", "several", "site"] {
+    for name in [
+        "scenario",
+        "altitudes",
+        "side",
+        "field",
+        "multi_interferer",
+        "site",
+    ] {
         let file = root.join(format!("examples/{name}.toml"));
         let scenario = Scenario::load(&file).unwrap();
         let (mission, _) = mission::mission(&scenario, 1, 1e-4).unwrap();
@@ -288,7 +295,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
             ..
         } = start(&own, &more).end();
         assert_eq!((ended, stderr.len()), (Some(status), 1), "{stderr:?}");
-        let line = "--altitude 23: relay 1 has what is its own by a [[relay]] of --config";
+        let line = "--altitude 23: relay 1 has values of its own in a [[relay]] of --config";
         assert_eq!(stderr[0].starts_with(line), status == 2, "{stderr:?}");
     }
 }

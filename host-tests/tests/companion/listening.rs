@@ -68,6 +68,6 @@ fn a_radio_on_the_autopilots_link_is_heard() {
     flight.drone.order("noise 150");
     flight
         .relay
-        .line("believed: nothing is known; spread TowardTx");
+        .line("estimate: interference unknown; the relays spread, pattern TowardTx");
     assert!(flight.targets_for(Duration::from_millis(100)).is_empty());
 }

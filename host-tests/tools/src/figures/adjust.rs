@@ -261,7 +261,7 @@ pub fn rounds_sheet() -> Result<Sheet, FigureError> {
                 line("coarse to fine", 0, |row| row.sir_fine_linear),
                 line("grid of 41 by 21", 1, |row| row.sir_grid_linear),
                 Line::new(
-                    "places and altitudes jointly",
+                    "positions and altitudes jointly",
                     Look::number(2).unsigned(),
                     [(0.0, joint.sir), (f64::from(most), joint.sir)],
                 ),

@@ -175,7 +175,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         .collect();
     Ok(Sheet {
         name: "altitude",
-        title: "SIR by the altitude that fifty relays share",
+        title: "SIR by the common altitude of fifty relays",
         says: vec![
             format!(
                 "Best altitudes between 20 m and 300 m: {}.",

@@ -157,11 +157,9 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     };
     Ok(Sheet {
         name: "aside",
-        title: "The best place of a single relay as the room beside the line grows",
+        title: "Best position of a single relay by lateral room",
         says: vec![
-            "Not in the paper. Seen from above: the relay leaves the line on the side away from the \
-             interferer, and keeps to the edge of the room until it has enough. There the circles \
-             of equal SIR of both hops touch, and more room changes nothing."
+            "Not in the paper. Seen from above: the relay leaves the line on the side away from the interferer, and stays at the edge of the room while the room is small. With enough room it is where the circles of equal SIR of both hops touch, and more room changes nothing."
                 .to_owned(),
         ],
         taken: [
@@ -178,7 +176,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
                     lines: lines(|row| (f64::from(row.x_m), f64::from(row.y_m))),
                 },
                 Panel {
-                    heading: "what it gains".to_owned(),
+                    heading: "gain".to_owned(),
                     x: Axis::linear("room to each side, m").between(0.0, f64::from(MOST_ROOM_M)),
                     y: Axis::linear("SIR, linear"),
                     lines: lines(|row| (row.room_m, f64::from(row.sir_linear))),
@@ -204,11 +202,9 @@ pub fn gains_sheet() -> Result<Sheet, FigureError> {
     };
     Ok(Sheet {
         name: "aside-gain",
-        title: "What a single relay gains by side, by altitude and by both",
+        title: "Gain of a single relay by lateral offset, altitude and both",
         says: vec![
-            "Not in the paper. With an interferer on the line, side and altitude are worth all but the same. \
-             Else the side is worth more. Where all of the room is used, the altitude can add to it; \
-             where there is enough, the lowest is best."
+            "Not in the paper. With an interferer on the line, lateral offset and altitude gain nearly the same. Otherwise the lateral offset gains more. If all of the room is used, the altitude can add to it; with enough room the lowest altitude is best."
                 .to_owned(),
         ],
         taken: [

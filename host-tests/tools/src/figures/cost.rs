@@ -87,7 +87,7 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     let names = [
         "paper's step of 0.1",
         "bracketed targets",
-        "bracketed, head predicts",
+        "bracketed, leader predicts",
     ];
     let lines = names.into_iter().enumerate().map(|(index, name)| {
         let points = rows.iter().filter_map(move |row| {
@@ -115,7 +115,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     });
     Ok(Sheet {
         name: "cost",
-        title: "Passes, messages and bytes until the chain has settled",
+        title: "Passes, messages and bytes until the chain settles",
         says: vec![format!(
             "With 100 relays the paper's schedule takes {ratio:.0} times as many messages as the \
              head that first solves the chain from the mission. One relay alone sends none."

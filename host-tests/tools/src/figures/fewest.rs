@@ -99,7 +99,7 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     }
     Chart::of(
         Axis::log("target SIR, linear").between(1.0, f64::from(MOST_TARGET)),
-        Axis::log("fewest relays"),
+        Axis::log("minimum number of relays"),
         lines,
     )
 }
@@ -122,7 +122,7 @@ pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     let [_, _, _, low, low_tx, low_rx] = at(1);
     Ok(Sheet {
         name: "fewest-by-place",
-        title: "The fewest relays for a target SIR, by the place of the interferer",
+        title: "Minimum number of relays for a target SIR, by the interferer's position",
         says: vec![format!(
             "The nearer the interferer to the line between Tx and Rx, the more relays. The paper \
              has it that nearness to Tx or Rx itself does it, which holds for low targets and Rx \
@@ -151,7 +151,7 @@ pub fn by_power_sheet() -> Result<Sheet, FigureError> {
     let rows = by_power(&all_targets())?;
     Ok(Sheet {
         name: "fewest-by-power",
-        title: "The fewest relays for a target SIR, by the power of the relays",
+        title: "Minimum number of relays for a target SIR, by the relays' power",
         says: vec![
             "More power at the relays means fewer of them, as the paper says. The formulas as \
              printed give too few: 16, 24, 36 and 54 relays of 1 W for targets of 5, 10, 20 and \

@@ -99,7 +99,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     };
     Ok(Sheet {
         name: "gain",
-        title: "PowerRatio of Algorithm 1 over placements that do not know of the interferer",
+        title: "Gain of Algorithm 1 over placements that ignore the interferer",
         says: vec![[8, 50, 100].map(of).join("; ") + "."],
         taken: vec![
             "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) \

@@ -88,7 +88,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     let names = [
         "best common altitude",
         "Algorithm 2 from there",
-        "places and altitudes jointly",
+        "positions and altitudes jointly",
     ];
     let [common, adjust, joint] = names;
     let panel = |y: Axis, lines: Vec<Line>| Panel {
@@ -120,10 +120,9 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     }));
     Ok(Sheet {
         name: "joint",
-        title: "One altitude, Algorithm 2, and places and altitudes chosen jointly",
+        title: "Common altitude, Algorithm 2, and joint optimisation of positions and altitudes",
         says: vec![
-            "Not in the paper. What the choice of altitudes is worth over the best altitude that \
-             all share, and what it costs."
+            "Not in the paper. Gain of free altitudes over the best common altitude, and its cost."
                 .to_owned(),
         ],
         taken: vec![

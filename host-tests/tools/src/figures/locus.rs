@@ -112,7 +112,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     }
     Ok(Sheet {
         name: "locus",
-        title: "Where both hops of a single relay have the same SIR",
+        title: "Positions at which both hops of a single relay have the same SIR",
         says: vec![
             "More power at Tx shifts the locus toward Rx; an interferer nearer to the line shifts \
              it down: both as the paper says."

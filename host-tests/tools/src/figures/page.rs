@@ -33,7 +33,7 @@ pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
 pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, FigureError> {
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>uav-relay: figures</title>\n\
-         <style>{STYLE}</style>\n</head>\n<body>\n<h1>The evaluation, computed by the code that flies</h1>\n\
+         <style>{STYLE}</style>\n</head>\n<body>\n<h1>The evaluation, computed by the on-board code</h1>\n\
          <p>Hosseinalipour, Rahmati and Dai, <em>Interference Avoidance Position Planning in Dual-hop and Multi-hop UAV Relay \
          Networks</em>, section Numerical Results, and what this project adds.</p>\n"
     );

@@ -53,9 +53,9 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ("3 relays, one source", 3, 1, unknown),
     ("8 relays, one source", 8, 1, unknown),
     ("20 relays, one source", 20, 1, unknown),
-    ("8 relays, places 1 dB off", 8, 1, shadowed),
+    ("8 relays, 1 dB position errors", 8, 1, shadowed),
     ("8 relays, two sources", 8, 2, unknown),
-    ("8, two sources, told the paper's", 8, 2, hypothetical),
+    ("8, two sources, hypothetical one", 8, 2, hypothetical),
 ];
 
 /// Returns the share by agreement, in `scenes` scenes each.
@@ -141,7 +141,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     }
     Ok(Sheet {
         name: "sensing",
-        title: "An interferer that nobody told the chain of: found, and followed",
+        title: "Estimation and tracking of an unknown interferer",
         says: vec![
             "Not in the paper, which takes the interferer as known. The share of the SIR of the chain that was told everything; of two sources, \
              of the exact optimum for their sum, beside the chain that was told the paper's hypothetical interferer."
@@ -159,19 +159,19 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         chart: Chart {
             panels: vec![
                 Panel {
-                    heading: "still sources".to_owned(),
+                    heading: "static sources".to_owned(),
                     #[expect(clippy::cast_precision_loss, reason = "a few")]
-                    x: Axis::linear("agreements that followed what was heard").between(0.0, LAST as f64),
-                    y: Axis::log("short of the optimum"),
+                    x: Axis::linear("agreements after measurements").between(0.0, LAST as f64),
+                    y: Axis::log("shortfall from the optimum"),
                     lines: lines.collect(),
                 },
                 Panel {
                     heading: "an interferer that moves".to_owned(),
-                    x: Axis::linear("its speed, m/s").between(0.0, 10.0),
+                    x: Axis::linear("speed of the interferer, m/s").between(0.0, 10.0),
                     y: Axis::linear("share of the optimum").between(0.5, 1.0),
                     lines: vec![
-                        speeds(3, 0, "3 relays follow", |row| row.followed_linear),
-                        speeds(8, 1, "8 relays follow", |row| row.followed_linear),
+                        speeds(3, 0, "3 relays track it", |row| row.followed_linear),
+                        speeds(8, 1, "8 relays track it", |row| row.followed_linear),
                         speeds(3, 5, "3 relays stay", |row| row.stayed_linear),
                         speeds(8, 6, "8 relays stay", |row| row.stayed_linear),
                     ],

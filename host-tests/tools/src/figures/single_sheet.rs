@@ -23,7 +23,7 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
         y: Axis::linear("SIR, dB"),
         lines: vec![
             line("Theorem 1", 0, |row| f64::from(row.sir_linear)),
-            line("random place", 1, |row| row.random_sir_linear),
+            line("random position", 1, |row| row.random_sir_linear),
             line("blind to interference", 2, |row| row.blind_sir_linear),
         ],
     }
@@ -41,7 +41,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     says.extend(single_gains::findings(&gains));
     Ok(Sheet {
         name: "single",
-        title: "A single relay at its best place, by its altitude",
+        title: "Single relay at its best position, by altitude",
         says,
         taken: vec![
             "D = 35 m, p_MSI = 20 W, interferer at (30, 30) m".to_owned(),

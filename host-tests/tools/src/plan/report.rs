@@ -358,8 +358,7 @@ impl HypotheticalReport {
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its places are not good enough: {} against all interferers; these are the best found against all{gain}. Relays by \
-                 themselves fly the first: `cargo provision` refuses them, and `cargo chain --listen` has relays find their own",
+                "its places are not good enough: {} against all interferers; these are the best found against all{gain}. Relays fly the positions for the hypothetical one: `cargo provision` refuses them, and `cargo chain --listen` has relays find their own",
                 unit.both(sir)
             ),
             (false, None) => writeln!(
