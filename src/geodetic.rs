@@ -122,11 +122,11 @@ pub enum LineError {
 impl core::fmt::Display for LineError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Distance => "its distance must be that between its sites; without sites of its own, between those that the relays were loaded with",
-            Self::Sites => "its sites must be on earth, 10 m to 100 km apart",
-            Self::Altitude => "its altitudes must be within the relay's own geofence",
-            Self::Lateral => "its room to the side must be within the relay's own geofence",
-            Self::Length => "its distance must be within the relay's own geofence",
+            Self::Distance => "the distance must be that between its sites, or without sites of its own that between the loaded ones",
+            Self::Sites => "the sites must be on earth, 10 m to 100 km apart",
+            Self::Altitude => "the altitudes must be within the relay's own geofence",
+            Self::Lateral => "the lateral range must be within the relay's own geofence",
+            Self::Length => "the distance must be within the relay's own geofence",
         })
     }
 }

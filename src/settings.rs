@@ -284,7 +284,7 @@ impl core::fmt::Display for SetupError {
                 "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
             }
             Self::Step => "the fixed step must be above 0",
-            Self::Method => "method must be Align in a field, and without its feature, altitude or adjust; Joint is for up to 100 relays",
+            Self::Method => "method must be Align in a field, or without the feature altitude or adjust; Joint is for at most 100 relays",
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
                 "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field on"
@@ -298,7 +298,7 @@ impl core::fmt::Display for SetupError {
             Self::WithoutQuorum => {
                 "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
             }
-            Self::Guard => "guard must have places within 1e7, a separation of 0 to 1e5, relays of 1 to 1000, hover of 0 to 1e3, and its feature on",
+            Self::Guard => "guard must have positions within 1e7 m, a separation of 0 to 1e5 m, 1 to 1000 relays, a hover_m of 0 to 1e3, and the feature guard",
         })
     }
 }

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use crate::keep::keep;
+use crate::atomic_file::replace;
 
 /// Returns this start's epoch, one more than in `file`, and writes it to the file.
 ///
@@ -25,7 +25,7 @@ pub fn next(file: &Path) -> Result<u32, String> {
     let epoch = last
         .checked_add(1)
         .ok_or_else(|| named("is the largest epoch, and a start needs a larger one"))?;
-    keep(file, format!("{epoch}\n").as_bytes())
+    replace(file, format!("{epoch}\n").as_bytes())
         .map_err(|error| named(&format!("cannot be written: {error}")))?;
     Ok(epoch)
 }

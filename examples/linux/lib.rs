@@ -20,11 +20,11 @@
 #![cfg(unix)]
 #![forbid(unsafe_code)]
 
+pub mod atomic_file;
 pub mod command;
 pub mod config;
 pub mod counters;
 pub mod epoch;
-pub mod keep;
 pub mod lines;
 pub mod log;
 pub mod mission;

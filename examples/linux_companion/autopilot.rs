@@ -18,11 +18,11 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Band, Event, Instant, Placement, Relay, Sites};
 
-use crate::answers::{Answer, Answers};
-use crate::astray::{Astray, Off};
 use crate::datagrams::Datagrams;
 use crate::lost;
+use crate::off_line::{Off, OffLineMonitor};
 use crate::relay::seed;
+use crate::unanswered::{Answer, AnswerMonitor};
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_scenario::endpoint::Endpoint;
@@ -80,8 +80,8 @@ pub(crate) struct Companion {
     port: Port,
     waiting: Vec<u8>,
     state: Option<&'static str>,
-    answers: Answers,
-    astray: Astray,
+    answers: AnswerMonitor,
+    astray: OffLineMonitor,
     /// Lost relays cleared by the operator over MAVLink, until collected.
     cleared: Vec<u16>,
 }
@@ -102,8 +102,8 @@ impl Companion {
             port,
             waiting: Vec::new(),
             state: None,
-            answers: Answers::new(now),
-            astray: Astray::default(),
+            answers: AnswerMonitor::new(now),
+            astray: OffLineMonitor::default(),
             cleared: Vec::new(),
         })
     }

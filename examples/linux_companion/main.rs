@@ -31,8 +31,8 @@
 //! | `ports.rs` | ttys of either wiring |
 //! | `autopilot.rs` | link to the autopilot |
 //! | `datagrams.rs` | UDP port of the autopilot |
-//! | `answers.rs` | report of an autopilot that does not answer |
-//! | `astray.rs` | report of a drone far from its line |
+//! | `unanswered.rs` | report of an autopilot that does not answer |
+//! | `off_line.rs` | report of a drone far from its line |
 //! | `positions.rs` | positions and measurements from a FIFO |
 //! | `relay.rs` | main loop |
 //! | `report.rs` | log lines |
@@ -40,31 +40,29 @@
 //! | `status.rs` | state of the relay as JSON |
 //! | `uploads.rs` | file of the newest uploaded mission |
 //! | `views.rs` | file of the relay's votes on views |
-//! | `waits.rs` | log lines for the reasons of a hold |
+//! | `hold_reasons.rs` | log lines for the reasons of a hold |
 //! | `lost.rs` | lost relays, and the operator's command to clear them |
-//! | `kept.rs` | file written in flight by a separate thread |
+//! | `stored.rs` | file written in flight by a separate thread |
 //!
 //! It shares a library with the ground station, `examples/linux`. It runs on other kinds of Unix, too; on a Mac the ttys are
 //! called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]
-mod answers;
-#[cfg(unix)]
-mod astray;
-#[cfg(unix)]
 mod autopilot;
 #[cfg(unix)]
 mod datagrams;
 #[cfg(unix)]
 #[cfg(unix)]
-mod kept;
+mod hold_reasons;
 #[cfg(unix)]
 mod listen;
 #[cfg(unix)]
 mod lost;
 #[cfg(unix)]
 mod movement;
+#[cfg(unix)]
+mod off_line;
 #[cfg(unix)]
 mod options;
 #[cfg(unix)]
@@ -80,11 +78,13 @@ mod section;
 #[cfg(unix)]
 mod status;
 #[cfg(unix)]
+mod stored;
+#[cfg(unix)]
+mod unanswered;
+#[cfg(unix)]
 mod uploads;
 #[cfg(unix)]
 mod views;
-#[cfg(unix)]
-mod waits;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {

@@ -8,15 +8,15 @@ use serde_json::json;
 use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload, ViewRecord};
 
 use crate::autopilot::Companion;
-use crate::kept::Kept;
+use crate::hold_reasons::HoldReasonLog;
 use crate::lost::Lost;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
 use crate::report::Report;
+use crate::stored::StoredFile;
 use crate::uploads::Uploads;
 use crate::views::Views;
-use crate::waits::Waits;
 use crate::{positions, status, uploads, views};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::refusals::Refusals;
@@ -33,7 +33,7 @@ struct Flight {
     views: Views,
     uploads: Option<Uploads>,
     refusals: Refusals,
-    waits: Waits,
+    waits: HoldReasonLog,
     lost: Lost,
     signs: bool,
 }
@@ -135,7 +135,7 @@ impl Flight {
             views,
             uploads,
             refusals: Refusals::default(),
-            waits: Waits::default(),
+            waits: HoldReasonLog::default(),
             lost: Lost::new(plan.identity.index, plan.mission.relays()),
             signs: auth.is_some(),
         })
@@ -179,7 +179,7 @@ impl Flight {
         let moves = self.report.look(time, relay, drone);
         let files = [
             self.uploads.as_mut().and_then(|it| it.tend(time, log)),
-            self.views.kept().and_then(Kept::wake),
+            self.views.kept().and_then(StoredFile::wake),
         ];
         if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
             log.tell(time, "rejected", format_args!("{why}"));
@@ -221,10 +221,10 @@ impl Flight {
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::bad),
-                "view_file_writes": views.map_or(0, Kept::writes),
-                "view_file_slowest_ms": views.map_or(0.0, Kept::slowest_ms),
-                "view_file_failures": views.map_or(0, Kept::failures),
-                "upload_file_failures": uploads.map_or(0, Kept::failures),
+                "view_file_writes": views.map_or(0, StoredFile::writes),
+                "view_file_slowest_ms": views.map_or(0.0, StoredFile::slowest_ms),
+                "view_file_failures": views.map_or(0, StoredFile::failures),
+                "upload_file_failures": uploads.map_or(0, StoredFile::failures),
                 "lines_dropped": log.dropped(),
             })
         })
@@ -236,7 +236,7 @@ impl Flight {
         let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let fifo = self.positions.as_ref().map(Positions::fd);
         let files = [self.views.kept(), self.uploads.as_ref().map(Uploads::kept)];
-        let files = files.into_iter().flatten().map(Kept::fd);
+        let files = files.into_iter().flatten().map(StoredFile::fd);
         others.extend(fifo.into_iter().chain(files).map(|fd| (fd, PollFlags::IN)));
         // The autopilot is the last entry, if there is one.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);

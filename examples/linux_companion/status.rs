@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 use uav_relay::{Placement, Relay, Side};
 use uav_relay_linux::counters::counted;
 
+use crate::hold_reasons;
 use crate::lost::Lost;
-use crate::waits;
 
 pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
@@ -33,7 +33,7 @@ pub(crate) fn of_relay(
         "receiver_w": relay.level_w(Side::Downstream),
         "stands_down": relay.stands_down(),
         "ready": relay.is_ready(),
-        "waits": waits::reasons(relay).map(|reason| reason.map(waits::word)),
+        "waits": hold_reasons::reasons(relay).map(|reason| reason.map(hold_reasons::word)),
         "lost": lost.nodes(),
         "has_lease": relay.lease().is_some(),
         "upstream": upstream,

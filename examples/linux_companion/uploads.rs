@@ -9,7 +9,7 @@ use uav_relay::CRC_32C;
 
 use uav_relay::{Instant, Mission, Upload};
 
-use crate::kept::Kept;
+use crate::stored::StoredFile;
 use uav_relay_linux::log::Log;
 
 const STORED: usize = Upload::LENGTH + 4;
@@ -40,7 +40,7 @@ fn parse(bytes: &[u8]) -> Option<Upload> {
 
 #[derive(Debug)]
 pub(crate) struct Uploads {
-    kept: Kept,
+    kept: StoredFile,
     unstored: Option<[u8; STORED]>,
     writing: Option<[u8; STORED]>,
 }
@@ -49,7 +49,7 @@ impl Uploads {
     /// Starts the writer thread; writes nothing yet.
     pub(crate) fn new(file: &Path) -> Result<Self, String> {
         Ok(Self {
-            kept: Kept::new("--upload-file", file)?,
+            kept: StoredFile::new("--upload-file", file)?,
             unstored: None,
             writing: None,
         })
@@ -81,7 +81,7 @@ impl Uploads {
         self.kept.wake()
     }
 
-    pub(crate) const fn kept(&self) -> &Kept {
+    pub(crate) const fn kept(&self) -> &StoredFile {
         &self.kept
     }
 

@@ -9,14 +9,14 @@ use std::path::Path;
 use uav_relay::CRC_32C;
 use uav_relay::{Instant, RecordError, ViewRecord};
 
-use crate::kept::Kept;
 use crate::relay::Refusal;
+use crate::stored::StoredFile;
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--view-file";
 
 pub(crate) struct Views {
-    kept: Option<Kept>,
+    kept: Option<StoredFile>,
     stored: Option<ViewRecord>,
     writing: Option<ViewRecord>,
     /// Record of the last write, successful or not.
@@ -45,7 +45,7 @@ impl Views {
             },
         };
         Ok(Self {
-            kept: file.map(|file| Kept::new(OPTION, file)).transpose()?,
+            kept: file.map(|file| StoredFile::new(OPTION, file)).transpose()?,
             stored,
             writing: None,
             tried: None,
@@ -97,7 +97,7 @@ impl Views {
         }
     }
 
-    pub(crate) const fn kept(&self) -> Option<&Kept> {
+    pub(crate) const fn kept(&self) -> Option<&StoredFile> {
         self.kept.as_ref()
     }
 

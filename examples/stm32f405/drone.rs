@@ -11,12 +11,12 @@ use uav_relay_kept::{epoch, journal::Journal};
 use super::autopilot::{Autopilot, Uart};
 #[cfg(feature = "auth")]
 use super::flash;
-use super::{board, config, kept, log};
+use super::{board, config, log, persistent};
 
 /// Relay, its votes, and the autopilot of a drone with sites; in static RAM, to save stack.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
-    pub(crate) views: &'static mut kept::Views,
+    pub(crate) views: &'static mut persistent::Views,
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
@@ -39,9 +39,9 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
             let relay = switch_on(&config, auth, wiring, now)?;
             #[cfg(feature = "upload")]
             if auth.is_some() {
-                kept::resume_upload(relay);
+                persistent::resume_upload(relay);
             }
-            let views = cortex_m::singleton!(VIEWS: kept::Views = kept::Views::resume(relay, now))?;
+            let views = cortex_m::singleton!(VIEWS: persistent::Views = persistent::Views::resume(relay, now))?;
             Some(Drone {
                 relay,
                 views,

@@ -72,7 +72,7 @@ pub(crate) fn off_course(error: CourseError) {
     match error {
         CourseError::Axis(error) => defmt::error!("configuration refused: sites, {}", error),
         CourseError::Distance(along) => defmt::error!(
-            "configuration refused: the sites are {=f64} m apart, the mission's distance is another",
+            "configuration refused: the sites are {=f64} m apart, but the mission's distance differs",
             along
         ),
         other => defmt::error!("configuration refused: sites, {}", other),

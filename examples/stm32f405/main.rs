@@ -20,21 +20,21 @@
 //! | `wires.rs`, `radio.rs` | pins and interrupts, for either wiring |
 //! | `executor.rs`, `ports.rs` | executor and asynchronous ports of `stm32f405_async` |
 //! | `drone.rs` | drone as defined by its configuration block, for either wiring |
-//! | `turns.rs` | main loop |
-//! | `autopilot.rs`, `grounded.rs` | autopilot link with the feature `flight`, and its replacement |
+//! | `main_loop.rs` | main loop |
+//! | `autopilot.rs`, `no_autopilot.rs` | autopilot link with the feature `flight`, and its replacement |
 //! | `uploads.rs` | journal of uploaded missions, with the feature `upload` |
-//! | `kept.rs` | storing and restoring of uploads and votes |
+//! | `persistent.rs` | storing and restoring of uploads and votes |
 //! | `flash.rs` | flash sectors of the journals, with their unsafe code |
 //! | `port.rs` | interrupt-driven serial port |
 //! | `chip.rs` | clocks, watchdog, cause of the last reset |
 //! | `clock.rs` | time and sleep |
-//! | `log.rs`, `silent.rs` | log with `--features defmt`, and its replacement |
+//! | `log.rs`, `no_log.rs` | log with `--features defmt`, and its replacement |
 //! | `sink_uart.rs`, `sink_rtt.rs` | log output: a spare UART, or the debug probe with `--features rtt` |
 //! | `board.rs` | all other unsafe code |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "flight"), path = "grounded.rs")]
+#[cfg_attr(not(feature = "flight"), path = "no_autopilot.rs")]
 mod autopilot;
 #[cfg(target_os = "none")]
 mod board;
@@ -47,14 +47,14 @@ mod drone;
 #[cfg(target_os = "none")]
 mod flash;
 #[cfg(target_os = "none")]
-mod kept;
-#[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
+#[cfg_attr(not(feature = "defmt"), path = "no_log.rs")]
 mod log;
 #[cfg(target_os = "none")]
-mod port;
+mod main_loop;
 #[cfg(target_os = "none")]
-mod turns;
+mod persistent;
+#[cfg(target_os = "none")]
+mod port;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
@@ -76,7 +76,7 @@ fn main() -> ! {
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
-    turns::fly(clock, links, drone)
+    main_loop::fly(clock, links, drone)
 }
 
 /// Creates the links in static RAM; not inlined, so that its stack frame is released.

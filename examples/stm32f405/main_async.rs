@@ -19,14 +19,14 @@ mod executor;
 #[cfg(target_os = "none")]
 mod flash;
 #[cfg(target_os = "none")]
-#[allow(dead_code, reason = "what only polled ports call")]
-mod grounded;
-#[cfg(target_os = "none")]
-mod kept;
-#[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
+#[cfg_attr(not(feature = "defmt"), path = "no_log.rs")]
 #[allow(dead_code, reason = "what only an autopilot logs")]
 mod log;
+#[cfg(target_os = "none")]
+#[allow(dead_code, reason = "what only polled ports call")]
+mod no_autopilot;
+#[cfg(target_os = "none")]
+mod persistent;
 #[cfg(target_os = "none")]
 mod port;
 #[cfg(target_os = "none")]
@@ -38,7 +38,7 @@ mod uploads;
 mod wires;
 
 #[cfg(target_os = "none")]
-use grounded as autopilot;
+use no_autopilot as autopilot;
 #[cfg(target_os = "none")]
 use uav_relay_block as config;
 
@@ -109,7 +109,7 @@ async fn tell(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infal
             log::event(event, relay);
             #[cfg(feature = "upload")]
             if event == uav_relay::Event::Uploaded {
-                kept::keep_upload(relay);
+                persistent::keep_upload(relay);
             }
         });
     }

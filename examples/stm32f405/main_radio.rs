@@ -8,7 +8,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "flight"), path = "grounded.rs")]
+#[cfg_attr(not(feature = "flight"), path = "no_autopilot.rs")]
 mod autopilot;
 #[cfg(target_os = "none")]
 mod board;
@@ -21,16 +21,16 @@ mod drone;
 #[cfg(target_os = "none")]
 mod flash;
 #[cfg(target_os = "none")]
-mod kept;
-#[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "defmt"), path = "silent.rs")]
+#[cfg_attr(not(feature = "defmt"), path = "no_log.rs")]
 mod log;
+#[cfg(target_os = "none")]
+mod main_loop;
+#[cfg(target_os = "none")]
+mod persistent;
 #[cfg(target_os = "none")]
 mod port;
 #[cfg(target_os = "none")]
 mod radio;
-#[cfg(target_os = "none")]
-mod turns;
 #[cfg(all(target_os = "none", feature = "upload"))]
 #[expect(unreachable_pub, reason = "the tests on the ground have it public")]
 mod uploads;
@@ -50,7 +50,7 @@ fn main() -> ! {
     let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
-    turns::fly(clock, channel, drone)
+    main_loop::fly(clock, channel, drone)
 }
 
 /// Creates the link in static RAM; not inlined, so that its stack frame is released.

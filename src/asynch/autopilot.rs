@@ -137,7 +137,7 @@ impl AsyncAutopilot {
             }
             wake(&self.listener);
             self.speech.raise();
-            // What is said now is not due any more.
+            // The frames sent now are no longer due.
             yield_now().await;
             let due = self.lend(|link| link.poll_timeout(now)).unwrap_or(now);
             let due = due.max(now + PAUSE);

@@ -1,16 +1,16 @@
-//! Pages on flying a chain, beside the reference of the modules.
+//! Guides for flying a chain.
 //!
-//! | page | what it answers |
+//! | page | content |
 //! | --- | --- |
-//! | [`firmware`] | from an empty folder to a relay that flies: in a loop, by interrupts, with RTIC or Embassy |
-//! | [`planning`] | how many relays, where, and whether that is the best there is |
-//! | [`lost_relays`] | what happens when a relay falls silent, comes back, or the chain is split |
-//! | [`uploads`] | how a flying chain is given a new mission |
-//! | [`sensing`] | how the relays find an interferer, and follow it |
-//! | [`flight`] | how a drone flies to its place, and who flies it |
-//! | [`decisions`] | why the parts that surprise are as they are |
-//! | [`security`] | what signed frames protect, and what not |
-//! | [`wire_format`] | every byte on the wire, enough for another implementation |
+//! | [`firmware`] | from an empty folder to a flying relay: in a loop, by interrupts, with RTIC or Embassy |
+//! | [`planning`] | number of relays, their positions, and whether the plan is proven optimal |
+//! | [`lost_relays`] | behaviour when a relay fails or comes back, or the chain is split |
+//! | [`uploads`] | new missions in flight |
+//! | [`sensing`] | estimation and tracking of an unknown interferer |
+//! | [`flight`] | control of the drone through its autopilot |
+//! | [`decisions`] | reasons of unusual design decisions |
+//! | [`security`] | protection by signed frames, and its limits |
+//! | [`wire_format`] | specification of every byte on the wire |
 
 #[doc = include_str!("firmware.md")]
 pub mod firmware {}

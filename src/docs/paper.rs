@@ -1,4 +1,4 @@
-// What examples in the documentation begin with: the paper's mission, and a relay of it that has just been switched on.
+// Start of the examples in the documentation: the paper's mission, and a relay of it that has just been switched on.
 
 pub const MISSION: uav_relay::Mission = uav_relay::Mission::new(uav_relay::MissionConfig {
     relays: 1,

@@ -120,7 +120,7 @@ impl core::fmt::Display for MissionError {
             Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
             Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
             Self::Noise => {
-                "noise_w must be within 0 to 1, and at most 1e12 times what of the interferer arrives a metre from it"
+                "noise_w must be within 0 to 1, and at most 1e12 times the interferer's power received at 1 m"
             }
             Self::Field => "a field of interference needs the feature `field`",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",

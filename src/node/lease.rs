@@ -163,7 +163,7 @@ impl Lease {
     /// Records that all members have accepted this relay's view.
     pub(crate) fn commit(&mut self) {
         self.bound = Some(self.rest.1);
-        // Nobody accepts the initial view: it is configured.
+        // The initial view is configured and needs no acceptance.
         self.is_whole |= self.rest.0 != ViewId::LOADED;
     }
 

@@ -64,9 +64,9 @@ impl core::fmt::Display for UploadError {
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
             Self::Line(error) => return error.fmt(f),
-            Self::Old => "version must be above that of the mission held",
+            Self::Old => "version must be above that of the present mission",
             Self::Unsigned => "uploads need signed frames",
-            Self::Begun => "the relay has begun: it can only be handed what is newer",
+            Self::Begun => "the relay has started: only a newer upload is accepted",
         })
     }
 }

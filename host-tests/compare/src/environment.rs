@@ -74,7 +74,7 @@ fn succeed(command: &mut Command) -> Result<(), Trouble> {
     said.extend(output.stdout);
     let text = String::from_utf8_lossy(&said);
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    // Of pip the first error; of other programs the last line.
+    // For pip the first error, for other programs the last line.
     let first = lines.clone().find(|line| line.starts_with("ERROR"));
     let line = first.or_else(|| lines.next_back()).unwrap_or_default();
     Err(Trouble::Failed(line.trim().to_owned()))

@@ -3,7 +3,7 @@
 use host_tests::fixtures::mission;
 use uav_relay::Side;
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::deaf::Deaf;
+use uav_relay_sim::simulator::one_way::OneWayFailure;
 use uav_relay_sim::simulator::outcome::{Ending, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 
@@ -33,7 +33,7 @@ fn a_chain_takes_the_same_places_by_any_channel() {
 fn a_deaf_relay_receives_nothing_from_that_one_until_it_hears_again() {
     for access in [Access::Ideal, Access::Aloha, Access::Csma] {
         let mut setup = Setup::on_air(mission(2), access);
-        setup.deaf = vec![Deaf {
+        setup.deaf = vec![OneWayFailure {
             by: 2,
             of: 1,
             from: at(0),
@@ -62,7 +62,7 @@ fn a_deaf_relay_receives_nothing_from_that_one_until_it_hears_again() {
 #[test]
 fn a_wire_can_be_deaf_in_one_direction_too() {
     let mut setup = Setup::new(mission(3));
-    setup.deaf = vec![Deaf {
+    setup.deaf = vec![OneWayFailure {
         by: 3,
         of: 2,
         from: seconds(20),

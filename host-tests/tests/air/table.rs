@@ -3,8 +3,8 @@
 use std::time;
 
 use host_tests::fixtures::mission;
-use uav_relay_sim::simulator::deaf::Deaf;
-use uav_relay_sim::simulator::many::run_seeds;
+use uav_relay_sim::simulator::one_way::OneWayFailure;
+use uav_relay_sim::simulator::parallel::run_seeds;
 use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
@@ -33,7 +33,7 @@ fn at_baud(baud: u32) -> Setup {
 #[ignore = "prints a table"]
 fn chains_on_bad_channels() {
     let mut deaf = usual();
-    deaf.deaf = vec![Deaf {
+    deaf.deaf = vec![OneWayFailure {
         by: 4,
         of: 3,
         from: at(0),

@@ -111,14 +111,14 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     fill_disk(chain.relays[1].pid(), true);
     let full = std::fs::metadata(&file).unwrap().len();
     let line = chain.relays[1].line("capture ended: ");
-    let why = "--capture cannot be written any more: File too large";
+    let why = "--capture cannot be written: File too large";
     assert!(line.contains(why), "{line}");
     // The neighbours keep asking for signs of life and receive them.
     std::thread::sleep(Duration::from_secs(4));
     let again = chain.relays[1].lines_with("capture ended");
     assert!(again.is_empty(), "once: {again:?}");
     for relay in &mut chain.relays {
-        assert!(!relay.has_said("lost: ") && !relay.has_said("lapsed: "));
+        assert!(!relay.has_said("lost: ") && !relay.has_said("lease expired: "));
     }
     // A capture does not resume when space is available again.
     fill_disk(chain.relays[1].pid(), false);
@@ -159,9 +159,9 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
         std::thread::sleep(Duration::from_millis(1_200));
         std::fs::write(&level, power).unwrap();
     }
-    station.line("capture ended: --capture cannot be written any more: File too large");
+    station.line("capture ended: --capture cannot be written: File too large");
     if !station.has_said("back: relay 1") {
-        station.line("back: relay 1 is heard");
+        station.line("back: relay 1 is received");
     }
     assert!(station.lines_with("capture ended").is_empty(), "once");
     station.signal(Signal::TERM);

@@ -132,7 +132,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change_and_move() {
         .map(ToString::to_string)
         .collect();
     assert_eq!(said(&ended, "dry run"), ["version 2 was not uploaded"]);
-    assert!(!bench.relays[0].has_said("uploaded: holds version 2"));
+    assert!(!bench.relays[0].has_said("uploaded: stored version 2"));
 
     // A script's upload: the relays move as far as announced.
     let ended = bench.uploads("2", &[&new[..], &["--yes"]].concat());

@@ -93,14 +93,14 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
     let mut drones = Drones::start(&channel);
     drones.fly_until(|all| (1..=3).all(|index| all.has_said(index, "converged: ")));
     drop(drones.relays.pop());
-    drones.fly_until(|all| all.has_said(2, "fell silent may still hover there"));
+    drones.fly_until(|all| all.has_said(2, "a lost relay may still hover between"));
     let socket = drones.socket(2);
     assert_eq!(asked(&socket)["relay"]["lost"], serde_json::json!([3]));
     for (command, why) in [
         ("land", "no such command; there is clear-lost N"),
         ("clear-lost", "name the relays that have landed"),
         ("clear-lost 2", "relay 2 is this relay"),
-        ("clear-lost 1", "relay 1 is heard, and is not lost"),
+        ("clear-lost 1", "relay 1 is received and not lost"),
         ("clear-lost 4", "relay 4: must be within 1 to 3"),
         ("clear-lost x", "relay x: must be within 1 to 3"),
     ] {

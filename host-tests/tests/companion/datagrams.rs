@@ -129,7 +129,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     they_hear_each_other(&mut relay, &mut drone);
     for _ in 0..2 {
         drone.order("unplug");
-        relay.line("autopilot: silent");
+        relay.line("autopilot: no heartbeat");
         drone.order("reboot");
         drone.forget();
         drone.order("plug");

@@ -87,7 +87,14 @@ fn three_with_one_file_settle_where_the_simulated_chain_does() {
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Folder::new();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    for name in ["scenario", "altitudes", "side", "field", "several", "site"] {
+    for name in [
+        "scenario",
+        "altitudes",
+        "side",
+        "field",
+        "multi_interferer",
+        "site",
+    ] {
         let file = root.join(format!("examples/{name}.toml"));
         let scenario = Scenario::load(&file).unwrap();
         let (mission, _) = mission::mission(&scenario, 1, 1e-4).unwrap();
@@ -214,7 +221,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
         let all = [&["--index", "1", "--shared", channel.tty(0)], more].concat();
         let relay = start(file, &all);
         let mut said = overrides(relay);
-        let shared = format!("--shared {} counts, and not --upstream ", channel.tty(0));
+        let shared = format!("--shared {} replaces --upstream ", channel.tty(0));
         let last = said.pop().unwrap();
         assert!(last.starts_with(&shared), "{last}");
         said
@@ -227,9 +234,9 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
     assert_eq!(
         others,
         [
-            format!("--altitude 23 counts, and not 33.3 of {name}"),
-            format!("--interferer 80,1,2 counts, and not 55.5,987.6,-321 of {name}"),
-            format!("--network 12 counts, and not 4711 of {name}"),
+            format!("--altitude 23 replaces 33.3 of {name}"),
+            format!("--interferer 80,1,2 replaces 55.5,987.6,-321 of {name}"),
+            format!("--network 12 replaces 4711 of {name}"),
         ]
     );
     // The same number in another notation is no difference, and neither is a value that the file lacks.
@@ -263,8 +270,8 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
     assert_eq!(
         said,
         [
-            format!("--altitude 25 counts, and not 20 of {name}"),
-            format!("--interferer 80,500,400 counts, and not [field] of {name}"),
+            format!("--altitude 25 replaces 20 of {name}"),
+            format!("--interferer 80,500,400 replaces [field] of {name}"),
         ]
     );
 
@@ -288,7 +295,7 @@ fn what_the_command_line_says_otherwise_is_said_once_and_nothing_else() {
             ..
         } = start(&own, &more).end();
         assert_eq!((ended, stderr.len()), (Some(status), 1), "{stderr:?}");
-        let line = "--altitude 23: relay 1 has what is its own by a [[relay]] of --config";
+        let line = "--altitude 23: relay 1 has values of its own in a [[relay]] of --config";
         assert_eq!(stderr[0].starts_with(line), status == 2, "{stderr:?}");
     }
 }

@@ -253,7 +253,7 @@ fn an_arducopter(key: Option<&str>) {
     falls_silent(&mut flight);
     flight
         .relay
-        .line("autopilot: cannot be engaged: it is in OFFBOARD or GUIDED");
+        .line("autopilot: cannot be engaged: it was in OFFBOARD or GUIDED");
     assert!(flight.targets_for(MOMENT).is_empty(), "it was not chosen");
     flight.drone.order("sticks 0 0");
     flight.drone.order("mode pilot");

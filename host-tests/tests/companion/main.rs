@@ -309,9 +309,9 @@ fn a_killed_process_is_noticed_by_both_neighbours_and_so_is_its_return() {
     let killed = Instant::now();
     // A dropped relay is killed.
     drop(chain.relays.remove(1));
-    chain.relays[0].line("lost: no sign of life from relay 2 downstream");
+    chain.relays[0].line("lost: relay 2 downstream does not reply");
     let first = killed.elapsed();
-    chain.relays[1].line("lost: no sign of life from relay 2 upstream");
+    chain.relays[1].line("lost: relay 2 upstream does not reply");
     let took = killed.elapsed();
     println!(
         "noticed after {} and {} ms",

@@ -27,7 +27,7 @@ fn a_drone_keeps_its_number_when_its_place_in_the_chain_changes() {
         relay.line("converged");
     }
     drop(second);
-    third.line("lost: no sign of life from relay 2 upstream");
+    third.line("lost: relay 2 upstream does not reply");
     let line = third.line("view accepted: ");
     let said = " s  relay 3  view accepted: 2 relays, this relay at place 2, view ";
     assert!(line.contains(said), "{line}");

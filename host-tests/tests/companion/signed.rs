@@ -98,13 +98,13 @@ fn one_with_another_key_is_not_heard() {
     let one = start(&mut chain, &files, 1);
     chain.options = files.options("other", "epoch2");
     chain.relays = vec![one, chain.relay(2)];
-    chain.relays[0].line("lost: no sign of life from relay 2 downstream");
+    chain.relays[0].line("lost: relay 2 downstream does not reply");
     assert!(!chain.relays[0].has_said("setpoint: "));
     chain.relays[0].signal(Signal::TERM);
     let said = chain.relays.swap_remove(0).end().stdout;
     let last = said.last().unwrap();
     assert!(
-        last.contains(" 0 received, ") && !last.contains(" 0 refused"),
+        last.contains(" 0 received, ") && !last.contains(" 0 rejected"),
         "{last}"
     );
 }
@@ -156,5 +156,9 @@ fn a_bad_key_or_epoch_is_named() {
 #[test]
 fn without_a_key_it_says_so() {
     let mut relay = Relay::start(&["--index", "1", "--of", "1"]);
-    assert!(relay.line("unsigned: ").contains("anybody can send frames"));
+    assert!(
+        relay
+            .line("unsigned: ")
+            .contains("anybody in range can send frames")
+    );
 }

@@ -119,7 +119,7 @@ fn told(pid: Pid, reader: PipeReader, dropped: u64) -> usize {
         std::thread::sleep(Duration::from_millis(20));
         let told = lines.try_iter();
         let told = told
-            .filter(|it| it.contains(" lines dropped, nobody"))
+            .filter(|it| it.contains(" lines dropped: the output"))
             .count();
         if told > 0 {
             return told;

@@ -144,7 +144,7 @@ fn three_relays_know_what_both_stations_measure() {
     meter.send_to(tx_dbm.as_bytes(), &to).unwrap();
     std::fs::write(&level, format!("1\nreceiver {rx_w:e}\nhalf a li")).unwrap();
     tx.line("\"event\":\"back\"");
-    rx.line("back: relay 3 is heard");
+    rx.line("back: relay 3 is received");
     for tty in 0..3 {
         until(&field.status(tty), |said| {
             is_about(&said["relay"]["transmitter_w"], tx_w)
@@ -171,7 +171,7 @@ fn three_relays_know_what_both_stations_measure() {
     field.hub.pull(4);
     rx.line("port lost: --tty ");
     rx.signal(Signal::HUP);
-    rx.line("hang-up: the log was opened again, the station goes on");
+    rx.line("hang-up: the log file was reopened; the station continues");
     field.hub.plug(4);
     rx.line("port back: --tty ");
     let end = Instant::now() + LIMIT;
@@ -308,7 +308,7 @@ fn a_station_that_stands_uploads_and_stands_on() {
     assert!(said > 500, "{said} bytes in the capture");
 
     let (mut second, ..) = station("1", "second");
-    second.line("back: relay 1 is heard");
+    second.line("back: relay 1 is received");
     second.line("not flown: --version 1: must be within 3 to 65535, the relays hold version 2");
     second.signal(Signal::TERM);
     assert_eq!(second.end().status, Some(0), "it stood on");

@@ -82,7 +82,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         );
         for (relay, place) in relays.iter_mut().zip(&uploaded) {
             // Both log lines come before the ground station's.
-            relay.line("uploaded: holds version 3");
+            relay.line("uploaded: stored version 3");
             relay.line("adopted: flies version 3");
             relay.settles_at(*place);
         }
@@ -136,7 +136,7 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     drop(relays);
     let mut relays = [start(1), start(2)];
     relays[0].line("resumed: flies version 1");
-    relays[1].line("uploaded: holds version 1");
+    relays[1].line("uploaded: stored version 1");
     relays[1].line("adopted: flies version 1");
     for (relay, place) in relays.iter_mut().zip(&uploaded) {
         relay.settles_at(*place);
@@ -284,7 +284,7 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
                 "--version 5: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude {altitude}.0 m"
             );
             assert_eq!((ended.status, &ended.stderr[..]), (Some(1), &[line][..]));
-            assert!(!relays[0].has_said("refused: "), "nothing was sent");
+            assert!(!relays[0].has_said("upload refused: "), "nothing was sent");
             more.push("--no-fence");
         }
         let ended = ground(&files, "5", &more).end();
@@ -300,7 +300,7 @@ fn an_altitude_outside_the_geofence_is_refused_at_the_ground_with_its_range() {
             "--version 5: relay 1, or one beyond it, refuses it: altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band"
         );
         assert_eq!(ended.stderr, [line]);
-        let own = "upload refused: its altitudes must be within the relay's own geofence, ";
+        let own = "upload refused: the altitudes must be within the relay's own geofence, ";
         relays[0].line(&format!("{own}{range}"));
         assert!(!relays[0].has_said("adopted: ") && !relays[1].has_said("adopted: "));
     }

@@ -64,7 +64,7 @@ fn a_port_that_cannot_be_opened_says_why() {
     ];
     // Root may open any file.
     if std::fs::read(&secret).is_err() {
-        faults.push((secret, "may not be opened by this user"));
+        faults.push((secret, "permission denied; on most"));
     }
     for (path, why) in faults {
         let tty = path.to_str().unwrap();

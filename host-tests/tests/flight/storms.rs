@@ -14,8 +14,8 @@ use uav_relay::WithoutQuorum;
 use uav_relay_oracle::random::seed;
 use uav_relay_sim::simulator::bursts::Bursts;
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::deaf::Deaf;
 use uav_relay_sim::simulator::faults::Faults;
+use uav_relay_sim::simulator::one_way::OneWayFailure;
 
 use super::*;
 
@@ -52,7 +52,7 @@ fn storm(seed: u64) -> Setup {
         let (from, until) = span(rng);
         let by = rng.random_range(1..=8);
         let of = (by + rng.random_range(0..7)) % 8 + 1;
-        setup.deaf.push(Deaf {
+        setup.deaf.push(OneWayFailure {
             by,
             of,
             from,

@@ -54,7 +54,7 @@ fn frame() -> Vec<Vec<u8>> {
 
 fn scenario() -> Vec<Vec<u8>> {
     let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
-    ["scenario", "several", "field", "altitudes"]
+    ["scenario", "multi_interferer", "field", "altitudes"]
         .iter()
         .map(|name| fs::read(format!("{examples}/{name}.toml")).unwrap())
         .collect()

@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 use uav_relay::Placement;
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
-use uav_relay_tools::plan::{Ask, Number, Plan, plan};
+use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
 
 /// Largest permitted error of a position on the map, m.
 const ALLOWED_M: f64 = 0.01;
 
 fn best(scenario: &Scenario, relays: u16) -> Plan {
-    let ask = Ask {
+    let ask = PlanRequest {
         number: Number::Of(relays),
         free_altitude: scenario.lateral_max_m > 0.0,
         x_m: None,

@@ -13,7 +13,7 @@ use uav_relay_sim::report::hop_sirs;
 use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_tools::plan::{Ask, Number, Plan, plan};
+use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
 
 const TOLERANCE: f64 = 1e-4;
 
@@ -23,7 +23,7 @@ fn example(name: &str) -> Scenario {
 }
 
 fn free(scenario: &Scenario, number: Number) -> Plan {
-    let ask = Ask {
+    let ask = PlanRequest {
         number,
         free_altitude: true,
         x_m: None,

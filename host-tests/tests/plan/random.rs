@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
-use uav_relay_tools::plan::{Ask, NoPlan, Number, Plan, Unit, plan};
+use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, plan};
 
 fn round(value: f64) -> f64 {
     f64::from(value as f32)
@@ -100,13 +100,13 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
     }
 }
 
-fn ask(rng: &mut impl Rng) -> Ask {
+fn ask(rng: &mut impl Rng) -> PlanRequest {
     let number = if rng.random_bool(0.7) {
         Number::Of(rng.random_range(1..=12))
     } else {
         Number::Meeting(log_uniform(rng, 1e-3, 30.0))
     };
-    Ask {
+    PlanRequest {
         number,
         free_altitude: rng.random_bool(0.3),
         x_m: None,
@@ -204,7 +204,7 @@ fn plans_keep_every_limit_and_what_is_proven_is() {
     assert!(planned > 150 && unmet > 10 && proven > 80 && one_proven > 30);
 }
 
-fn keeps_the_limits(scenario: &Scenario, ask: &Ask, plan: &Plan) {
+fn keeps_the_limits(scenario: &Scenario, ask: &PlanRequest, plan: &Plan) {
     assert_eq!(plan.sirs.len(), plan.places.len() + 1);
     assert!(
         plan.sirs.iter().all(|sir| sir.is_finite() && *sir > 0.0),
@@ -267,7 +267,7 @@ fn plans_beside_the_line_are_worth_what_they_say() {
             ..scenario(&mut rng)
         };
         let relays = rng.random_range(1..=8);
-        let ask = Ask {
+        let ask = PlanRequest {
             number: Number::Of(relays),
             free_altitude: true,
             x_m: None,

@@ -11,7 +11,7 @@ use uav_relay_scenario::scene::Scene;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::simulator::sky::Sky;
+use uav_relay_sim::simulator::true_interference::TrueInterference;
 use uav_relay_tools::provision::block::Flight;
 
 use crate::fleet::Fleet;
@@ -61,7 +61,7 @@ fn simulated(flight: &Flight) -> Outcome {
     let axis = unknown().line.unwrap().axis;
     let mut setup = Setup::new(*flight.mission());
     setup.settings.listen = flight.listen();
-    let mut sky = Sky::of(scene());
+    let mut sky = TrueInterference::of(scene());
     for drone in 1..=RELAYS {
         sky.handed.extend(places(drone).map(|place| {
             let at = axis.place(axis.point(place).unwrap()).unwrap();

@@ -9,7 +9,7 @@ use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
 use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::wild::Wild;
+use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
 
@@ -21,7 +21,7 @@ const HILL: f64 = 8.0;
 /// Returns the error of the first relay's estimate at the receiver. Returns also the fraction of the optimum.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
-        let wild = Wild::new(seed, RELAYS, 1);
+        let wild = RandomScene::new(seed, RELAYS, 1);
         let mut setup = wild.setup(Interference::Unknown).unwrap();
         setup.settings.wiring = Wiring::Shared;
         setup.auth = true;

@@ -1,7 +1,7 @@
 //! Moving interferer, compared with a chain that stays in its first optimum.
 
-use uav_relay_tools::listening::followed::{mean, shares};
 use uav_relay_tools::listening::found::quantile;
+use uav_relay_tools::listening::moving::{mean, shares};
 
 use crate::count;
 

@@ -2,18 +2,18 @@
 
 use uav_relay::{Interference, Interferer};
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_tools::figures::trouble::Trouble;
+use uav_relay_tools::figures::error::FigureError;
 use uav_relay_tools::listening::found::{
     self, LAST, Shares, hypothetical, quantile, shadowed, unknown,
 };
-use uav_relay_tools::listening::wild::Wild;
+use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
 
 fn shares(
     relays: u16,
     sources: usize,
-    setup: impl Fn(&Wild) -> Result<Setup, Trouble> + Sync,
+    setup: impl Fn(&RandomScene) -> Result<Setup, FigureError> + Sync,
 ) -> Shares {
     found::shares(count(200), relays, sources, setup).unwrap()
 }

@@ -5,10 +5,10 @@ use uav_relay::{Duration, Instant, Interference};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::TimelineEvent;
-use uav_relay_sim::simulator::sky::{Broken, Says};
+use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
 
 use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::wild::Wild;
+use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
 
@@ -20,7 +20,7 @@ fn a_still_world_becomes_silent() {
         .into_par_iter()
         .map(|seed| {
             let relays = [3, 5, 8, 20][seed as usize % 4];
-            let wild = Wild::new(seed, relays, 1);
+            let wild = RandomScene::new(seed, relays, 1);
             let mut setup = wild.setup(Interference::Unknown).unwrap();
             let sky = setup.sky.as_mut().unwrap();
             sky.period = Duration::from_millis(1_000);
@@ -47,7 +47,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
     let mut shares: Vec<f64> = seeds
         .into_par_iter()
         .map(|seed| {
-            let wild = Wild::new(seed, 8, 1);
+            let wild = RandomScene::new(seed, 8, 1);
             let mut setup = wild.setup(Interference::Unknown).unwrap();
             setup.faults = Faults::BAD_DAY;
             let outcome = run(setup).unwrap();
@@ -92,12 +92,12 @@ fn a_broken_sensor_is_named_and_left_out() {
         let outcomes: Vec<(bool, bool, f64)> = seeds
             .into_par_iter()
             .map(|seed| {
-                let wild = Wild::new(seed, 8, 1);
+                let wild = RandomScene::new(seed, 8, 1);
                 let broken = 1 + (seed % 8) as u16;
                 let mut setup = wild.setup(Interference::Unknown).unwrap();
                 setup.sky.as_mut().unwrap().broken = vec![Broken {
                     node: broken,
-                    says: Says::Times(10_f64.powf(off_db / 10.0)),
+                    says: SensorReading::Times(10_f64.powf(off_db / 10.0)),
                     since: Instant::from_millis(since_s * 1_000),
                 }];
                 let outcome = run(setup).unwrap();

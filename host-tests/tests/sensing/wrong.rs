@@ -5,26 +5,26 @@ use uav_relay::{Instant, Interference, Wiring};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::simulator::sky::{Broken, Says};
+use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
 
 use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::wild::Wild;
+use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
 
 /// Simulated sensor faults. Constant values are those of a 10 W interferer at 500 m, a receiver's noise, and zero.
-const KINDS: [(&str, Says); 7] = [
-    ("0.1 times", Says::Times(0.1)),
-    ("0.5 times", Says::Times(0.5)),
-    ("2 times", Says::Times(2.0)),
-    ("10 times", Says::Times(10.0)),
-    ("5e-9 W always", Says::Always(5e-9)),
-    ("1e-13 W always", Says::Always(1e-13)),
-    ("0 W always", Says::Always(0.0)),
+const KINDS: [(&str, SensorReading); 7] = [
+    ("0.1 times", SensorReading::Times(0.1)),
+    ("0.5 times", SensorReading::Times(0.5)),
+    ("2 times", SensorReading::Times(2.0)),
+    ("10 times", SensorReading::Times(10.0)),
+    ("5e-9 W always", SensorReading::Always(5e-9)),
+    ("1e-13 W always", SensorReading::Always(1e-13)),
+    ("0 W always", SensorReading::Always(0.0)),
 ];
 
 /// Returns a chain whose ends measure and send their measurements.
-fn setup(wild: &Wild) -> Setup {
+fn setup(wild: &RandomScene) -> Setup {
     let mut setup = wild.setup(Interference::Unknown).unwrap();
     setup.settings.wiring = Wiring::Shared;
     setup.auth = true;
@@ -32,7 +32,7 @@ fn setup(wild: &Wild) -> Setup {
 }
 
 /// Returns the final fraction of the optimum.
-fn share(wild: &Wild, outcome: &Outcome) -> f64 {
+fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
     let goals = outcome.stands.last().unwrap().goals.as_ref();
     goals.map_or(0.0, |goals| {
         wild.scene().unwrap().chain_sir(goals) / wild.optimum().unwrap()
@@ -54,7 +54,7 @@ fn named(outcome: &Outcome) -> Vec<u16> {
 /// Returns the fractions of the optimum without faults, by scene, as a reference.
 fn sound(relays: u16) -> Vec<f64> {
     let one = |seed| {
-        let wild = Wild::new(seed, relays, 1);
+        let wild = RandomScene::new(seed, relays, 1);
         share(&wild, &run(setup(&wild)).unwrap())
     };
     (0..count(24)).into_par_iter().map(one).collect()
@@ -64,7 +64,7 @@ fn sound(relays: u16) -> Vec<f64> {
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {
         let one = |seed: usize| {
-            let (wild, node) = (Wild::new(seed as u64, relays, 1), node(seed as u64));
+            let (wild, node) = (RandomScene::new(seed as u64, relays, 1), node(seed as u64));
             let mut wrong = setup(&wild);
             wrong.sky.as_mut().unwrap().broken = vec![Broken {
                 node,
@@ -117,7 +117,7 @@ fn sensors_that_are_right_are_not_named() {
         let each: Vec<(Vec<u16>, f64)> = (0..count(24))
             .into_par_iter()
             .map(|seed| {
-                let wild = Wild::new(seed, relays, 1);
+                let wild = RandomScene::new(seed, relays, 1);
                 let outcome = run(setup(&wild)).unwrap();
                 (named(&outcome), share(&wild, &outcome))
             })
@@ -151,7 +151,7 @@ fn measurements_of_an_end_may_come_late_or_stop() {
         ("never", [begin, begin]),
     ] {
         let one = |seed| {
-            let mut late = setup(&Wild::new(seed, 5, 1));
+            let mut late = setup(&RandomScene::new(seed, 5, 1));
             let sky = late.sky.as_mut().unwrap();
             sky.scene.mu_nlos *= 8.0;
             sky.ends_during = during;

@@ -1,7 +1,7 @@
 //! Interferers of a replaced mission, and estimated interferers.
 
 use roxmltree::{Document, Node};
-use uav_relay_sim::svg::{Others, Picture, draw};
+use uav_relay_sim::svg::{OtherInterferers, Picture, draw};
 
 use super::{all, level, number, tip};
 
@@ -61,7 +61,7 @@ fn what_is_believed_is_drawn_beside_what_is_true() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {
         let picture = Picture {
             others: vec![(30.0, x, y)],
-            others_are: Others::Believed,
+            others_are: OtherInterferers::Believed,
             ..level(8)
         };
         let svg = draw(&picture);

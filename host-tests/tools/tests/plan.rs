@@ -345,7 +345,7 @@ fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
         table.contains("worst hop: SIR 2.4655") && table.contains("8 relays, by Algorithm 1"),
         "{table}"
     );
-    assert!(table.contains("no places are better"), "{table}");
+    assert!(table.contains("no positions are better"), "{table}");
     let drawing = std::fs::read_to_string(path).unwrap();
     assert!(roxmltree::Document::parse(&drawing).is_ok());
     let output = plan(&["--target-sir", "5"]);

@@ -43,7 +43,7 @@ impl core::fmt::Display for RecordError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Base => "the record is of a relay that was loaded with another mission",
-            Self::Begun => "the relay has begun: what it has said before comes too late",
+            Self::Begun => "the record must be restored before the relay starts",
         })
     }
 }

@@ -91,7 +91,7 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     }
 }
 
-/// Adds noise of 1e-6 to 1e4 of the interference at a random place. It stays within a mission's limit.
+/// Adds noise of 1e-6 to 1e4 of the interference at a random position. It stays within a mission's limit.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);
     let altitude_m = link.relays.first().map_or(1.0, |relay| relay.altitude_m);

@@ -2,8 +2,8 @@
 
 use crate::command::{Failure, carries, number, whole};
 use crate::simulator::bursts::Bursts;
-use crate::simulator::deaf::Deaf;
 use crate::simulator::medium::Access;
+use crate::simulator::one_way::OneWayFailure;
 use crate::simulator::setup::Setup;
 use clap::{Args, ValueEnum};
 use uav_relay::{Duration, Instant, Wiring};
@@ -33,7 +33,7 @@ pub struct Air {
     burst: f64,
     /// Relay J does not receive relay I from second S until E, or permanently. Repeatable
     #[arg(long, value_name = "J:I@S[-E]", value_parser = deaf)]
-    deaf: Vec<Deaf>,
+    deaf: Vec<OneWayFailure>,
     /// Run for S seconds, 1 to 1e6, with all events, and report the availability of the chain
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = soak)]
     soak: Option<Instant>,
@@ -67,7 +67,7 @@ impl Air {
 
     /// Returns the failure options with their start times.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
-        let name = |deaf: &Deaf| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
+        let name = |deaf: &OneWayFailure| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
         self.deaf.iter().map(name)
     }
 
@@ -84,7 +84,7 @@ impl Air {
         let wrong = self.deaf.iter().find(|deaf| {
             !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
         });
-        if let Some(Deaf { by, of, .. }) = wrong {
+        if let Some(OneWayFailure { by, of, .. }) = wrong {
             let line = format!("--deaf {by}:{of}@..: relays must be within 1 to {uavs}");
             return Err(Failure::input(line));
         }
@@ -131,7 +131,7 @@ impl Air {
     }
 }
 
-fn deaf(text: &str) -> Result<Deaf, String> {
+fn deaf(text: &str) -> Result<OneWayFailure, String> {
     let form =
         "must be J:I@S or J:I@S-E, two relays (1 to N) and seconds after the start (0 to 1e6)";
     let (relays, times) = text.split_once('@').ok_or(form)?;
@@ -145,7 +145,7 @@ fn deaf(text: &str) -> Result<Deaf, String> {
     if by == of {
         return Err("must be J:I@S-E with two different relays".to_owned());
     }
-    Ok(Deaf {
+    Ok(OneWayFailure {
         by,
         of,
         from,

@@ -2,14 +2,14 @@
 
 use crate::command::{Failure, number, whole};
 use crate::simulator::setup::Setup;
-use crate::simulator::sky::Sky;
+use crate::simulator::true_interference::TrueInterference;
 use clap::Args;
 use uav_relay::{Instant, Interference, Interferer, Listen, Mission, MissionConfig};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
-use super::said::said;
+use super::given::given;
 
 /// Command-line options for measurements.
 #[derive(Args, Debug)]
@@ -40,10 +40,10 @@ impl Listening {
             .move_interferer
             .map(|[along, aside]| format!("{along},{aside}"));
         let told = [
-            said("--samples", self.samples),
-            said("--shadow", self.shadow),
-            said("--move-interferer", velocity),
-            said("--listen-for", self.listen_for),
+            given("--samples", self.samples),
+            given("--shadow", self.shadow),
+            given("--move-interferer", velocity),
+            given("--listen-for", self.listen_for),
         ];
         match told.into_iter().flatten().next() {
             Some(option) if !self.listen => Err(Failure::input(format!(
@@ -89,7 +89,7 @@ impl Listening {
             listen.relative_error = error;
         }
         setup.settings.listen = Some(listen);
-        let mut sky = Sky::of(scene);
+        let mut sky = TrueInterference::of(scene);
         sky.samples = samples;
         sky.shadow_db = self.shadow.unwrap_or_default();
         sky.velocity_mps = self.move_interferer.unwrap_or_default();

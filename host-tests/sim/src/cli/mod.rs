@@ -9,11 +9,11 @@
 
 mod air;
 mod flight;
+mod given;
 mod hostile;
 mod listening;
 mod options;
 mod prepared;
-mod said;
 mod times;
 mod upload;
 

@@ -6,9 +6,9 @@ use crate::command::{Failure, file, number, whole};
 use clap::{Parser, ValueEnum};
 use uav_relay_scenario::number::narrow;
 
+use super::given::given;
 use super::hostile::Hostile;
 use super::listening::Listening;
-use super::said::said;
 
 /// Simulates N relays that exchange real frames and move to the positions with the best worst-hop SIR
 #[derive(Parser, Debug)]
@@ -104,15 +104,18 @@ impl Options {
         let rounds = "has no rounds; adjust has";
         let bracket = "has a fixed step, see --epsilon; the other methods bracket";
         let ignored: [(Option<String>, &str); 6] = [
-            (said("--epsilon", self.epsilon.filter(|_| !is_step)), step),
-            (said("--rounds", self.rounds.filter(|_| !is_adjust)), rounds),
+            (given("--epsilon", self.epsilon.filter(|_| !is_step)), step),
             (
-                said("--explore", self.explore_m.filter(|_| !is_adjust)),
+                given("--rounds", self.rounds.filter(|_| !is_adjust)),
+                rounds,
+            ),
+            (
+                given("--explore", self.explore_m.filter(|_| !is_adjust)),
                 rounds,
             ),
             (self.grid.filter(|_| !is_adjust).map(grid_said), rounds),
             (
-                said("--tolerance", self.tolerance.filter(|_| is_step)),
+                given("--tolerance", self.tolerance.filter(|_| is_step)),
                 bracket,
             ),
             (

@@ -9,12 +9,12 @@ use uav_relay_scenario::{Interference, Scenario};
 use super::options::{Method, Options};
 use crate::beta::beta_w;
 use crate::command::{self, Failure};
-use crate::report::{self, AgainstAll, AirReport, ChainReport, ListenedReport, timeline};
+use crate::report::{self, AirReport, AllInterferersReport, ChainReport, SensingReport, timeline};
 use crate::simulator::chain::Chain;
 use crate::simulator::faults::Faults;
 use crate::simulator::outcome::{Outcome, RelayEnd};
 use crate::simulator::setup::Setup;
-use crate::svg::{Others, Picture, room};
+use crate::svg::{OtherInterferers, Picture, room};
 
 /// Setup of a run, with the true mission for its evaluation.
 #[derive(Debug)]
@@ -159,7 +159,7 @@ impl<'a> Prepared<'a> {
     /// Reports the outcome against the true interference, which also replaces the setup's mission.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
-        let listened = ListenedReport::of(&self.setup, outcome);
+        let listened = SensingReport::of(&self.setup, outcome);
         self.setup.mission = options.listening.moved(self.told, outcome.ended);
         let setup = &self.setup;
         let flown = report::flown(setup, outcome);
@@ -169,7 +169,7 @@ impl<'a> Prepared<'a> {
         report.listened = listened;
         let planned = options.hostile.uploads.are_planned();
         if let (None, false, Some(sir)) = (&listened, planned, report.sir) {
-            report.against_all = AgainstAll::of(scenario, &report.relays, sir);
+            report.against_all = AllInterferersReport::of(scenario, &report.relays, sir);
         }
         report
     }
@@ -303,10 +303,14 @@ fn drawn(
     let (interferers, others, others_are) =
         if let (true, uav_relay::Interference::Source(at)) = (uploaded, mission.interference()) {
             let now = [at.power_w, at.x_m, at.y_m].map(f64::from);
-            (vec![now.into()], before, Others::Before)
+            (vec![now.into()], before, OtherInterferers::Before)
         } else {
             let believed = believed.map(|at| [at.power_w, at.x_m, at.y_m].map(f64::from).into());
-            (before, believed.into_iter().collect(), Others::Believed)
+            (
+                before,
+                believed.into_iter().collect(),
+                OtherInterferers::Believed,
+            )
         };
     let shown: Vec<_> = interferers.iter().chain(&others).copied().collect();
     let room = room(mission, aside, &shown);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::simulator::attack::Strike;
+use crate::simulator::attack::AttackKind;
 use crate::simulator::outcome::{Moment, Outcome, TimelineEvent};
 
 /// Attacker's frames of one kind.
@@ -64,8 +64,8 @@ impl AttackReport {
         });
         Self {
             auth,
-            forged: struck(outcome, Strike::Forge),
-            replayed: struck(outcome, Strike::Replay),
+            forged: struck(outcome, AttackKind::Forge),
+            replayed: struck(outcome, AttackKind::Replay),
             ended_otherwise: outcome.ending != calm.ending,
             farthest_m: far
                 .collect::<Option<Vec<f64>>>()
@@ -155,7 +155,7 @@ fn formed(outcome: &Outcome) -> u64 {
     views.len() as u64
 }
 
-fn struck(outcome: &Outcome, kind: Strike) -> StruckReport {
+fn struck(outcome: &Outcome, kind: AttackKind) -> StruckReport {
     let counted: BTreeMap<&'static str, u64> = outcome
         .struck
         .counted

@@ -5,19 +5,19 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay::{Interference, Mission};
 
-use super::against::AgainstAll;
 use super::air::AirReport;
+use super::all_interferers::AllInterferersReport;
 use super::attack::AttackReport;
+use super::availability::AvailabilityReport;
 use super::drones::{DroneReport, drones};
 use super::failure::error;
-use super::flown::version;
+use super::final_mission::version;
 use super::hops::{self, RelayReport, db, hop_sirs};
-use super::left::{LostReport, left, lost};
-use super::listened::ListenedReport;
 use super::recovery::{self, RecoveryReport, recoveries};
+use super::remaining::{LostReport, left, lost};
+use super::sensing::SensingReport;
 use super::silences::{SilenceReport, silences};
 use super::timeline::{self, MomentReport, seconds};
-use super::watched::WatchedReport;
 use crate::simulator::outcome::{Ending, Outcome};
 use crate::simulator::setup::Setup;
 
@@ -96,13 +96,13 @@ pub struct ChainReport {
     pub air: Option<AirReport>,
     /// Statistics over the whole run, if recorded.
     #[serde(flatten)]
-    pub watched: WatchedReport,
+    pub watched: AvailabilityReport,
     /// Result of the search for the interferer, for relays that measure it.
     #[serde(flatten)]
-    pub listened: Option<ListenedReport>,
+    pub listened: Option<SensingReport>,
     /// SIR against all interferers, if the relays assumed a single one.
     #[serde(flatten)]
-    pub against_all: Option<AgainstAll>,
+    pub against_all: Option<AllInterferersReport>,
     /// Number of relays in the chain at the end, if the run had other events than convergence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
@@ -194,7 +194,10 @@ impl ChainReport {
             air: None,
             listened: None,
             against_all: None,
-            watched: outcome.watched.map(WatchedReport::of).unwrap_or_default(),
+            watched: outcome
+                .watched
+                .map(AvailabilityReport::of)
+                .unwrap_or_default(),
             left: (!timeline.is_empty()).then_some(flown),
             lost: lost(outcome, &chain),
             recovery: recoveries(&outcome.moments, mission.relays()),
@@ -238,7 +241,7 @@ impl ChainReport {
             air: None,
             listened: None,
             against_all: None,
-            watched: WatchedReport::default(),
+            watched: AvailabilityReport::default(),
             left: None,
             lost: Vec::new(),
             drones: Vec::new(),

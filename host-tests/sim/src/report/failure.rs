@@ -1,6 +1,6 @@
 //! Error messages for runs that failed.
 
-use super::flown::version;
+use super::final_mission::version;
 use super::timeline::seconds;
 use crate::simulator::outcome::{Ending, Outcome, TimelineEvent};
 

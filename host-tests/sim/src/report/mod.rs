@@ -1,24 +1,24 @@
 //! Reports of runs and plans, as text and JSON.
 
-pub mod against;
 pub mod air;
+pub mod all_interferers;
 pub mod attack;
+pub mod availability;
 pub mod chain;
 mod drones;
 mod failure;
-pub mod flown;
+pub mod final_mission;
 pub mod hops;
-pub mod left;
-pub mod listened;
 pub mod recovery;
+pub mod remaining;
+pub mod sensing;
 pub mod silences;
 pub mod timeline;
-pub mod watched;
 
-pub use against::AgainstAll;
 pub use air::AirReport;
+pub use all_interferers::AllInterferersReport;
 pub use attack::AttackReport;
 pub use chain::ChainReport;
-pub use flown::flown;
+pub use final_mission::flown;
 pub use hops::{RelayReport, db, hop_sirs, hops_table, relays};
-pub use listened::ListenedReport;
+pub use sensing::SensingReport;

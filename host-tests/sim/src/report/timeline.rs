@@ -162,7 +162,7 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
     }
     match one.what {
         "lost" | "not received by" | "mission mismatch" | "key mismatch" | "epoch went back"
-        | "duplicate index" => one.other == moment.other,
+        | "duplicate index" | "sensor off" => one.other == moment.other,
         // Both neighbours log that they found each other.
         "found" => {
             one.other == Some(moment.relay) && moment.other == Some(one.relay)
@@ -175,7 +175,6 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         "stored" | "adopted" => one.version == moment.version,
         "no quorum" | "lease expired" | "engaged" | "released" => true,
         "new estimate" => !group.relays.contains(&moment.relay),
-        "sensor off" => one.other == moment.other,
         _ => false,
     }
 }

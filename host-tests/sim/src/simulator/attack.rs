@@ -22,7 +22,7 @@ pub struct Attack {
 
 /// Kind of an attacker's frame.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub enum Strike {
+pub enum AttackKind {
     /// A forged frame.
     Forge,
     /// A received frame, sent again.
@@ -33,7 +33,7 @@ pub enum Strike {
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Struck {
     /// Frames by kind and by the name of the counter in [`Stats`]. `received` counts frames accepted as a neighbour's.
-    pub counted: BTreeMap<(Strike, &'static str), u64>,
+    pub counted: BTreeMap<(AttackKind, &'static str), u64>,
 }
 
 #[derive(Clone, Debug)]
@@ -73,7 +73,7 @@ impl Attacker {
     }
 
     /// Times and kinds of all frames, unsorted.
-    pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, Strike)> {
+    pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, AttackKind)> {
         let Attack {
             forged,
             replayed,
@@ -81,7 +81,7 @@ impl Attacker {
         } = self.attack;
         let pause = link.line_time(MAX_SWEEP);
         let mut free = Instant::ZERO;
-        let kinds = [(Strike::Forge, forged), (Strike::Replay, replayed)];
+        let kinds = [(AttackKind::Forge, forged), (AttackKind::Replay, replayed)];
         let all = kinds
             .into_iter()
             .flat_map(|(kind, count)| (0..count).map(move |number| (kind, number)));

@@ -1,6 +1,7 @@
 //! Event loop of a run: connects the relays and processes events until the run ends.
 
 mod air;
+mod attacker;
 mod begin;
 mod channel;
 mod ending;
@@ -17,8 +18,7 @@ mod recorded;
 mod start;
 mod state;
 mod station;
-mod story;
-mod strike;
+mod timeline;
 
 pub use state::Chain;
 
@@ -35,7 +35,7 @@ use super::fleet::Vehicle;
 use super::flying::Seen;
 use super::medium::AirCounts;
 use super::outcome::{Outcome, RelayEnd, TimelineEvent};
-use super::queue::Happening;
+use super::queue::QueuedEvent;
 use super::setup::Setup;
 
 /// Limit on the events of a run: some minutes of computing.
@@ -164,40 +164,40 @@ impl Chain {
         self.outcome
     }
 
-    fn happen(&mut self, index: usize, happening: Happening) {
+    fn happen(&mut self, index: usize, happening: QueuedEvent) {
         if matches!(
             happening,
-            Happening::Kill
-                | Happening::Boot
-                | Happening::Part
-                | Happening::Upload
-                | Happening::Strike(_)
+            QueuedEvent::Kill
+                | QueuedEvent::Boot
+                | QueuedEvent::Part
+                | QueuedEvent::Upload
+                | QueuedEvent::AttackKind(_)
         ) {
             self.ahead -= 1;
         }
         match happening {
-            Happening::Fly if self.fleet.is_empty() => self.fly(),
-            Happening::Fly => self.fly_fleet(),
-            Happening::Restart => self.restart_autopilot(index),
-            Happening::Part => self.tell_of_partitions(),
-            Happening::Air(event) => self.on_air(event),
-            Happening::Listen => self.measure_all(),
-            Happening::Strike(kind) => self.strike(kind),
-            Happening::Upload => self.begin_upload(index),
-            Happening::Heard { bytes } => self.hear(index, &bytes),
-            Happening::Ask => self.ask(index),
+            QueuedEvent::Fly if self.fleet.is_empty() => self.fly(),
+            QueuedEvent::Fly => self.fly_fleet(),
+            QueuedEvent::Restart => self.restart_autopilot(index),
+            QueuedEvent::Part => self.tell_of_partitions(),
+            QueuedEvent::Air(event) => self.on_air(event),
+            QueuedEvent::Listen => self.measure_all(),
+            QueuedEvent::AttackKind(kind) => self.strike(kind),
+            QueuedEvent::Upload => self.begin_upload(index),
+            QueuedEvent::Heard { bytes } => self.hear(index, &bytes),
+            QueuedEvent::Ask => self.ask(index),
             of_relay => self.happen_to(index, of_relay),
         }
     }
 
     /// Handles an event of relay `index` (from 0).
-    fn happen_to(&mut self, index: usize, happening: Happening) {
+    fn happen_to(&mut self, index: usize, happening: QueuedEvent) {
         let now = self.now;
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
         match happening {
-            Happening::Boot => {
+            QueuedEvent::Boot => {
                 let start = Start {
                     index: member.node,
                     number: member.starts + 1,
@@ -219,7 +219,7 @@ impl Chain {
                 self.tell(index, TimelineEvent::Booted, None);
             }
             _ if member.killed.is_some() => return,
-            Happening::Kill => {
+            QueuedEvent::Kill => {
                 member.killed = Some(now);
                 if let Some(medium) = &mut self.medium {
                     medium.switch_off(index);
@@ -228,14 +228,14 @@ impl Chain {
                 self.film(index);
                 return;
             }
-            Happening::Bytes { port, bytes } => {
+            QueuedEvent::Bytes { port, bytes } => {
                 // The relay must accept any fragmentation of the byte stream: split at a random offset.
                 let cut = self.rng.random_range(0..=bytes.len());
                 let (first, second) = bytes.split_at_checked(cut).unwrap_or((&bytes, &[]));
                 member.relay.handle_bytes(now, port, first);
                 member.relay.handle_bytes(now, port, second);
             }
-            Happening::Wake => {
+            QueuedEvent::Wake => {
                 // Ignore a wake-up that was replaced by an earlier one; otherwise wake-ups would multiply.
                 if member.wake != Some(now) {
                     return;
@@ -278,7 +278,7 @@ impl Chain {
             // A drained relay must not request an immediate call.
             assert!(at > now, "relay {} would spin", index + 1);
             member.wake = Some(at);
-            self.queue.put(at, index, Happening::Wake);
+            self.queue.put(at, index, QueuedEvent::Wake);
         }
     }
 }

@@ -11,7 +11,7 @@ use super::faults::Injected;
 use super::film::Film;
 use super::flying::Seen;
 use super::medium::AirCounts;
-use super::sky::Stand;
+use super::true_interference::Stand;
 
 /// Kind of a log entry about a relay; "the other node" is [`Moment::other`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -5,12 +5,12 @@ use std::collections::BinaryHeap;
 
 use uav_relay::{Instant, Port};
 
-use super::attack::Strike;
+use super::attack::AttackKind;
 use super::medium::AirEvent;
 
 /// Event of a relay or of the whole run.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Happening {
+pub enum QueuedEvent {
     /// Bytes arrive at the relay.
     Bytes {
         /// Receiving port.
@@ -44,7 +44,7 @@ pub enum Happening {
     /// Interference measurement of all relays.
     Listen,
     /// The attacker sends a frame to a relay.
-    Strike(Strike),
+    AttackKind(AttackKind),
 }
 
 /// Queued event. Events of the same time keep their order of insertion.
@@ -53,7 +53,7 @@ struct Entry {
     at: Instant,
     order: u64,
     relay: usize,
-    happening: Happening,
+    happening: QueuedEvent,
 }
 
 impl Ord for Entry {
@@ -77,7 +77,7 @@ pub struct Queue {
 
 impl Queue {
     /// Schedules `happening` for `relay` (from 0) at `at`.
-    pub fn put(&mut self, at: Instant, relay: usize, happening: Happening) {
+    pub fn put(&mut self, at: Instant, relay: usize, happening: QueuedEvent) {
         self.entries.push(Reverse(Entry {
             at,
             order: self.order,
@@ -88,7 +88,7 @@ impl Queue {
     }
 
     /// Removes the next event and returns its time, relay and kind.
-    pub fn take(&mut self) -> Option<(Instant, usize, Happening)> {
+    pub fn take(&mut self) -> Option<(Instant, usize, QueuedEvent)> {
         let Reverse(entry) = self.entries.pop()?;
         Some((entry.at, entry.relay, entry.happening))
     }

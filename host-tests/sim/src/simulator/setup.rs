@@ -7,13 +7,13 @@ use uav_relay::{
 };
 
 use super::attack::Attack;
-use super::deaf::Deaf;
 use super::drones::FlightSpec;
 use super::faults::Faults;
 use super::fleet::spec::FleetSpec;
 use super::link::LinkSpec;
 use super::medium::access::{self, Access};
-use super::sky::Sky;
+use super::one_way::OneWayFailure;
+use super::true_interference::TrueInterference;
 
 /// Period in which relays 1 to `after` and the others do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -99,9 +99,9 @@ pub struct Setup {
     /// Mean burst of losses, frames. 1 if independent, else at least [`Bursts::shortest`](super::bursts::Bursts::shortest).
     pub burst: f64,
     /// Failures of single link directions.
-    pub deaf: Vec<Deaf>,
+    pub deaf: Vec<OneWayFailure>,
     /// Interference that the relays measure, if they have to find it.
-    pub sky: Option<Sky>,
+    pub sky: Option<TrueInterference>,
     /// Fixed end of the run; the chain is judged all the time.
     pub soak: Option<Instant>,
     /// Time from which frames are no longer lost or damaged.

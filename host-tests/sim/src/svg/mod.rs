@@ -18,7 +18,7 @@ use axis::{Frame, Scale};
 use canvas::Canvas;
 use labels::Labels;
 use picture::{BOTTOM, LEFT, RIGHT, TOP, WIDTH, bottom, decibels, length, placed, worst};
-pub use picture::{Others, Picture, Room, room};
+pub use picture::{OtherInterferers, Picture, Room, room};
 
 /// Draws the chain as an SVG document.
 ///

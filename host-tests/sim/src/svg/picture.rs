@@ -27,7 +27,7 @@ pub struct Picture {
     /// Former or estimated interferers, drawn faint if they are in the plot's range.
     pub others: Vec<(f64, f64, f64)>,
     /// Kind of the interferers in `others`.
-    pub others_are: Others,
+    pub others_are: OtherInterferers,
     /// Relays from Tx to Rx: x and altitude, m; non-finite positions are omitted.
     pub nodes: Vec<(f64, f64)>,
     /// Room beside the line; adds a top view.
@@ -44,7 +44,7 @@ pub struct Picture {
 
 /// Kind of interferers that are not actually present.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Others {
+pub enum OtherInterferers {
     /// Interferers of the previous mission.
     #[default]
     Before,
@@ -52,7 +52,7 @@ pub enum Others {
     Believed,
 }
 
-impl Others {
+impl OtherInterferers {
     /// Returns the label of the marker.
     pub(super) const fn word(self) -> &'static str {
         match self {

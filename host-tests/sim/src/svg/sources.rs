@@ -3,7 +3,7 @@
 use super::axis::Frame;
 use super::canvas::{Canvas, Point};
 use super::labels::{Area, Labels, width};
-use super::picture::{LEFT, Others, Picture, RIGHT, TOP, length, near};
+use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
 
 /// Font size and line spacing of the labels.
 const SIZE: f64 = 10.0;
@@ -77,7 +77,7 @@ fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
         .map(|source| (frame.x.at(source.1), source));
     all.filter(|(at, _)| {
         let covers = |(_, x, _): &Source| (frame.x.at(*x) - at).abs() < 12.0;
-        picture.others_are == Others::Believed || !inside.iter().any(covers)
+        picture.others_are == OtherInterferers::Believed || !inside.iter().any(covers)
     })
     .collect()
 }

@@ -1,7 +1,7 @@
 //! Agreement and availability at the lowest permitted data rate.
 
-use uav_relay_sim::simulator::many::run_seeds;
 use uav_relay_sim::simulator::medium::Access;
+use uav_relay_sim::simulator::parallel::run_seeds;
 use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;

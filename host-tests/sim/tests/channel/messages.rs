@@ -2,9 +2,9 @@
 
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::many::run_seeds;
 use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::parallel::run_seeds;
 use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;

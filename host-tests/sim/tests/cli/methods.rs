@@ -200,7 +200,10 @@ fn relays_of_a_scenario_keep_what_they_hold() {
 
 #[test]
 fn several_interferers_are_flown_as_one_and_a_note_says_so() {
-    let several = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/several.toml");
+    let several = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/multi_interferer.toml"
+    );
     let output = chain(&["--json", "--uavs", "3", "--scenario", several]);
     assert!(output.status.success());
     let note = String::from_utf8(output.stderr).unwrap();

@@ -236,7 +236,7 @@ fn an_attacker_changes_nothing_of_it() {
 
 #[test]
 fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
-    let file = example("several.toml");
+    let file = example("multi_interferer.toml");
     let output = chain(&["--scenario", &file, "--upload", "20:x_m=500", "--json"]);
     assert!(output.status.success());
     let notes = String::from_utf8(output.stderr).unwrap();

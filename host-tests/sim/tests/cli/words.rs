@@ -122,7 +122,7 @@ fn what_was_adopted_is_not_denied() {
 /// A closed output pipe causes no panic (exit status 101).
 #[test]
 fn whoever_does_not_listen_changes_no_status() {
-    let several = example("several.toml");
+    let several = example("multi_interferer.toml");
     for (arguments, status) in [
         (&["--uavs", "3"][..], 0),
         (&["--uavs", "3", "--json"], 0),

@@ -1,8 +1,8 @@
 //! One-way links between neighbours.
 
 use uav_relay::Phase;
-use uav_relay_sim::simulator::deaf::Deaf;
 use uav_relay_sim::simulator::flying::groups;
+use uav_relay_sim::simulator::one_way::OneWayFailure;
 use uav_relay_sim::simulator::outcome::TimelineEvent;
 
 use super::*;
@@ -20,7 +20,7 @@ fn cases(seed: u64) -> Vec<Setup> {
                 let mut setup = by_radio(relays, 57_600);
                 setup.auth = auth;
                 setup.seed = seed;
-                setup.deaf = vec![Deaf {
+                setup.deaf = vec![OneWayFailure {
                     by,
                     of,
                     from: at(from),
@@ -45,7 +45,7 @@ fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
         one.leased && one.phase == Phase::Holding
     };
     let nodes: Vec<u16> = (1..=setup.mission.relays()).filter(holds).collect();
-    let Deaf { by, of, .. } = setup.deaf[0];
+    let OneWayFailure { by, of, .. } = setup.deaf[0];
     let least = usize::from(setup.mission.relays() - 1);
     if nodes.len() != least || nodes.contains(&by) && nodes.contains(&of) {
         return Some(format!("{nodes:?} hold their places"));
@@ -75,7 +75,7 @@ fn in_the_end_all_but_one_of_those_that_hear_each_other_have_one_agreement() {
         .collect();
     let found = run_all(&cases, |setup, outcome| {
         let wrong = wrong(setup, &outcome)?;
-        let Deaf { by, of, from, .. } = setup.deaf[0];
+        let OneWayFailure { by, of, from, .. } = setup.deaf[0];
         let (relays, auth) = (
             setup.mission.relays(),
             if setup.auth { " --auth" } else { "" },

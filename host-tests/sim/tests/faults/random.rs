@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::Duration;
 use uav_relay_sim::simulator::bursts::Bursts;
-use uav_relay_sim::simulator::deaf::Deaf;
+use uav_relay_sim::simulator::one_way::OneWayFailure;
 use uav_relay_sim::simulator::setup::Partition;
 
 use super::*;
@@ -58,7 +58,7 @@ fn sequence(seed: u64) -> Setup {
         let near = [by.saturating_sub(1), by + 1, by.saturating_sub(2), by + 2];
         let of = near[rng.random_range(0..4)];
         if (1..=relays).contains(&of) {
-            setup.deaf.push(Deaf {
+            setup.deaf.push(OneWayFailure {
                 by,
                 of,
                 from,

@@ -1,6 +1,6 @@
 //! Availability of a chain on channels with high loss.
 
-use uav_relay_sim::simulator::many::run_seeds;
+use uav_relay_sim::simulator::parallel::run_seeds;
 
 use super::*;
 

@@ -5,10 +5,10 @@ use serde::Serialize;
 use uav_relay::{Adjust, Local, Method, Mission, Schedule};
 
 use super::chart::{Axis, Chart, Line, Look, Stroke};
+use super::error::FigureError;
 use super::flight::{Flown, fly};
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 
 /// Number of relays.
 pub const RELAYS: u16 = 50;
@@ -55,8 +55,13 @@ pub struct RoundRow {
 /// Runs Algorithm 2 for `relays` relays from `altitude_m` on, with the interferer at (500, 150) m.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn adjusted(relays: u16, altitude_m: f64, rounds: u16, local: Local) -> Result<Flown, Trouble> {
+/// [`FigureError`].
+pub fn adjusted(
+    relays: u16,
+    altitude_m: f64,
+    rounds: u16,
+    local: Local,
+) -> Result<Flown, FigureError> {
     let method = match rounds {
         0 => Method::Align,
         _ => Method::Adjust(Adjust {
@@ -73,16 +78,16 @@ pub fn adjusted(relays: u16, altitude_m: f64, rounds: u16, local: Local) -> Resu
     )
 }
 
-fn mission(relays: u16, altitude_m: f64) -> Result<Mission, Trouble> {
+fn mission(relays: u16, altitude_m: f64) -> Result<Mission, FigureError> {
     paper::flown(&paper::altitudes(150.0, altitude_m), relays)
 }
 
 /// Returns the relays' positions after each of these numbers of rounds.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, Trouble> {
-    let chains: Result<Vec<Vec<ShapeRow>>, Trouble> = rounds
+/// [`FigureError`].
+pub fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
+    let chains: Result<Vec<Vec<ShapeRow>>, FigureError> = rounds
         .par_iter()
         .map(|&round| {
             let flown = adjusted(RELAYS, START_M, round, Local::Fine)?;
@@ -103,8 +108,8 @@ pub fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, Trouble> {
 /// Returns the SIR after each round up to `rounds`; a search that has ended keeps its last SIR.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn rounds(rounds: u16) -> Result<Vec<RoundRow>, Trouble> {
+/// [`FigureError`].
+pub fn rounds(rounds: u16) -> Result<Vec<RoundRow>, FigureError> {
     let (fine, grid) = rayon::join(
         || adjusted(RELAYS, START_M, rounds, Local::Fine),
         || adjusted(RELAYS, START_M, rounds, GRID),
@@ -114,7 +119,7 @@ pub fn rounds(rounds: u16) -> Result<Vec<RoundRow>, Trouble> {
         sirs.get(usize::from(round))
             .or(sirs.last())
             .copied()
-            .ok_or(Trouble::Unsettled("Algorithm 2"))
+            .ok_or(FigureError::Unsettled("Algorithm 2"))
     };
     (0..=rounds)
         .map(|round| {
@@ -154,8 +159,8 @@ fn steps(rows: &[ShapeRow], round: u16) -> String {
 /// Returns the figure of the positions.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn shapes_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn shapes_sheet() -> Result<Sheet, FigureError> {
     let rows = shapes(&ROUNDS)?;
     let mut lines: Vec<Line> = ROUNDS
         .iter()
@@ -203,8 +208,8 @@ pub fn shapes_sheet() -> Result<Sheet, Trouble> {
 /// Returns the figure of the SIR by round.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn rounds_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn rounds_sheet() -> Result<Sheet, FigureError> {
     let most = ROUNDS.iter().copied().fold(0, u16::max);
     let rows = rounds(most)?;
     let joint = fly(
@@ -256,7 +261,7 @@ pub fn rounds_sheet() -> Result<Sheet, Trouble> {
                 line("coarse to fine", 0, |row| row.sir_fine_linear),
                 line("grid of 41 by 21", 1, |row| row.sir_grid_linear),
                 Line::new(
-                    "places and altitudes jointly",
+                    "positions and altitudes jointly",
                     Look::number(2).unsigned(),
                     [(0.0, joint.sir), (f64::from(most), joint.sir)],
                 ),

@@ -6,8 +6,8 @@ use uav_relay::Schedule;
 use uav_relay::optimiser::plan;
 
 use super::chart::{Axis, Chart, Line, Look, Panel, Stroke};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use super::{convergence, paper, walk};
 
 /// Number of relays.
@@ -38,8 +38,8 @@ const CLOSE_UP_M: (u32, u32) = (195, 230);
 /// Computes the chain for each pair of an interferer offset, m, and an altitude, m, 10 to 500.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
@@ -59,7 +59,7 @@ fn all_pairs() -> Vec<(f64, f64)> {
     pairs
 }
 
-fn row(y_m: f64, altitude_m: f64) -> Result<Row, Trouble> {
+fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
     let mission = paper::mission(&paper::altitudes(y_m, altitude_m), RELAYS)?;
     let (low, high) = CLOSE_UP_M;
     let close_up = (f64::from(low)..=f64::from(high)).contains(&altitude_m);
@@ -69,7 +69,7 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, Trouble> {
                 step: convergence::STEP,
             };
             let agreed = plan::solve(&mission, schedule, |_| mission.config().common)?;
-            walk::stretched(&mission, agreed.target).ok_or(Trouble::Unsettled("a chain"))
+            walk::stretched(&mission, agreed.target).ok_or(FigureError::Unsettled("a chain"))
         })
         .transpose()?;
     Ok(Row {
@@ -85,13 +85,13 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, Trouble> {
 /// Scans every 5 m, then refines to 0.1 m by ternary search if that gains more than the tolerance of a chain.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), Trouble> {
-    let sir = |altitude_m: f64| -> Result<f64, Trouble> {
+/// [`FigureError`].
+pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
+    let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;
         Ok(walk::settled(&mission)?.sir)
     };
-    let coarse: Result<Vec<(f64, f64)>, Trouble> = (4..=60_u32)
+    let coarse: Result<Vec<(f64, f64)>, FigureError> = (4..=60_u32)
         .into_par_iter()
         .map(|step| {
             let altitude_m = 5.0 * f64::from(step);
@@ -151,8 +151,8 @@ fn close_up(rows: &[Row]) -> Panel {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&all_pairs())?;
     let of = |y_m: f64| {
         rows.iter()
@@ -166,7 +166,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
             Line::new(&format!("Y = {y} m"), Look::number(index).spaced(), points)
         })
         .collect();
-    let bests: Result<Vec<String>, Trouble> = OFFSETS_M
+    let bests: Result<Vec<String>, FigureError> = OFFSETS_M
         .par_iter()
         .map(|&y| {
             let (altitude, sir) = best_common(RELAYS, y)?;
@@ -175,7 +175,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
         .collect();
     Ok(Sheet {
         name: "altitude",
-        title: "SIR by the altitude that fifty relays share",
+        title: "SIR by the common altitude of fifty relays",
         says: vec![
             format!(
                 "Best altitudes between 20 m and 300 m: {}.",

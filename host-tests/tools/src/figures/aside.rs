@@ -6,9 +6,9 @@ use uav_relay::Mission;
 use uav_relay::planning::single::{Found, aside, theorems};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
 /// Power of the relay, W.
@@ -64,7 +64,7 @@ pub struct PowerRatio {
     pub both_altitude_m: f32,
 }
 
-fn mission(offset_m: f64, room_m: f64) -> Result<Mission, Trouble> {
+fn mission(offset_m: f64, room_m: f64) -> Result<Mission, FigureError> {
     let scenario = Scenario {
         altitude_m: ALTITUDES_M.0,
         altitude_min_m: ALTITUDES_M.0,
@@ -77,16 +77,16 @@ fn mission(offset_m: f64, room_m: f64) -> Result<Mission, Trouble> {
     paper::mission(&scenario, 1)
 }
 
-fn some<C>(found: Option<(Found, C)>) -> Result<Found, Trouble> {
-    let (found, _) = found.ok_or(Trouble::Unsettled("a single relay"))?;
+fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
+    let (found, _) = found.ok_or(FigureError::Unsettled("a single relay"))?;
     Ok(found)
 }
 
 /// Returns the best positions at the lowest altitude for each offset, every `step_m` of room.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
         for room_m in (0..=MOST_ROOM_M).step_by(usize::from(step_m)) {
@@ -108,13 +108,13 @@ pub fn data(step_m: u16) -> Result<Vec<Row>, Trouble> {
 /// Returns the SIRs with and without lateral and vertical freedom. The interferer's offset rises by `step_m`.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn gains(step_m: u16) -> Result<Vec<PowerRatio>, Trouble> {
+/// [`FigureError`].
+pub fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
 }
 
-fn gain(offset: u16) -> Result<PowerRatio, Trouble> {
+fn gain(offset: u16) -> Result<PowerRatio, FigureError> {
     let offset_m = f64::from(offset);
     let mission = mission(offset_m, ROOM_M)?;
     let common = mission.config().common;
@@ -139,8 +139,8 @@ fn taken() -> Vec<String> {
 /// Returns the figure of the positions.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn places_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn places_sheet() -> Result<Sheet, FigureError> {
     let rows = data(ROOM_STEP_M)?;
     let lines = |of: fn(&Row) -> (f64, f64)| -> Vec<Line> {
         let line = |(index, offset): (usize, f64)| {
@@ -157,11 +157,9 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
     };
     Ok(Sheet {
         name: "aside",
-        title: "The best place of a single relay as the room beside the line grows",
+        title: "Best position of a single relay by lateral room",
         says: vec![
-            "Not in the paper. Seen from above: the relay leaves the line on the side away from the \
-             interferer, and keeps to the edge of the room until it has enough. There the circles \
-             of equal SIR of both hops touch, and more room changes nothing."
+            "Not in the paper. Seen from above: the relay leaves the line on the side away from the interferer, and stays at the edge of the room while the room is small. With enough room it is where the circles of equal SIR of both hops touch, and more room changes nothing."
                 .to_owned(),
         ],
         taken: [
@@ -178,7 +176,7 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
                     lines: lines(|row| (f64::from(row.x_m), f64::from(row.y_m))),
                 },
                 Panel {
-                    heading: "what it gains".to_owned(),
+                    heading: "gain".to_owned(),
                     x: Axis::linear("room to each side, m").between(0.0, f64::from(MOST_ROOM_M)),
                     y: Axis::linear("SIR, linear"),
                     lines: lines(|row| (row.room_m, f64::from(row.sir_linear))),
@@ -193,8 +191,8 @@ pub fn places_sheet() -> Result<Sheet, Trouble> {
 /// Returns the figure of the gain.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn gains_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {
         let points = rows
@@ -204,11 +202,9 @@ pub fn gains_sheet() -> Result<Sheet, Trouble> {
     };
     Ok(Sheet {
         name: "aside-gain",
-        title: "What a single relay gains by side, by altitude and by both",
+        title: "Gain of a single relay by lateral offset, altitude and both",
         says: vec![
-            "Not in the paper. With an interferer on the line, side and altitude are worth all but the same. \
-             Else the side is worth more. Where all of the room is used, the altitude can add to it; \
-             where there is enough, the lowest is best."
+            "Not in the paper. With an interferer on the line, lateral offset and altitude gain nearly the same. Otherwise the lateral offset gains more. If all of the room is used, the altitude can add to it; with enough room the lowest altitude is best."
                 .to_owned(),
         ],
         taken: [

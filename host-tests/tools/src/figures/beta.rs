@@ -5,8 +5,8 @@ use serde::Serialize;
 use uav_relay::FieldPoint;
 
 use super::chart::{Axis, Chart, Line, Look};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 
 /// Shape parameters alpha and beta.
 pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];
@@ -59,8 +59,8 @@ fn density(alpha: f64, beta: f64, y: f64) -> f64 {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(STEPS);
     let lines = SHAPES
         .iter()

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use super::{paper, walk};
 
 /// Numbers of relays.
@@ -30,9 +30,9 @@ pub struct Row {
 /// Returns the sweeps of each chain until it settles, thinned out for drawing.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
-    let chains: Result<Vec<Vec<Row>>, Trouble> =
+/// [`FigureError`].
+pub fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
+    let chains: Result<Vec<Vec<Row>>, FigureError> =
         relays.par_iter().map(|&relays| sweeps(relays)).collect();
     Ok(chains?
         .into_iter()
@@ -40,7 +40,7 @@ pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
         .collect())
 }
 
-fn sweeps(relays: u16) -> Result<Vec<Row>, Trouble> {
+fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     let mission = paper::mission(&paper::multi_hop(), relays)?;
     let sweeps = walk::descent(&mission, STEP)?;
     let row = |sweep: walk::Sweep| {
@@ -72,8 +72,8 @@ fn thinned(rows: &[Row]) -> Vec<Row> {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let lines = |from: u32| -> Vec<Line> {
         RELAYS

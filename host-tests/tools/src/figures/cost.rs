@@ -5,9 +5,9 @@ use serde::Serialize;
 use uav_relay::{Method, Schedule};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::flight::{Flown, fly};
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 
@@ -48,14 +48,14 @@ pub struct Row {
 /// Simulates each chain with the three schedules.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     relays.par_iter().map(|&relays| row(relays)).collect()
 }
 
-fn row(relays: u16) -> Result<Row, Trouble> {
+fn row(relays: u16) -> Result<Row, FigureError> {
     let mission = paper::flown(&Scenario::default(), relays)?;
-    let flown = |schedule: Schedule, predict: bool| -> Result<Flown, Trouble> {
+    let flown = |schedule: Schedule, predict: bool| -> Result<Flown, FigureError> {
         fly(&mission, Method::Align, schedule, predict)
     };
     let step = flown(
@@ -87,7 +87,7 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     let names = [
         "paper's step of 0.1",
         "bracketed targets",
-        "bracketed, head predicts",
+        "bracketed, leader predicts",
     ];
     let lines = names.into_iter().enumerate().map(|(index, name)| {
         let points = rows.iter().filter_map(move |row| {
@@ -107,15 +107,15 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let ratio = rows.last().map_or(0.0, |row| {
         row.step_messages as f64 / row.predicted_messages.max(1) as f64
     });
     Ok(Sheet {
         name: "cost",
-        title: "Passes, messages and bytes until the chain has settled",
+        title: "Passes, messages and bytes until the chain settles",
         says: vec![format!(
             "With 100 relays the paper's schedule takes {ratio:.0} times as many messages as the \
              head that first solves the chain from the mission. One relay alone sends none."

@@ -5,9 +5,9 @@ use serde::Serialize;
 use uav_relay::planning::fleet::Fewest;
 
 use super::chart::{Axis, Chart, Line, Look};
+use super::error::FigureError;
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
 /// Largest target, linear SIR; every whole number from 1 to it is computed.
@@ -44,21 +44,21 @@ pub struct Row {
 /// Returns the fewest relays by target and position of the interferer, with relays of 1 W.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError::Mission`].
+pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &PLACES_M.map(|place| (place, 1.0)))
 }
 
 /// Returns the fewest relays by target and power of the relays, with the interferer at (500, 400) m.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn by_power(targets: &[u16]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError::Mission`].
+pub fn by_power(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &POWERS_W.map(|power| ((500.0, 400.0), power)))
 }
 
-fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, Trouble> {
-    let of = |&((x_m, y_m), relay_w): &((f64, f64), f64)| -> Result<Vec<Row>, Trouble> {
+fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, FigureError> {
+    let of = |&((x_m, y_m), relay_w): &((f64, f64), f64)| -> Result<Vec<Row>, FigureError> {
         let scenario = Scenario {
             uav_w: relay_w,
             ..paper::with_interferer(paper::multi_hop(), x_m, y_m)
@@ -74,7 +74,7 @@ fn rows(targets: &[u16], scenarios: &[((f64, f64), f64)]) -> Result<Vec<Row>, Tr
         };
         Ok(targets.iter().map(row).collect())
     };
-    let rows: Result<Vec<Vec<Row>>, Trouble> = scenarios.par_iter().map(of).collect();
+    let rows: Result<Vec<Vec<Row>>, FigureError> = scenarios.par_iter().map(of).collect();
     Ok(rows?.concat())
 }
 
@@ -99,7 +99,7 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     }
     Chart::of(
         Axis::log("target SIR, linear").between(1.0, f64::from(MOST_TARGET)),
-        Axis::log("fewest relays"),
+        Axis::log("minimum number of relays"),
         lines,
     )
 }
@@ -107,8 +107,8 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
 /// Returns the figure by position of the interferer.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn by_place_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     let rows = by_place(&all_targets())?;
     let at = |target: u16| {
         PLACES_M.map(|place| {
@@ -122,7 +122,7 @@ pub fn by_place_sheet() -> Result<Sheet, Trouble> {
     let [_, _, _, low, low_tx, low_rx] = at(1);
     Ok(Sheet {
         name: "fewest-by-place",
-        title: "The fewest relays for a target SIR, by the place of the interferer",
+        title: "Minimum number of relays for a target SIR, by the interferer's position",
         says: vec![format!(
             "The nearer the interferer to the line between Tx and Rx, the more relays. The paper \
              has it that nearness to Tx or Rx itself does it, which holds for low targets and Rx \
@@ -146,12 +146,12 @@ pub fn by_place_sheet() -> Result<Sheet, Trouble> {
 /// Returns the figure by power of the relays.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn by_power_sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn by_power_sheet() -> Result<Sheet, FigureError> {
     let rows = by_power(&all_targets())?;
     Ok(Sheet {
         name: "fewest-by-power",
-        title: "The fewest relays for a target SIR, by the power of the relays",
+        title: "Minimum number of relays for a target SIR, by the relays' power",
         says: vec![
             "More power at the relays means fewer of them, as the paper says. The formulas as \
              printed give too few: 16, 24, 36 and 54 relays of 1 W for targets of 5, 10, 20 and \

@@ -2,7 +2,7 @@
 
 use uav_relay::{Method, Mission, Placement, Schedule};
 
-use super::trouble::Trouble;
+use super::error::FigureError;
 use super::walk;
 use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
@@ -28,13 +28,13 @@ pub struct Flown {
 /// Simulates `mission` until it settles; `predict` lets the leader first solve the chain itself.
 ///
 /// # Errors
-/// [`Trouble::Setup`] or [`Trouble::Unsettled`].
+/// [`FigureError::Setup`] or [`FigureError::Unsettled`].
 pub fn fly(
     mission: &Mission,
     method: Method,
     schedule: Schedule,
     predict: bool,
-) -> Result<Flown, Trouble> {
+) -> Result<Flown, FigureError> {
     let mut setup = Setup::new(*mission);
     setup.settings.method = method;
     setup.settings.schedule = schedule;
@@ -51,6 +51,6 @@ pub fn fly(
             messages: outcome.messages,
             bytes: outcome.bytes,
         }),
-        _ => Err(Trouble::Unsettled("a simulated chain")),
+        _ => Err(FigureError::Unsettled("a simulated chain")),
     }
 }

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use super::{paper, walk};
 use crate::baseline::random::{DRAWS, mean};
 use crate::baseline::{blind, equal};
@@ -43,18 +43,18 @@ pub struct Row {
 /// Returns the results for these numbers of relays, against the mean of `draws` random chains.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
         .map(|&relays| row(relays, draws))
         .collect()
 }
 
-fn row(relays: u16, draws: u32) -> Result<Row, Trouble> {
+fn row(relays: u16, draws: u32) -> Result<Row, FigureError> {
     let mission = paper::mission(&paper::multi_hop(), relays)?;
     let sir = walk::settled(&mission)?.sir;
-    let scene = Scene::new(&paper::multi_hop(), relays).ok_or(Trouble::Unsettled("a scene"))?;
+    let scene = Scene::new(&paper::multi_hop(), relays).ok_or(FigureError::Unsettled("a scene"))?;
     let random = mean(&scene, draws, SEED + u64::from(relays));
     let blind = scene.sir_along(&blind::places(&scene));
     let equal = scene.sir_along(&equal::places(&scene));
@@ -75,8 +75,8 @@ fn row(relays: u16, draws: u32) -> Result<Row, Trouble> {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let relays: Vec<u16> = (1..=MOST_RELAYS).collect();
     let rows = data(&relays, DRAWS)?;
     let line = |name: &str, index: usize, value: fn(&Row) -> f64| {
@@ -99,7 +99,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     };
     Ok(Sheet {
         name: "gain",
-        title: "PowerRatio of Algorithm 1 over placements that do not know of the interferer",
+        title: "Gain of Algorithm 1 over placements that ignore the interferer",
         says: vec![[8, 50, 100].map(of).join("; ") + "."],
         taken: vec![
             "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) \

@@ -7,10 +7,10 @@ use uav_relay::{Local, Method, Schedule};
 use super::adjust::adjusted;
 use super::altitude::best_common;
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::flight::fly;
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 
 /// Numbers of relays.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
@@ -48,15 +48,15 @@ pub struct Row {
 /// Returns the results for these numbers of relays, with at most `rounds` rounds of Algorithm 2.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(relays: &[u16], rounds: u16) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(relays: &[u16], rounds: u16) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
         .map(|&relays| row(relays, rounds))
         .collect()
 }
 
-fn row(relays: u16, rounds: u16) -> Result<Row, Trouble> {
+fn row(relays: u16, rounds: u16) -> Result<Row, FigureError> {
     let (altitude_m, common) = best_common(relays, OFFSET_M)?;
     let adjusted = adjusted(relays, altitude_m, rounds, Local::Fine)?;
     let mission = paper::flown(&paper::altitudes(OFFSET_M, altitude_m), relays)?;
@@ -78,8 +78,8 @@ fn row(relays: u16, rounds: u16) -> Result<Row, Trouble> {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS, ROUNDS)?;
     let line = |name: &str, index: usize, value: fn(&Row) -> f64| {
         let points = rows.iter().map(|row| (f64::from(row.relays), value(row)));
@@ -88,7 +88,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     let names = [
         "best common altitude",
         "Algorithm 2 from there",
-        "places and altitudes jointly",
+        "positions and altitudes jointly",
     ];
     let [common, adjust, joint] = names;
     let panel = |y: Axis, lines: Vec<Line>| Panel {
@@ -120,10 +120,9 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     }));
     Ok(Sheet {
         name: "joint",
-        title: "One altitude, Algorithm 2, and places and altitudes chosen jointly",
+        title: "Common altitude, Algorithm 2, and joint optimisation of positions and altitudes",
         says: vec![
-            "Not in the paper. What the choice of altitudes is worth over the best altitude that \
-             all share, and what it costs."
+            "Not in the paper. Gain of free altitudes over the best common altitude, and its cost."
                 .to_owned(),
         ],
         taken: vec![

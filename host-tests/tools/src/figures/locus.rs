@@ -5,9 +5,9 @@ use uav_relay::Mission;
 use uav_relay::planning::single::theorems::equal_altitudes;
 
 use super::chart::{Axis, Chart, Line, Look};
+use super::error::FigureError;
 use super::paper;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use uav_relay_scenario::Scenario;
 
 /// Power of Tx, W, and position of the interferer, m, for each line.
@@ -43,8 +43,8 @@ pub struct Row {
 /// Returns the mission of one relay of 1 W.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, Trouble> {
+/// [`FigureError::Mission`].
+pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, FigureError> {
     let scenario = Scenario {
         distance_m: DISTANCE_M,
         tx_w,
@@ -56,8 +56,8 @@ pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, Trouble
 /// Returns the altitudes at `per_m` positions per metre from Tx to Rx.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn data(per_m: u8) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError::Mission`].
+pub fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for choice in CHOICES {
         let mission = mission(choice)?;
@@ -84,8 +84,8 @@ pub fn data(per_m: u8) -> Result<Vec<Row>, Trouble> {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(FINENESS)?;
     let mut lines = Vec::new();
     for (index, (tx_w, (x_m, y_m))) in CHOICES.into_iter().enumerate() {
@@ -112,7 +112,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     }
     Ok(Sheet {
         name: "locus",
-        title: "Where both hops of a single relay have the same SIR",
+        title: "Positions at which both hops of a single relay have the same SIR",
         says: vec![
             "More power at Tx shifts the locus toward Rx; an interferer nearer to the line shifts \
              it down: both as the paper says."

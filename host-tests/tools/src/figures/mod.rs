@@ -25,6 +25,7 @@ pub mod chart;
 pub mod convergence;
 pub mod cost;
 pub mod draw;
+pub mod error;
 pub mod fewest;
 pub mod flight;
 pub mod gain;
@@ -40,11 +41,10 @@ pub mod single;
 pub mod single_gains;
 pub mod single_sheet;
 pub mod stochastic;
-pub mod trouble;
 pub mod walk;
 
+use error::FigureError;
 use sheet::Sheet;
-use trouble::Trouble;
 
 /// A figure.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ pub struct Figure {
     /// Name on the command line, and of its file without `.svg`.
     pub name: &'static str,
     /// Function that makes the figure.
-    pub make: fn() -> Result<Sheet, Trouble>,
+    pub make: fn() -> Result<Sheet, FigureError>,
 }
 
 /// The figures in the order of the paper, then this project's own.
@@ -75,6 +75,6 @@ pub const ALL: [Figure; 16] = [
     figure("sensing", sensing::sheet),
 ];
 
-const fn figure(name: &'static str, make: fn() -> Result<Sheet, Trouble>) -> Figure {
+const fn figure(name: &'static str, make: fn() -> Result<Sheet, FigureError>) -> Figure {
     Figure { name, make }
 }

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::draw::draw;
+use super::error::FigureError;
 use super::sheet::Sheet;
-use super::trouble::Trouble;
 
 const STYLE: &str = "body{font:16px/1.45 Helvetica,Arial,'DejaVu Sans',sans-serif;color:#222;max-width:62rem;margin:2rem auto;padding:0 1rem}\
 figure{margin:2.5rem 0;break-inside:avoid}img{width:30rem;max-width:100%;height:auto}\
@@ -16,8 +16,8 @@ th,td{border-bottom:1px solid #ccc;padding:.15rem .7rem .15rem 0;text-align:righ
 /// Writes a figure's picture and tables to `dir`.
 ///
 /// # Errors
-/// [`Trouble::Drawing`] or [`Trouble::File`].
-pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), Trouble> {
+/// [`FigureError::Drawing`] or [`FigureError::File`].
+pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
     let svg = draw(&sheet.chart, sheet.title)?;
     write(&dir.join(format!("{}.svg", sheet.name)), &svg)?;
     for table in &sheet.tables {
@@ -29,11 +29,11 @@ pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), Trouble> {
 /// Writes `index.html` with these figures to `dir` and returns its path.
 ///
 /// # Errors
-/// [`Trouble::File`].
-pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, Trouble> {
+/// [`FigureError::File`].
+pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, FigureError> {
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>uav-relay: figures</title>\n\
-         <style>{STYLE}</style>\n</head>\n<body>\n<h1>The evaluation, computed by the code that flies</h1>\n\
+         <style>{STYLE}</style>\n</head>\n<body>\n<h1>The evaluation, computed by the on-board code</h1>\n\
          <p>Hosseinalipour, Rahmati and Dai, <em>Interference Avoidance Position Planning in Dual-hop and Multi-hop UAV Relay \
          Networks</em>, section Numerical Results, and what this project adds.</p>\n"
     );
@@ -99,8 +99,8 @@ fn short_table(html: &mut String, rows: &[Vec<String>]) {
     html.push_str("</table>\n");
 }
 
-fn write(file: &Path, text: &str) -> Result<(), Trouble> {
-    std::fs::write(file, text).map_err(|error| Trouble::File(file.display().to_string(), error))
+fn write(file: &Path, text: &str) -> Result<(), FigureError> {
+    std::fs::write(file, text).map_err(|error| FigureError::File(file.display().to_string(), error))
 }
 
 fn escape(words: &str) -> String {

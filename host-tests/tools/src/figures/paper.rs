@@ -2,7 +2,7 @@
 
 use uav_relay::Mission;
 
-use super::trouble::Trouble;
+use super::error::FigureError;
 use uav_relay_scenario::mission;
 use uav_relay_scenario::{Interference, Scenario, Source};
 
@@ -48,15 +48,15 @@ pub fn with_interferer(scenario: Scenario, x_m: f64, y_m: f64) -> Scenario {
 /// Returns the mission of `relays` relays in `scenario`, for a chain computed without messages.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn mission(scenario: &Scenario, relays: u16) -> Result<Mission, Trouble> {
+/// [`FigureError::Mission`].
+pub fn mission(scenario: &Scenario, relays: u16) -> Result<Mission, FigureError> {
     Ok(mission::mission(scenario, relays, FINE)?.0)
 }
 
 /// Returns the mission of `relays` relays in `scenario`, for a simulated chain.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn flown(scenario: &Scenario, relays: u16) -> Result<Mission, Trouble> {
+/// [`FigureError::Mission`].
+pub fn flown(scenario: &Scenario, relays: u16) -> Result<Mission, FigureError> {
     Ok(mission::mission(scenario, relays, FLOWN)?.0)
 }

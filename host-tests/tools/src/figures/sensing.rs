@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
-use crate::listening::followed::{self, mean};
 use crate::listening::found::{self, LAST, hypothetical, quantile, shadowed, shares, unknown};
-use crate::listening::wild::Wild;
+use crate::listening::moving::{self, mean};
+use crate::listening::scene::RandomScene;
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Random scenes per line.
@@ -46,23 +46,23 @@ pub struct Followed {
     pub stayed_linear: f64,
 }
 
-type Run = fn(&Wild) -> Result<Setup, Trouble>;
+type Run = fn(&RandomScene) -> Result<Setup, FigureError>;
 
 /// Kinds of scene: name, relays, sources, setup.
 const KINDS: [(&str, u16, usize, Run); 6] = [
     ("3 relays, one source", 3, 1, unknown),
     ("8 relays, one source", 8, 1, unknown),
     ("20 relays, one source", 20, 1, unknown),
-    ("8 relays, places 1 dB off", 8, 1, shadowed),
+    ("8 relays, 1 dB position errors", 8, 1, shadowed),
     ("8 relays, two sources", 8, 2, unknown),
-    ("8, two sources, told the paper's", 8, 2, hypothetical),
+    ("8, two sources, hypothetical one", 8, 2, hypothetical),
 ];
 
 /// Returns the share by agreement, in `scenes` scenes each.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, Trouble> {
+/// [`FigureError`].
+pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
         let each: found::Shares = shares(scenes, relays, sources, run)?;
@@ -82,12 +82,12 @@ pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, Trouble> {
 /// Returns the share by speed, in `scenes` scenes each.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, Trouble> {
+/// [`FigureError`].
+pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {
         for speed_mps in SPEEDS_MPS {
-            let shares = followed::shares(scenes, relays, speed_mps)?;
+            let shares = moving::shares(scenes, relays, speed_mps)?;
             rows.push(Followed {
                 relays,
                 speed_mps,
@@ -102,8 +102,8 @@ pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, Trouble> {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {
         let of = found.iter().filter(|row| row.scene == *what);
@@ -141,7 +141,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     }
     Ok(Sheet {
         name: "sensing",
-        title: "An interferer that nobody told the chain of: found, and followed",
+        title: "Estimation and tracking of an unknown interferer",
         says: vec![
             "Not in the paper, which takes the interferer as known. The share of the SIR of the chain that was told everything; of two sources, \
              of the exact optimum for their sum, beside the chain that was told the paper's hypothetical interferer."
@@ -159,19 +159,19 @@ pub fn sheet() -> Result<Sheet, Trouble> {
         chart: Chart {
             panels: vec![
                 Panel {
-                    heading: "still sources".to_owned(),
+                    heading: "static sources".to_owned(),
                     #[expect(clippy::cast_precision_loss, reason = "a few")]
-                    x: Axis::linear("agreements that followed what was heard").between(0.0, LAST as f64),
-                    y: Axis::log("short of the optimum"),
+                    x: Axis::linear("agreements after measurements").between(0.0, LAST as f64),
+                    y: Axis::log("shortfall from the optimum"),
                     lines: lines.collect(),
                 },
                 Panel {
                     heading: "an interferer that moves".to_owned(),
-                    x: Axis::linear("its speed, m/s").between(0.0, 10.0),
+                    x: Axis::linear("speed of the interferer, m/s").between(0.0, 10.0),
                     y: Axis::linear("share of the optimum").between(0.5, 1.0),
                     lines: vec![
-                        speeds(3, 0, "3 relays follow", |row| row.followed_linear),
-                        speeds(8, 1, "8 relays follow", |row| row.followed_linear),
+                        speeds(3, 0, "3 relays track it", |row| row.followed_linear),
+                        speeds(8, 1, "8 relays track it", |row| row.followed_linear),
                         speeds(3, 5, "3 relays stay", |row| row.stayed_linear),
                         speeds(8, 6, "8 relays stay", |row| row.stayed_linear),
                     ],

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::chart::Chart;
-use super::trouble::Trouble;
+use super::error::FigureError;
 
 /// A figure.
 #[derive(Clone, PartialEq, Debug)]
@@ -39,22 +39,22 @@ impl Table {
     /// Creates the table of `rows`; the head has the names of their fields.
     ///
     /// # Errors
-    /// [`Trouble::Table`] if a row cannot be serialised, [`Trouble::NotFinite`] if a number is not finite.
+    /// [`FigureError::Table`] if a row cannot be serialised, [`FigureError::NotFinite`] if a number is not finite.
     pub fn new<R: Serialize>(
         name: &'static str,
         rows: impl IntoIterator<Item = R>,
-    ) -> Result<Self, Trouble> {
+    ) -> Result<Self, FigureError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         for row in rows {
             writer.serialize(row)?;
         }
         let bytes = writer
             .into_inner()
-            .map_err(|error| Trouble::File(format!("{name}.csv"), error.into_error()))?;
+            .map_err(|error| FigureError::File(format!("{name}.csv"), error.into_error()))?;
         let rows = String::from_utf8_lossy(&bytes).into_owned();
         let not_finite = |cell: &str| matches!(cell, "NaN" | "inf" | "-inf");
         if rows.split([',', '\n']).any(not_finite) {
-            return Err(Trouble::NotFinite(format!("{name}.csv")));
+            return Err(FigureError::NotFinite(format!("{name}.csv")));
         }
         Ok(Self { name, rows })
     }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::planning::single::theorems;
 
-use super::trouble::Trouble;
+use super::error::FigureError;
 use crate::baseline::random::mean;
 use crate::baseline::{blind, equal};
 use uav_relay_scenario::mission;
@@ -70,8 +70,12 @@ pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
 /// Returns the results for each pair of powers and altitude, against `draws` random positions.
 ///
 /// # Errors
-/// [`Trouble::Unsettled`], which does not occur for powers above 0.
-pub fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError::Unsettled`], which does not occur for powers above 0.
+pub fn data(
+    powers_w: &[(f64, f64)],
+    altitudes_m: &[u32],
+    draws: u32,
+) -> Result<Vec<Row>, FigureError> {
     let choices: Vec<(f64, f64, u32)> = powers_w
         .iter()
         .flat_map(|&(tx, relay)| altitudes_m.iter().map(move |&h| (tx, relay, h)))
@@ -79,7 +83,7 @@ pub fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<
     choices
         .par_iter()
         .map(|&(tx_w, relay_w, altitude_m)| {
-            row(tx_w, relay_w, altitude_m, draws).ok_or(Trouble::Unsettled("a single relay"))
+            row(tx_w, relay_w, altitude_m, draws).ok_or(FigureError::Unsettled("a single relay"))
         })
         .collect()
 }

@@ -5,8 +5,8 @@
 
 use serde::Serialize;
 
+use super::error::FigureError;
 use super::single::{REALISATIONS, Row, data as places};
-use super::trouble::Trouble;
 use uav_relay_sim::report::db;
 
 /// Powers of Tx, W.
@@ -94,7 +94,7 @@ pub fn data(
     relay_w: &[f64],
     altitudes_m: &[u32],
     draws: u32,
-) -> Result<Vec<GainRow>, Trouble> {
+) -> Result<Vec<GainRow>, FigureError> {
     let powers: Vec<(f64, f64)> = tx_w
         .iter()
         .flat_map(|&tx| relay_w.iter().map(move |&relay| (tx, relay)))

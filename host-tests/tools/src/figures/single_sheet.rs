@@ -1,10 +1,10 @@
 //! Figure of one relay, with the table of its average gains.
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
 use super::single::{ALTITUDES_M, REALISATIONS, Row, SEED, data};
 use super::single_gains::{self, RELAY_W, TX_W};
-use super::trouble::Trouble;
 use crate::baseline::random::DRAWS;
 use uav_relay_sim::report::db;
 
@@ -23,7 +23,7 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
         y: Axis::linear("SIR, dB"),
         lines: vec![
             line("Theorem 1", 0, |row| f64::from(row.sir_linear)),
-            line("random place", 1, |row| row.random_sir_linear),
+            line("random position", 1, |row| row.random_sir_linear),
             line("blind to interference", 2, |row| row.blind_sir_linear),
         ],
     }
@@ -32,8 +32,8 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
 /// Returns the figure, with the table of average gains.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let altitudes: Vec<u32> = (ALTITUDES_M.0..=ALTITUDES_M.1).collect();
     let rows = data(&REALISATIONS, &altitudes, DRAWS)?;
     let gains = single_gains::data(&TX_W, &RELAY_W, &altitudes, DRAWS)?;
@@ -41,7 +41,7 @@ pub fn sheet() -> Result<Sheet, Trouble> {
     says.extend(single_gains::findings(&gains));
     Ok(Sheet {
         name: "single",
-        title: "A single relay at its best place, by its altitude",
+        title: "Single relay at its best position, by altitude",
         says,
         taken: vec![
             "D = 35 m, p_MSI = 20 W, interferer at (30, 30) m".to_owned(),

@@ -6,8 +6,8 @@ use serde::Serialize;
 use uav_relay::Mission;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
+use super::error::FigureError;
 use super::sheet::{Sheet, Table};
-use super::trouble::Trouble;
 use super::{convergence, paper, walk};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 
@@ -73,8 +73,8 @@ fn lambda_w(mission: &Mission) -> f64 {
 /// Returns the points of the field.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn field(kind: Kind) -> Result<Vec<PointRow>, Trouble> {
+/// [`FigureError::Mission`].
+pub fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
     // Upsilon = (1 + beta / (alpha - 1)) / I_max is `part` / Lambda.
@@ -97,8 +97,8 @@ pub fn field(kind: Kind) -> Result<Vec<PointRow>, Trouble> {
 /// Returns the mission of `relays` relays in the field.
 ///
 /// # Errors
-/// [`Trouble::Mission`].
-pub fn mission(kind: Kind, relays: u16) -> Result<Mission, Trouble> {
+/// [`FigureError::Mission`].
+pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     let points = field(kind)?;
     let spec = Field {
         i_max_w: points.first().map_or(0.0, |point| point.i_max_w),
@@ -121,13 +121,13 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, Trouble> {
 /// Returns the sweeps of both fields for these numbers of relays, until each chain settles.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
+/// [`FigureError`].
+pub fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
         for &relays in relays {
             for sweep in walk::descent(&mission(field, relays)?, convergence::STEP)? {
-                let chain = sweep.chain.ok_or(Trouble::Unsettled("a sweep"))?;
+                let chain = sweep.chain.ok_or(FigureError::Unsettled("a sweep"))?;
                 rows.push(Row {
                     field,
                     relays,
@@ -142,7 +142,7 @@ pub fn data(relays: &[u16]) -> Result<Vec<Row>, Trouble> {
 }
 
 /// Returns the final SIRs with the paper's step, a tenth of it, and bracketed targets.
-fn shown() -> Result<Vec<Vec<String>>, Trouble> {
+fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]
             .map(str::to_owned)
@@ -151,7 +151,7 @@ fn shown() -> Result<Vec<Vec<String>>, Trouble> {
     for field in [Kind::Uneven, Kind::Even] {
         for relays in RELAYS {
             let mission = mission(field, relays)?;
-            let stepped = |step: f64| -> Result<String, Trouble> {
+            let stepped = |step: f64| -> Result<String, FigureError> {
                 let sweeps = walk::descent(&mission, step)?;
                 let chain = sweeps.last().and_then(|sweep| sweep.chain.as_ref());
                 let sir = chain.map_or(0.0, |chain| chain.sir);
@@ -195,8 +195,8 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
 /// Returns the figure.
 ///
 /// # Errors
-/// Never in practice: see [`Trouble`].
-pub fn sheet() -> Result<Sheet, Trouble> {
+/// Never in practice: see [`FigureError`].
+pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let panel = |heading: &str, field: Kind| Panel {
         heading: heading.to_owned(),

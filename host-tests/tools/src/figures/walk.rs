@@ -7,7 +7,7 @@ use uav_relay::optimiser::plan;
 use uav_relay::optimiser::search::Search;
 use uav_relay::{Heading, Mission, Placement, Profile, Schedule};
 
-use super::trouble::Trouble;
+use super::error::FigureError;
 use uav_relay_sim::report::hop_sirs;
 
 /// Positions of identical relays.
@@ -74,15 +74,15 @@ pub struct Sweep {
 /// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles. `step` is in linear SIR.
 ///
 /// # Errors
-/// [`Trouble::Unsettled`] if no target is met.
-pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
+/// [`FigureError::Unsettled`] if no target is met.
+pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
     let mut sweeps = Vec::new();
     for number in 1.. {
         let ladder = *search.ladder();
         let targets = ladder.targets();
-        let &target = targets.first().ok_or(Trouble::Unsettled("a sweep"))?;
+        let &target = targets.first().ok_or(FigureError::Unsettled("a sweep"))?;
         let chain = stretched(mission, target);
         let last = chain.as_ref().and_then(|chain| match mission.heading() {
             Heading::TowardRx => chain.places.last(),
@@ -118,11 +118,11 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, Trouble> {
 /// Returns the chain that the relays of `mission` agree on by Algorithm 1 (Algorithm 4 in a field).
 ///
 /// # Errors
-/// [`Trouble::Unsettled`] if no target is met.
-pub fn settled(mission: &Mission) -> Result<Chain, Trouble> {
+/// [`FigureError::Unsettled`] if no target is met.
+pub fn settled(mission: &Mission) -> Result<Chain, FigureError> {
     let common = |_| mission.config().common;
     let agreed = plan::solve(mission, Schedule::Bracketed, common)?;
-    stretched(mission, agreed.target).ok_or(Trouble::Unsettled("a chain"))
+    stretched(mission, agreed.target).ok_or(FigureError::Unsettled("a chain"))
 }
 
 /// Returns the SIR of the worst hop of identical relays at `places`, linear; 0 if empty.

@@ -5,8 +5,8 @@ use uav_relay::Interference;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::setup::Setup;
 
-use super::wild::{Wild, by_agreement};
-use crate::figures::trouble::Trouble;
+use super::scene::{RandomScene, by_agreement};
+use crate::figures::error::FigureError;
 
 /// Last agreement that is reported.
 pub const LAST: usize = 8;
@@ -17,25 +17,25 @@ pub type Shares = [Vec<f64>; LAST + 1];
 /// Returns the shares in `scenes` random scenes, each run with `setup`.
 ///
 /// # Errors
-/// [`Trouble`].
+/// [`FigureError`].
 pub fn shares(
     scenes: u64,
     relays: u16,
     sources: usize,
-    setup: impl Fn(&Wild) -> Result<Setup, Trouble> + Sync,
-) -> Result<Shares, Trouble> {
+    setup: impl Fn(&RandomScene) -> Result<Setup, FigureError> + Sync,
+) -> Result<Shares, FigureError> {
     let one = |seed| {
-        let wild = Wild::new(seed, relays, sources);
+        let wild = RandomScene::new(seed, relays, sources);
         let outcome = run(setup(&wild)?)?;
         let best = wild.optimum()?;
         let sirs = by_agreement(&wild.scene()?, &outcome.stands);
         let last = *sirs
             .last()
-            .ok_or(Trouble::Unsettled("a chain that listens"))?;
+            .ok_or(FigureError::Unsettled("a chain that listens"))?;
         let share = |at: usize| sirs.get(at).unwrap_or(&last) / best;
         Ok((0..=LAST).map(share).collect())
     };
-    let each: Result<Vec<Vec<f64>>, Trouble> = (0..scenes).into_par_iter().map(one).collect();
+    let each: Result<Vec<Vec<f64>>, FigureError> = (0..scenes).into_par_iter().map(one).collect();
     let each = each?;
     Ok(std::array::from_fn(|at| {
         each.iter().filter_map(|one| one.get(at).copied()).collect()
@@ -45,16 +45,16 @@ pub fn shares(
 /// Setup without prior knowledge of the interference.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn unknown(wild: &Wild) -> Result<Setup, Trouble> {
+/// [`FigureError`].
+pub fn unknown(wild: &RandomScene) -> Result<Setup, FigureError> {
     wild.setup(Interference::Unknown)
 }
 
 /// The setup of [`unknown`] with 1 dB of shadowing, independent at each position.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn shadowed(wild: &Wild) -> Result<Setup, Trouble> {
+/// [`FigureError`].
+pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     if let Some(sky) = &mut setup.sky {
         sky.shadow_db = 1.0;
@@ -65,8 +65,8 @@ pub fn shadowed(wild: &Wild) -> Result<Setup, Trouble> {
 /// Setup without measurements. The relays know the interferer, or the paper's hypothetical one for several sources.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn hypothetical(wild: &Wild) -> Result<Setup, Trouble> {
+/// [`FigureError`].
+pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     (setup.mission, _) = uav_relay_scenario::mission::mission(&wild.scenario, wild.relays, 1e-4)?;
     setup.settings.listen = None;

@@ -6,6 +6,6 @@
 //! | [`found`] | static sources: share of the optimum after each agreement |
 //! | [`followed`] | a moving source: mean share of the optimum over time |
 
-pub mod followed;
 pub mod found;
-pub mod wild;
+pub mod moving;
+pub mod scene;

@@ -11,8 +11,8 @@ use uav_relay::optimiser::spacing::Stand;
 use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
-use super::briefed::Briefed;
 use super::found::{NoPlan, Plan, Why};
+use super::profiles::ProfiledMission;
 use super::source;
 use uav_relay_scenario::Scenario;
 
@@ -20,7 +20,7 @@ type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as u
 
 /// Returns the best positions of `relays` relays with free altitudes and sides, by the joint method.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
-    let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     match joint(&briefed) {
         Some(places) => Ok(briefed.plan(&places, "the joint method", false)),
         // The relays do the same: they stay at their own altitudes.
@@ -29,7 +29,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
 }
 
 /// Returns the joint method's positions; `None` if it finds none.
-fn joint(briefed: &Briefed) -> Option<Vec<Placement>> {
+fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
     solved(mission, |index| {
         let holds = briefed.held.contains(&index);

@@ -3,7 +3,8 @@
 use uav_relay::planning::single::{aside, theorems};
 
 /// Explanation for an interferer at Rx.
-const DROWNED: &str = "the interferer stands at Rx, where nothing is heard wherever the drone is";
+const DROWNED: &str =
+    "the interferer stands at Rx, where no signal is received wherever the drone is";
 
 /// Explanation for an interferer at Tx.
 const LEVEL: &str = "the drone goes right above Rx: the interferer stands at Tx, so the first hop is the same everywhere, and the \
@@ -20,7 +21,7 @@ pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
             "the drone goes where both hops are equally good: nearer to Tx the second would be worse, nearer to Rx the first"
         }
         PlaceCase::AboveRx => {
-            "the drone goes right above Rx: its first hop is the better one even there, and only the second needs help"
+            "the drone goes right above Rx: its first hop is the better one even there, and only the second has to improve"
         }
         PlaceCase::BeforeValley => {
             "the drone goes to where both hops are equally good, before the interference is worst, or past it all to right above Rx, \

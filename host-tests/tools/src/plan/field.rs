@@ -5,13 +5,13 @@
 use uav_relay::planning::fleet;
 use uav_relay::planning::single::without_interferer;
 
-use super::ask::{Ask, Number};
-use super::briefed::{Briefed, is_free};
 use super::found::{NoPlan, Plan};
+use super::profiles::{ProfiledMission, is_free};
+use super::request::{Number, PlanRequest};
 use super::source::{fewest, nothing, placed, solved};
 use uav_relay_scenario::Scenario;
 
-pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     let scenario = if ask.free_altitude {
         &Scenario {
             altitude_m: scenario.altitude_min_m,
@@ -35,7 +35,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
 
 /// Returns the best positions of `relays` relays.
 fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
-    let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);
     if relays == 1 {
         let found =
@@ -51,7 +51,7 @@ fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan
     let target = fleet::best_of_equals(&briefed.mission, profile).ok_or_else(nothing)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
     let proven = is_free(scenario, |free| {
-        let free = Briefed::new(free, relays, tolerance).ok()?;
+        let free = ProfiledMission::new(free, relays, tolerance).ok()?;
         let most = fleet::best_of_equals(&free.mission, profile)?;
         Some(f64::from(most) <= f64::from(target) * (1.0 + tolerance))
     });

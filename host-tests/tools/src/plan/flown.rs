@@ -6,9 +6,9 @@
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, mission};
 
-use super::ask::{Ask, Number};
 use super::found::{LOSS, NoPlan, Plan};
-use super::several::with_one;
+use super::multi_interferer::with_one;
+use super::request::{Number, PlanRequest};
 use super::{altitude, source};
 
 /// A chain as the relays settle by themselves.
@@ -38,8 +38,8 @@ impl Flown {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
             (
-                "one interferer stands for all on board",
-                "have them find their own and fly that in simulation (`cargo chain --listen`, [listen]), or plan other altitudes or more \
+                "on board one hypothetical interferer replaces all",
+                "let the relays estimate the interferer, and simulate that (`cargo chain --listen`, [listen]), or plan other altitudes or more \
                  relays against the true sum (`cargo plan`)",
             )
         } else {
@@ -49,7 +49,7 @@ impl Flown {
             )
         };
         format!(
-            "relays by themselves reach {reach:.2} dB of {best:.2} dB, {:.1} % less than the best places: {why}; {remedy}",
+            "the relays reach {reach:.2} dB of {best:.2} dB, {:.1} % less than the best positions: {why}; {remedy}",
             100.0 * self.loss()
         )
     }
@@ -68,7 +68,7 @@ pub fn flown(
     tolerance: f64,
 ) -> Result<Flown, NoPlan> {
     let plan = alone(scenario, relays, method, tolerance)?;
-    let ask = Ask {
+    let ask = PlanRequest {
         number: Number::Of(relays),
         free_altitude: method == PlannedMethod::Joint,
         x_m: None,

@@ -10,27 +10,27 @@
 //! optimal.
 
 mod altitude;
-mod ask;
-mod briefed;
-pub mod carried;
 mod cases;
 mod field;
 pub mod flown;
 mod found;
 pub mod map;
+mod multi_interferer;
 pub mod noise;
 mod one;
+mod profiles;
 pub mod rate;
 pub mod report;
-mod several;
+mod request;
 mod source;
+pub mod stored_plan;
 mod unit;
 
 use uav_relay_scenario::{Interference, Scenario};
 
 pub use altitude::solved;
-pub use ask::{Ask, Number};
 pub use found::{Fitted, LOSS, NoPlan, Plan, Theorem, Why};
+pub use request::{Number, PlanRequest};
 pub use unit::Unit;
 
 /// Plans `ask` in `scenario`.
@@ -39,17 +39,19 @@ pub use unit::Unit;
 ///
 /// # Errors
 /// [`NoPlan`]: an invalid request, or the best SIR that can be had.
-pub fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     match &scenario.interference {
         Interference::Field(_) => field::plan(scenario, ask),
-        Interference::Sources(sources) if sources.len() > 1 => several::plan(scenario, ask),
+        Interference::Sources(sources) if sources.len() > 1 => {
+            multi_interferer::plan(scenario, ask)
+        }
         Interference::Sources(_) => one::plan(scenario, ask),
     }
 }
 
 /// Checks that the options of the request are compatible.
-fn check(scenario: &Scenario, ask: &Ask) -> Result<(), NoPlan> {
+fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     let Some(x_m) = ask.x_m else { return Ok(()) };
     let d = scenario.distance_m;
     let wrong = if !(0.0..=d).contains(&x_m) {

@@ -2,11 +2,11 @@
 
 use uav_relay_scenario::Scenario;
 
-use super::ask::{Ask, Number};
 use super::found::{NoPlan, Plan};
+use super::request::{Number, PlanRequest};
 use super::{altitude, source};
 
-pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     match ask.number {
         Number::Of(1) => source::alone(scenario, ask),
         Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),

@@ -7,8 +7,8 @@
 use serde::Serialize;
 use uav_relay_scenario::{Interference, Scenario};
 
-use super::ask::{Ask, Number};
 use super::found::{NoPlan, Plan};
+use super::request::{Number, PlanRequest};
 
 /// Largest number of relays tried where a plan takes milliseconds.
 const MOST_FAST: u16 = 200;
@@ -67,7 +67,7 @@ impl Rates {
     /// [`NoPlan`] if no number of relays has a plan.
     pub fn new(
         scenario: &Scenario,
-        ask: &Ask,
+        ask: &PlanRequest,
         bandwidth_hz: f64,
         target_bps: Option<f64>,
     ) -> Result<Self, NoPlan> {
@@ -83,7 +83,7 @@ impl Rates {
                     break;
                 }
             }
-            let one = Ask {
+            let one = PlanRequest {
                 number: Number::Of(relays),
                 ..*ask
             };
@@ -122,7 +122,7 @@ impl Rates {
 }
 
 /// Returns the largest number of relays to try.
-fn most_tried(scenario: &Scenario, ask: &Ask) -> u16 {
+fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     let is_several =
         matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
     if ask.x_m.is_some() {

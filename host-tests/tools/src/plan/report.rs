@@ -7,10 +7,10 @@ use serde::Serialize;
 use uav_relay_scenario::Noise;
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
-use super::ask::Number;
 use super::found::{Plan, Why};
 use super::noise::NoiseReport;
 use super::rate::{self, BestRate};
+use super::request::Number;
 use super::unit::Unit;
 
 /// The hypothetical interferer that replaces several.
@@ -358,8 +358,7 @@ impl HypotheticalReport {
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its places are not good enough: {} against all interferers; these are the best found against all{gain}. Relays by \
-                 themselves fly the first: `cargo provision` refuses them, and `cargo chain --listen` has relays find their own",
+                "its places are not good enough: {} against all interferers; these are the best found against all{gain}. Relays fly the positions for the hypothetical one: `cargo provision` refuses them, and `cargo chain --listen` has relays find their own",
                 unit.both(sir)
             ),
             (false, None) => writeln!(

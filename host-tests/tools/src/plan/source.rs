@@ -5,10 +5,10 @@ use uav_relay::planning::fleet::{Fewest, Most};
 use uav_relay::planning::single::{Found, aside, theorems};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 
-use super::ask::Ask;
-use super::briefed::{Briefed, is_free};
 use super::cases::{along_x, anywhere_above, sideways, upward};
 use super::found::{NoPlan, Plan, Theorem, Why};
+use super::profiles::{ProfiledMission, is_free};
+use super::request::PlanRequest;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 
@@ -23,8 +23,8 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
 }
 
 /// Returns the best position of one relay, by a theorem or beside the line. With a fixed altitude it stays above the line.
-pub(super) fn alone(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
-    let briefed = Briefed::new(scenario, 1, ask.tolerance)?;
+pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
+    let briefed = ProfiledMission::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
     let mission = if briefed.held.is_empty() {
         briefed.mission
@@ -122,19 +122,19 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
 
 /// Returns the best positions of relays at their own altitudes: Algorithm 1 without messages.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
-    let briefed = Briefed::new(scenario, relays, tolerance)?;
+    let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
     let proven = briefed.level()
         && is_free(scenario, |free| {
-            let most = solved(&Briefed::new(free, relays, tolerance).ok()?).ok()?;
+            let most = solved(&ProfiledMission::new(free, relays, tolerance).ok()?).ok()?;
             Some(f64::from(most) <= f64::from(target) * (1.0 + 2.0 * tolerance))
         });
     Ok(briefed.plan(&places, "Algorithm 1", proven))
 }
 
 /// Returns the target that the relays would agree on.
-pub(super) fn solved(briefed: &Briefed) -> Result<f32, NoPlan> {
+pub(super) fn solved(briefed: &ProfiledMission) -> Result<f32, NoPlan> {
     silent::solve(&briefed.mission, Schedule::Bracketed, |index| {
         briefed.profile(index)
     })
@@ -143,7 +143,7 @@ pub(super) fn solved(briefed: &Briefed) -> Result<f32, NoPlan> {
 }
 
 /// Returns the relays' positions for a target.
-pub(super) fn placed(briefed: &Briefed, target: f32) -> Option<Vec<Placement>> {
+pub(super) fn placed(briefed: &ProfiledMission, target: f32) -> Option<Vec<Placement>> {
     let mut places = vec![Placement::default(); usize::from(briefed.mission.relays())];
     let profile_of = |index| briefed.profile(index);
     briefed
@@ -169,16 +169,16 @@ pub(super) fn enough(
     scenario: &Scenario,
     target: f64,
     tolerance: f64,
-) -> Result<(Briefed, bool), NoPlan> {
+) -> Result<(ProfiledMission, bool), NoPlan> {
     // The number is not known yet: profiles of relays beyond it are ignored later.
-    let alone = Briefed::new(scenario, 1, tolerance)?;
-    let own = Briefed {
+    let alone = ProfiledMission::new(scenario, 1, tolerance)?;
+    let own = ProfiledMission {
         own: own_profiles(scenario, &alone.mission),
         ..alone
     };
     let profile_of = |index| own.profile(index);
     if let Some(found) = Fewest::of(&own.mission, narrow(target), profile_of) {
-        let briefed = Briefed::new(scenario, found.relays, tolerance)?;
+        let briefed = ProfiledMission::new(scenario, found.relays, tolerance)?;
         return Ok((briefed, found.proven));
     }
     let most = Most::of(&own.mission, profile_of).ok_or_else(nothing)?;

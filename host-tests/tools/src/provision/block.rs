@@ -65,13 +65,15 @@ impl fmt::Display for BlockError {
             Self::Course(CourseError::Distance(along)) => {
                 write!(
                     f,
-                    "the sites are {along:.3} m apart, and the mission's distance is another"
+                    "the sites are {along:.3} m apart, but the mission's distance differs"
                 )
             }
             Self::Course(error) => error.fmt(f),
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
-            Self::Config(_) | Self::Changed => f.write_str("the block does not say the mission"),
+            Self::Config(_) | Self::Changed => {
+                f.write_str("the block does not reproduce the mission")
+            }
         }
     }
 }

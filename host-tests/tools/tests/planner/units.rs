@@ -18,7 +18,7 @@ fn what_is_asked_in_decibels_is_answered_in_decibels() {
         "--target-sir-db",
         "60",
         "--scenario",
-        &example("several.toml"),
+        &example("multi_interferer.toml"),
     ]);
     assert!(
         line.contains("an SIR of 60 dB: the most found is ") && line.contains(" dB"),

@@ -143,7 +143,7 @@ fn a_plan_goes_to_every_drone() {
     // Existing blocks stay without --force; with it nothing of a larger flight remains.
     let again = refusal(&words);
     assert!(
-        again.contains("relay1.bin is there already; --force"),
+        again.contains("relay1.bin exists already; --force"),
         "{again}"
     );
     let small = folder.path().join("small.toml");
@@ -289,7 +289,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
 fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let folder = tempfile::tempdir().unwrap();
     let [out, dir] = ["block.bin", "blocks"].map(|name| text(&folder.path().join(name)));
-    let several = text(&example().with_file_name("several.toml"));
+    let several = text(&example().with_file_name("multi_interferer.toml"));
     let report = planned(&["--scenario", &several, "--uavs", "8", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let loss = report["hypothetical"]["loss"].as_f64().unwrap();

@@ -197,17 +197,17 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     assert!(!said.contains("--method"), "{said}");
     let (method, said) = written(&joint, &["--method", "align"]);
     assert_eq!(method, Method::Align);
-    let line = "--method align counts, and not network.method = \"joint\" of ";
+    let line = "--method align replaces network.method = \"joint\" of ";
     assert!(said.starts_with(line), "{said}");
     let others = network("id = 9\nrelays = 7\nprobe_after_ms = 5000\ndead_after_ms = 15000");
     let (_, said) = written(&others, &["--network", "3"]);
     let lines: Vec<&str> = said.lines().collect();
     assert!(
-        lines[0].starts_with("--network 3 counts, and not network.id = 9 of "),
+        lines[0].starts_with("--network 3 replaces network.id = 9 of "),
         "{said}"
     );
     assert!(
-        lines[1].starts_with("--uavs 5 counts, and not network.relays = 7 of "),
+        lines[1].starts_with("--uavs 5 replaces network.relays = 7 of "),
         "{said}"
     );
     let (_, said) = written(&network("id = 9\nrelays = 5"), &["--network", "9"]);

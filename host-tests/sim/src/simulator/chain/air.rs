@@ -4,7 +4,7 @@ use uav_relay::{Instant, Port};
 
 use super::super::attack::Recorded;
 use super::super::faults::Faults;
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::receiver::Receiver;
 use super::recorded::link;
 use super::state::Chain;
@@ -87,8 +87,8 @@ impl Chain {
                 let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
                 let bytes = arrival.bytes;
                 let (at, happening) = match receiver {
-                    Receiver::Relay(at) => (at, Happening::Bytes { port: into, bytes }),
-                    Receiver::Ground(at) => (at, Happening::Heard { bytes }),
+                    Receiver::Relay(at) => (at, QueuedEvent::Bytes { port: into, bytes }),
+                    Receiver::Ground(at) => (at, QueuedEvent::Heard { bytes }),
                 };
                 self.queue.put(arrives + late, at, happening);
             }

@@ -14,7 +14,7 @@ use super::super::link::Line;
 use super::super::medium::{Access, AirCounts, Medium};
 use super::super::optima::Run;
 use super::super::outcome::{Ending, Outcome};
-use super::super::queue::{Happening, Queue};
+use super::super::queue::{Queue, QueuedEvent};
 use super::super::record::Record;
 use super::super::setup::Setup;
 use super::fleet::LANDS_AFTER;
@@ -37,13 +37,13 @@ impl Chain {
             Medium::new(setup.access, setup.link, nodes, setup.seed)
         });
         for &(index, at) in &setup.kills {
-            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Kill);
+            queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Kill);
         }
         for &(index, at) in &setup.boots {
-            queue.put(at, usize::from(index.saturating_sub(1)), Happening::Boot);
+            queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Boot);
         }
         for (which, spec) in setup.uploads.iter().enumerate() {
-            queue.put(spec.at, which, Happening::Upload);
+            queue.put(spec.at, which, QueuedEvent::Upload);
         }
         let mut ahead = put_fleet(&setup, &mut queue)
             + setup.kills.len()
@@ -53,7 +53,7 @@ impl Chain {
         let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
         for (from, until) in parts.chain(deaf) {
             for at in [Some(from), until].into_iter().flatten() {
-                queue.put(at, 0, Happening::Part);
+                queue.put(at, 0, QueuedEvent::Part);
                 ahead += 1;
             }
         }
@@ -110,7 +110,7 @@ impl Chain {
         }
         if let Some(sky) = &chain.setup.sky {
             let first = Instant::ZERO + sky.period;
-            chain.queue.put(first, 0, Happening::Listen);
+            chain.queue.put(first, 0, QueuedEvent::Listen);
         }
         chain.expect_an_attack();
         chain.take_off();
@@ -161,12 +161,16 @@ fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
         queue.put(at, usize::from(relay.saturating_sub(1)), happening);
     };
     for &(relay, at) in &fleet.restarts {
-        put(at, relay, Happening::Restart);
+        put(at, relay, QueuedEvent::Restart);
     }
     // A pilot who keeps the drone lands it; its relay is switched off.
     let kept = fleet.takeovers.iter().filter(|it| it.until.is_none());
     for takeover in kept.clone() {
-        put(takeover.from + LANDS_AFTER, takeover.relay, Happening::Kill);
+        put(
+            takeover.from + LANDS_AFTER,
+            takeover.relay,
+            QueuedEvent::Kill,
+        );
     }
     fleet.restarts.len() + kept.count()
 }

@@ -3,7 +3,7 @@
 use uav_relay::Port;
 
 use super::super::medium::{Agenda, AirEvent, Sent};
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::super::record::Link;
 use super::receiver::Receiver;
 use super::state::Chain;
@@ -38,7 +38,7 @@ impl Chain {
 
     fn expect(&mut self, agenda: Agenda) {
         for (at, event) in agenda {
-            self.queue.put(at, 0, Happening::Air(event));
+            self.queue.put(at, 0, QueuedEvent::Air(event));
         }
     }
 

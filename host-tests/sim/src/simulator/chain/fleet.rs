@@ -8,7 +8,7 @@ use uav_relay::{Duration, Instant, Side};
 use super::super::drones::{Nearest, Point, apart};
 use super::super::fleet::Vehicle;
 use super::super::outcome::TimelineEvent;
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::state::Chain;
 
 /// Time step of the flight.
@@ -34,7 +34,7 @@ impl Chain {
             self.fleet = all
                 .map(|index| Vehicle::new(spec, index, self.setup.seed))
                 .collect();
-            self.queue.put(Instant::ZERO, 0, Happening::Fly);
+            self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
         }
     }
 
@@ -61,7 +61,7 @@ impl Chain {
         if self.now.as_micros().is_multiple_of(LOOKS.as_micros()) {
             self.look_around();
         }
-        self.queue.put(self.now + STEP, 0, Happening::Fly);
+        self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
 
     /// Updates the smallest separation margin from all pairs of drones.

@@ -3,7 +3,7 @@
 use uav_relay::Instant;
 
 use super::super::drones::{Flight, Nearest, apart, placement, point};
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::state::Chain;
 
 impl Chain {
@@ -11,7 +11,7 @@ impl Chain {
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));
-            self.queue.put(Instant::ZERO, 0, Happening::Fly);
+            self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
         }
         self.line_up();
     }
@@ -48,7 +48,7 @@ impl Chain {
             }
         }
         self.keep(flight.nearest(now));
-        self.queue.put(now + flight.step, 0, Happening::Fly);
+        self.queue.put(now + flight.step, 0, QueuedEvent::Fly);
         self.flight = Some(flight);
     }
 

@@ -6,9 +6,9 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
 use super::super::outcome::{Moment, TimelineEvent};
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::super::record::Link;
-use super::super::sky::Sky;
+use super::super::true_interference::TrueInterference;
 use super::receiver::Receiver;
 use super::state::Chain;
 
@@ -53,7 +53,7 @@ impl Chain {
     }
 
     /// Measures the interference at every station and sends the results.
-    pub(super) fn measure_at_ends(&mut self, sky: &Sky, scene: &Scene) {
+    pub(super) fn measure_at_ends(&mut self, sky: &TrueInterference, scene: &Scene) {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
                 let power_w = match station.end {
@@ -112,7 +112,7 @@ impl Chain {
         {
             assert!(again > now, "the ground would spin");
             station.wake = Some(again);
-            self.queue.put(again, at, Happening::Ask);
+            self.queue.put(again, at, QueuedEvent::Ask);
         }
     }
 

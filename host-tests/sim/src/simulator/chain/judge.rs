@@ -3,7 +3,7 @@
 use super::super::flying::Seen;
 use super::super::longest::longest;
 use super::super::optima::Run;
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::super::watch::Watch;
 use super::state::{Chain, Member};
 
@@ -18,10 +18,10 @@ pub(super) enum Touched {
 }
 
 impl Touched {
-    pub(super) fn by(happening: &Happening, index: usize) -> Self {
+    pub(super) fn by(happening: &QueuedEvent, index: usize) -> Self {
         match happening {
-            Happening::Bytes { .. } | Happening::Wake => Self::One(index),
-            Happening::Air(_) | Happening::Ask | Happening::Heard { .. } => Self::Nobody,
+            QueuedEvent::Bytes { .. } | QueuedEvent::Wake => Self::One(index),
+            QueuedEvent::Air(_) | QueuedEvent::Ask | QueuedEvent::Heard { .. } => Self::Nobody,
             _ => Self::All,
         }
     }

@@ -5,8 +5,8 @@ use uav_relay::{Instant, Phase, Placement, Sample};
 
 use super::super::drones::{Drone, placement};
 use super::super::fleet::Vehicle;
-use super::super::queue::Happening;
-use super::super::sky::Stand;
+use super::super::queue::QueuedEvent;
+use super::super::true_interference::Stand;
 use super::state::Chain;
 
 impl Chain {
@@ -77,7 +77,7 @@ impl Chain {
         }
         self.stand(nodes, places);
         if now < sky.until {
-            self.queue.put(now + sky.period, 0, Happening::Listen);
+            self.queue.put(now + sky.period, 0, QueuedEvent::Listen);
         } else {
             self.listened = true;
         }

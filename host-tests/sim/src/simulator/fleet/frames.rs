@@ -8,7 +8,7 @@ const SYSTEM: u8 = 1;
 
 /// Message sent by the autopilot.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Says {
+pub(super) enum SensorReading {
     Heartbeat {
         autopilot: u8,
         armed: bool,
@@ -32,7 +32,7 @@ pub(super) enum Says {
     },
 }
 
-impl Says {
+impl SensorReading {
     pub(super) fn frame(self, sequence: u8) -> Vec<u8> {
         let mut payload = Vec::new();
         let id = match self {

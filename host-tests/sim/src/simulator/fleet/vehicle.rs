@@ -8,7 +8,7 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::frame::id;
 use uav_relay::{Duration, Instant, Placement, Sites};
 
-use super::frames::{Heard, Says, heard};
+use super::frames::{Heard, SensorReading, heard};
 use super::pilot::{Mode, Pilot};
 use super::spec::FleetSpec;
 use crate::simulator::drones::{Body, Point, placement, point, sum};
@@ -337,9 +337,9 @@ impl Vehicle {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "wraps after 49 days")]
-    fn says(&mut self, now: Instant, id: u32) -> Option<Says> {
+    fn says(&mut self, now: Instant, id: u32) -> Option<SensorReading> {
         match id {
-            id::HEARTBEAT => Some(Says::Heartbeat {
+            id::HEARTBEAT => Some(SensorReading::Heartbeat {
                 autopilot: match self.kind {
                     Kind::Px4 => 12,
                     Kind::ArduCopter => 3,
@@ -355,20 +355,20 @@ impl Vehicle {
                 },
                 is_critical: self.is_failing,
             }),
-            id::EXTENDED_SYS_STATE => Some(Says::State {
+            id::EXTENDED_SYS_STATE => Some(SensorReading::State {
                 landed: self.landed,
             }),
             id::GLOBAL_POSITION_INT => {
                 let taken = self.taken();
                 let noise = self.spec.noise_m;
                 let said = taken.map(|part| part + noise * self.rng.random_range(-1.0..=1.0));
-                Some(Says::Position {
+                Some(SensorReading::Position {
                     boot_ms: (now.since(self.began).as_micros() / 1_000) as u32,
                     at: self.spec.axis.point(placement(said))?,
                 })
             }
             _ if self.kind == Kind::ArduCopter && self.mode == Mode::Companion => {
-                Some(Says::Target {
+                Some(SensorReading::Target {
                     at: self.spec.axis.point(placement(self.goal))?,
                 })
             }
@@ -400,7 +400,7 @@ impl Vehicle {
             }
             Some(Heard::Sync(asked)) => {
                 self.sequence = self.sequence.wrapping_add(1);
-                let answer = Says::Sync { asked }.frame(self.sequence);
+                let answer = SensorReading::Sync { asked }.frame(self.sequence);
                 self.link.handle_bytes(now, &answer);
             }
             None => {}

@@ -45,7 +45,7 @@ pub struct Sent {
 
 /// Reception of a frame at one node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Fate {
+enum Reception {
     Clean,
     Collided,
     /// Lost because the node itself was sending.
@@ -57,7 +57,7 @@ struct OnAir {
     from: usize,
     frame: Vec<u8>,
     ends: Instant,
-    hearers: Vec<(usize, Fate)>,
+    hearers: Vec<(usize, Reception)>,
 }
 
 /// Channel with a radio for every node.
@@ -142,7 +142,7 @@ impl Medium {
         }
         for frame in self.on_air.iter_mut().filter(|frame| frame.from == node) {
             for (_, fate) in &mut frame.hearers {
-                *fate = Fate::Unheard;
+                *fate = Reception::Unheard;
             }
         }
     }
@@ -198,7 +198,7 @@ impl Medium {
             agenda.push((until, AirEvent::Begin(node)));
         }
         for frame in &mut self.on_air {
-            frame.spoil(node, now, Fate::Unheard);
+            frame.spoil(node, now, Reception::Unheard);
         }
     }
 
@@ -220,15 +220,15 @@ impl Medium {
         radio.state = State::Sending;
         let mut heard = Vec::new();
         for by in hearers(node) {
-            let mut fate = Fate::Clean;
+            let mut fate = Reception::Clean;
             for other in &mut self.on_air {
                 if other.is_heard(by, now) {
-                    other.spoil(by, now, Fate::Collided);
-                    fate = Fate::Collided;
+                    other.spoil(by, now, Reception::Collided);
+                    fate = Reception::Collided;
                 }
             }
             if self.radios.get(by).is_some_and(Radio::is_deaf) {
-                fate = Fate::Unheard;
+                fate = Reception::Unheard;
             }
             heard.push((by, fate));
         }
@@ -250,11 +250,14 @@ impl Medium {
             .position(|frame| frame.from == node && frame.ends == now)?;
         let over = self.on_air.swap_remove(at);
         let count = |fate| over.hearers.iter().filter(|(_, it)| *it == fate).count();
-        let (collided, unheard) = (count(Fate::Collided), count(Fate::Unheard));
+        let (collided, unheard) = (count(Reception::Collided), count(Reception::Unheard));
         self.counts.collided += collided as u64;
         self.counts.unheard += unheard as u64;
         self.next(now, node, agenda);
-        let clean = over.hearers.iter().filter(|(_, fate)| *fate == Fate::Clean);
+        let clean = over
+            .hearers
+            .iter()
+            .filter(|(_, fate)| *fate == Reception::Clean);
         Some(Sent {
             from: node,
             frame: over.frame,
@@ -271,12 +274,12 @@ impl OnAir {
     }
 
     /// Marks the frame as lost at `node`, unless it already was.
-    fn spoil(&mut self, node: usize, now: Instant, how: Fate) {
+    fn spoil(&mut self, node: usize, now: Instant, how: Reception) {
         if self.ends <= now {
             return;
         }
         for (by, fate) in &mut self.hearers {
-            if *by == node && *fate == Fate::Clean {
+            if *by == node && *fate == Reception::Clean {
                 *fate = how;
             }
         }

@@ -11,9 +11,9 @@ use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use uav_relay_sim::command::{self, Failure};
+use uav_relay_tools::figures::error::FigureError;
 use uav_relay_tools::figures::page::{write_index, write_sheet};
 use uav_relay_tools::figures::sheet::Sheet;
-use uav_relay_tools::figures::trouble::Trouble;
 use uav_relay_tools::figures::{ALL, Figure};
 
 use options::Options;
@@ -25,25 +25,25 @@ fn main() -> ExitCode {
     }
 }
 
-fn failure(trouble: &Trouble) -> Failure {
+fn failure(trouble: &FigureError) -> Failure {
     let line = trouble.to_string();
     match trouble {
-        Trouble::File(..) => Failure::input(line),
+        FigureError::File(..) => Failure::input(line),
         _ => Failure::unmet(line),
     }
 }
 
-fn run(options: &Options) -> Result<(), Trouble> {
+fn run(options: &Options) -> Result<(), FigureError> {
     let started = Instant::now();
     let dir = &options.out;
     std::fs::create_dir_all(dir)
-        .map_err(|error| Trouble::File(format!("--out {}", dir.display()), error))?;
+        .map_err(|error| FigureError::File(format!("--out {}", dir.display()), error))?;
     let asked = |figure: &&Figure| {
         options.only.is_empty() || options.only.iter().any(|name| name == figure.name)
     };
     let chosen: Vec<&Figure> = ALL.iter().filter(asked).collect();
     let progress = Progress::begin(chosen.len());
-    let made: Result<Vec<Sheet>, Trouble> = chosen
+    let made: Result<Vec<Sheet>, FigureError> = chosen
         .into_par_iter()
         .map(|figure| {
             let sheet = (figure.make)()?;

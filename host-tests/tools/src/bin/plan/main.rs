@@ -12,7 +12,7 @@ use uav_relay_sim::command::{self, Failure};
 use uav_relay_sim::svg::{self, Picture, room};
 use uav_relay_tools::plan::rate::{self, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
-use uav_relay_tools::plan::{self, Ask, NoPlan, Number, Plan, Why};
+use uav_relay_tools::plan::{self, NoPlan, Number, Plan, PlanRequest, Why};
 
 use options::{Altitude, Options};
 
@@ -35,7 +35,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let number = options.number();
     out::check(options, &scenario)?;
     map::check(options, &scenario)?;
-    let ask = Ask {
+    let ask = PlanRequest {
         number,
         free_altitude: options.altitude == Altitude::Free,
         x_m: options.x_m,
@@ -113,7 +113,11 @@ struct Planned {
 }
 
 /// Plans for a number of relays or an SIR, with data rates if a bandwidth is given.
-fn plain(scenario: &Scenario, ask: &Ask, bandwidth_hz: Option<f64>) -> Result<Planned, NoPlan> {
+fn plain(
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    bandwidth_hz: Option<f64>,
+) -> Result<Planned, NoPlan> {
     let plan = plan::plan(scenario, ask)?;
     let rates = match bandwidth_hz {
         Some(bandwidth_hz) => {
@@ -131,7 +135,7 @@ fn plain(scenario: &Scenario, ask: &Ask, bandwidth_hz: Option<f64>) -> Result<Pl
 
 fn by_rate(
     scenario: &Scenario,
-    ask: &Ask,
+    ask: &PlanRequest,
     (target_bps, bandwidth_hz): (f64, f64),
 ) -> Result<Planned, NoPlan> {
     let Rates { best, meeting } = Rates::new(scenario, ask, bandwidth_hz, Some(target_bps))?;
@@ -155,7 +159,7 @@ fn too_fast(rates: &RateReport) -> String {
         format!("no number of relays from 1 to {tried}")
     };
     format!(
-        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. Ask for less, or for more \
+        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. PlanRequest for less, or for more \
          with a larger --bandwidth-hz",
         rates.best
     )

@@ -5,8 +5,8 @@ use std::path::Path;
 use uav_relay_scenario::deployment::{Companion, Deployment, agree};
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario};
 use uav_relay_sim::command::Failure;
-use uav_relay_tools::plan::carried::{planned, with_plan};
 use uav_relay_tools::plan::flown::flown;
+use uav_relay_tools::plan::stored_plan::{planned, with_plan};
 use uav_relay_tools::plan::{NoPlan, Number, Plan};
 use uav_relay_tools::provision::firmware::probe_after_ms;
 

@@ -12,8 +12,8 @@ use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command::{self, Failure};
-use uav_relay_tools::plan::carried::is_current;
 use uav_relay_tools::plan::flown::{Flown, flown};
+use uav_relay_tools::plan::stored_plan::is_current;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{ADDRESS, LEN, Secret};
 use uav_relay_tools::provision::summary::{Heading, summary};
@@ -238,7 +238,7 @@ impl<'a> Asked<'a> {
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
-                    "{}: [plan] is of another scenario: relays in this one settle on nothing",
+                    "{}: [plan] is of another scenario: relays in this one reach no agreement",
                     self.name
                 )),
                 None => Ok(None),

@@ -11,7 +11,7 @@ use uav_relay_scenario::mission::Refusal;
 /// Error of making a figure. The numbers are fixed, so any error except `File` is a bug.
 #[derive(Debug)]
 #[non_exhaustive]
-pub enum Trouble {
+pub enum FigureError {
     /// The scenario is not a valid mission.
     Mission(Refusal),
     /// A relay rejects its settings.
@@ -28,7 +28,7 @@ pub enum Trouble {
     File(String, std::io::Error),
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for FigureError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Mission(refusal) => refusal.fmt(f),
@@ -42,33 +42,33 @@ impl fmt::Display for Trouble {
     }
 }
 
-impl std::error::Error for Trouble {}
+impl std::error::Error for FigureError {}
 
-impl From<Refusal> for Trouble {
+impl From<Refusal> for FigureError {
     fn from(refusal: Refusal) -> Self {
         Self::Mission(refusal)
     }
 }
 
-impl From<SetupError> for Trouble {
+impl From<SetupError> for FigureError {
     fn from(error: SetupError) -> Self {
         Self::Setup(error)
     }
 }
 
-impl From<Infeasible> for Trouble {
+impl From<Infeasible> for FigureError {
     fn from(_: Infeasible) -> Self {
         Self::Unsettled("a chain")
     }
 }
 
-impl From<NotDrawn> for Trouble {
+impl From<NotDrawn> for FigureError {
     fn from(why: NotDrawn) -> Self {
         Self::Drawing(why)
     }
 }
 
-impl From<csv::Error> for Trouble {
+impl From<csv::Error> for FigureError {
     fn from(error: csv::Error) -> Self {
         Self::Table(error)
     }

@@ -9,7 +9,7 @@ use crate::simulator::watch::Watched;
 
 /// Statistics over the whole run; all absent if not recorded.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
-pub struct WatchedReport {
+pub struct AvailabilityReport {
     /// Time of the first agreement, s: all relays of a view hold their positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_agreement_s: Option<f64>,
@@ -27,7 +27,7 @@ pub struct WatchedReport {
     pub least_separation_m: Option<f64>,
 }
 
-impl WatchedReport {
+impl AvailabilityReport {
     /// Report of `watched`.
     pub fn of(watched: Watched) -> Self {
         let longest = watched.longest_wrong;

@@ -9,7 +9,7 @@ use super::hops::{RelayReport, db};
 
 /// SIR of the chain against all interferers, if its relays assumed a single one.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct AgainstAll {
+pub struct AllInterferersReport {
     /// SIR of the worst hop against all interferers, linear.
     pub all_sir: f64,
     /// SIR of the worst hop against all interferers, dB.
@@ -18,7 +18,7 @@ pub struct AgainstAll {
     pub all_loss: f64,
 }
 
-impl AgainstAll {
+impl AllInterferersReport {
     /// Evaluates `relays`, which assume `sir`; `None` if there is a single interferer or a field.
     pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {
         mission::hypothetical(scenario)?;

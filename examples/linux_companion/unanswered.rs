@@ -17,13 +17,13 @@ pub(crate) enum Answer {
 }
 
 #[derive(Debug)]
-pub(crate) struct Answers {
+pub(crate) struct AnswerMonitor {
     /// Best data so far, and the time since when; `None` once the autopilot is found.
     newest: Option<(Answer, Instant)>,
     told: Option<Answer>,
 }
 
-impl Answers {
+impl AnswerMonitor {
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             newest: Some((Answer::Nothing, now)),

@@ -3,9 +3,9 @@
 use rand::RngExt;
 use uav_relay::{Duration, Port, Wiring};
 
-use super::super::attack::{Attacker, Strike, fate};
+use super::super::attack::{AttackKind, Attacker, fate};
 use super::super::forge::{Way, destination, forge};
-use super::super::queue::Happening;
+use super::super::queue::QueuedEvent;
 use super::recorded::link;
 use super::state::{Chain, Member};
 
@@ -20,40 +20,40 @@ impl Chain {
         };
         let mut attacker = Attacker::new(attack, self.setup.seed);
         for (at, kind) in attacker.plan(&self.setup.link) {
-            self.queue.put(at, 0, Happening::Strike(kind));
+            self.queue.put(at, 0, QueuedEvent::AttackKind(kind));
             self.ahead += 1;
         }
         self.attacker = Some(attacker);
     }
 
     /// Sends one frame of the attacker to a living relay, or retries later if there is nothing to replay.
-    pub(super) fn strike(&mut self, kind: Strike) {
+    pub(super) fn strike(&mut self, kind: AttackKind) {
         let now = self.now;
         let Some(mut attacker) = self.attacker.take() else {
             return;
         };
         let frame = match kind {
-            Strike::Forge => {
+            AttackKind::Forge => {
                 let way = self.way(&mut attacker);
                 let heard = attacker.recall(now);
                 let heard = heard.as_ref().map(|heard| heard.bytes.as_slice());
                 let bytes = forge(&self.setup.mission, way, heard, &mut attacker.rng);
                 Some((self.port(way), bytes))
             }
-            Strike::Replay => attacker
+            AttackKind::Replay => attacker
                 .recall(now)
                 .map(|recorded| (recorded.port, recorded.bytes)),
         };
         match frame {
             Some((port, bytes)) => {
-                let astray = kind == Strike::Replay && attacker.rng.random_range(0..4) == 0;
+                let astray = kind == AttackKind::Replay && attacker.rng.random_range(0..4) == 0;
                 let to = destination(&bytes).filter(|_| !astray);
                 if let Some(to) = self.reached(to, &mut attacker) {
                     self.hit(to, kind, port, &bytes);
                 }
             }
             None if now < attacker.attack.until => {
-                self.queue.put(now + WAIT, 0, Happening::Strike(kind));
+                self.queue.put(now + WAIT, 0, QueuedEvent::AttackKind(kind));
                 self.ahead += 1;
             }
             None => {}
@@ -104,7 +104,7 @@ impl Chain {
     }
 
     /// Delivers the frame and records how the relay classified it.
-    fn hit(&mut self, index: usize, kind: Strike, port: Port, bytes: &[u8]) {
+    fn hit(&mut self, index: usize, kind: AttackKind, port: Port, bytes: &[u8]) {
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
@@ -113,8 +113,8 @@ impl Chain {
         let name = fate(&before, member.relay.stats());
         *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
         let note = match kind {
-            Strike::Forge => "forged by the attacker",
-            Strike::Replay => "replayed by the attacker",
+            AttackKind::Forge => "forged by the attacker",
+            AttackKind::Replay => "replayed by the attacker",
         };
         self.keep_frame(self.now, link(index, port), bytes, note.to_owned());
         self.drain(index);

@@ -11,7 +11,7 @@ use crate::simulator::chain::run;
 use crate::simulator::optima::alone;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
-use crate::simulator::sky::Sky;
+use crate::simulator::true_interference::TrueInterference;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
@@ -28,7 +28,7 @@ pub struct BelievedReport {
 
 /// Interference estimate and its quality.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
-pub struct ListenedReport {
+pub struct SensingReport {
     /// Final estimate of relay 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed: Option<BelievedReport>,
@@ -48,7 +48,7 @@ pub struct ListenedReport {
     pub mean_share_of_optimum: Option<f64>,
 }
 
-impl ListenedReport {
+impl SensingReport {
     /// Report of a run of `setup`; `None` if the relays did not measure.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let sky = setup.sky.as_ref()?;
@@ -118,7 +118,7 @@ impl ListenedReport {
     }
 }
 
-fn moves(sky: &Sky) -> bool {
+fn moves(sky: &TrueInterference) -> bool {
     sky.velocity_mps.iter().any(|speed| speed.abs() > 0.0)
 }
 

@@ -11,7 +11,7 @@ pub enum Number {
 
 /// Request to the planner.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Ask {
+pub struct PlanRequest {
     /// Number of relays.
     pub number: Number,
     /// True if altitudes may be chosen from the scenario's band.

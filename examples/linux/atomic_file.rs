@@ -8,7 +8,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// The system's error.
-pub fn keep(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub fn replace(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut beside = file.as_os_str().to_owned();
     beside.push(".new");
     let written = write(Path::new(&beside), bytes).and_then(|()| rename(&beside, file));

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use uav_relay::{Instant, Interference, Listen};
 use uav_relay_sim::simulator::chain::run;
 
-use super::wild::Wild;
-use crate::figures::trouble::Trouble;
+use super::scene::RandomScene;
+use crate::figures::error::FigureError;
 
 /// Start of the evaluation, s after the start of the run.
 const BEGUN_S: u32 = 60;
@@ -22,9 +22,9 @@ pub struct Shares {
 /// Returns the shares in `scenes` scenes while a single interferer passes at a distance of 300 m.
 ///
 /// # Errors
-/// [`Trouble`].
-pub fn shares(scenes: u64, relays: u16, speed_mps: f64) -> Result<Shares, Trouble> {
-    let each: Result<Vec<(f64, f64)>, Trouble> = (0..scenes)
+/// [`FigureError`].
+pub fn shares(scenes: u64, relays: u16, speed_mps: f64) -> Result<Shares, FigureError> {
+    let each: Result<Vec<(f64, f64)>, FigureError> = (0..scenes)
         .into_par_iter()
         .map(|seed| one(seed, relays, speed_mps))
         .collect();
@@ -32,15 +32,15 @@ pub fn shares(scenes: u64, relays: u16, speed_mps: f64) -> Result<Shares, Troubl
     Ok(Shares { followed, stayed })
 }
 
-fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), Trouble> {
-    let mut wild = Wild::new(seed, relays, 1);
+fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError> {
+    let mut wild = RandomScene::new(seed, relays, 1);
     // Half-way through, the interferer is beside the middle of the line.
     let span_s = 600.0 / speed_mps.max(3.0) + f64::from(BEGUN_S);
     let half_s = 0.5 * (span_s + f64::from(BEGUN_S));
     wild.place(500.0 - speed_mps * half_s, 300.0);
     let mut setup = wild.flown(Interference::Unknown)?;
     setup.settings.listen = Some(Listen::following(relays));
-    let none = Trouble::Unsettled("an interferer that moves");
+    let none = FigureError::Unsettled("an interferer that moves");
     let Some(sky) = &mut setup.sky else {
         return Err(none);
     };

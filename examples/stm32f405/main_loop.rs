@@ -9,9 +9,9 @@ use uav_relay::{Instant, Sample};
 use super::chip;
 use super::clock::Clock;
 use super::drone::Drone;
-#[cfg(feature = "upload")]
-use super::kept;
 use super::log;
+#[cfg(feature = "upload")]
+use super::persistent;
 
 pub(crate) trait Links {
     /// Exchanges bytes between the ports and the relay, and stores its votes between receiving and sending. Returns the time of
@@ -69,7 +69,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
             }
             #[cfg(feature = "upload")]
             if event == Event::Uploaded {
-                kept::keep_upload(relay);
+                persistent::keep_upload(relay);
             }
         }
         if log::asked() {

@@ -18,13 +18,13 @@ pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
 
 /// Logged reasons, and newer ones that have not held long enough.
 #[derive(Debug, Default)]
-pub(crate) struct Waits {
+pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],
     newest: [Option<HoldReason>; 2],
     since: Instant,
 }
 
-impl Waits {
+impl HoldReasonLog {
     /// Logs changed reasons; returns the time of the next check.
     pub(crate) fn tend(
         &mut self,

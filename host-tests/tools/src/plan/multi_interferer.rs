@@ -5,9 +5,9 @@
 
 use uav_relay::Placement;
 
-use super::ask::{Ask, Number};
-use super::briefed::{Briefed, MOST_RELAYS};
 use super::found::{Fitted, LOSS, NoPlan, Plan, Why};
+use super::profiles::{MOST_RELAYS, ProfiledMission};
+use super::request::{Number, PlanRequest};
 use super::{altitude, one, source};
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
 use uav_relay_scenario::hypothetical::Hypothetical;
@@ -22,7 +22,7 @@ const POLISHED: usize = 2;
 /// Number of interferers that are tried alone for starting chains.
 const ALONE: usize = 4;
 
-pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
+pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     let hypothetical = mission::hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
     let planner = Planner {
         scenario,
@@ -35,7 +35,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &Ask) -> Result<Plan, NoPlan> {
             scenario,
             target,
             |level| {
-                let ask = &Ask {
+                let ask = &PlanRequest {
                     free_altitude: false,
                     ..*ask
                 };
@@ -66,7 +66,7 @@ pub(super) fn with_one(scenario: &Scenario, one: &Hypothetical) -> Scenario {
 
 struct Planner<'a> {
     scenario: &'a Scenario,
-    ask: &'a Ask,
+    ask: &'a PlanRequest,
     hypothetical: Hypothetical,
 }
 
@@ -89,7 +89,7 @@ impl Planner<'_> {
     fn candidates(&self, relays: u16) -> Result<Candidates, NoPlan> {
         let scene = Scene::new(self.scenario, relays)
             .ok_or_else(|| NoPlan::Wrong("there is no interferer".to_owned()))?;
-        let ask = Ask {
+        let ask = PlanRequest {
             number: Number::Of(relays),
             ..*self.ask
         };
@@ -256,7 +256,7 @@ impl Candidates {
                 ..plan
             },
             (_, Some(best)) if best.sir > 0.0 => {
-                let briefed = Briefed::new(
+                let briefed = ProfiledMission::new(
                     &with_one(planner.scenario, &planner.hypothetical),
                     self.relays,
                     planner.ask.tolerance,

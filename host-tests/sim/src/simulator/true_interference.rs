@@ -10,7 +10,7 @@ use uav_relay_scenario::scene::{Place, Scene};
 
 /// Interferers and measurements.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sky {
+pub struct TrueInterference {
     /// True interferers at time 0.
     pub scene: Scene,
     /// Common velocity of the interferers, m/s along the line and to its right.
@@ -44,14 +44,14 @@ pub struct Broken {
     /// Node number: relay index from 1, 0 for the transmitter, N + 1 for the receiver.
     pub node: u16,
     /// Kind of the error.
-    pub says: Says,
+    pub says: SensorReading,
     /// Start of the error.
     pub since: Instant,
 }
 
 /// Error of a broken receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Says {
+pub enum SensorReading {
     /// Factor on the true power.
     Times(f64),
     /// Constant power, W.
@@ -61,7 +61,7 @@ pub enum Says {
 /// Size of a cell with common shadowing, m.
 const SHADOW_M: f64 = 5.0;
 
-impl Sky {
+impl TrueInterference {
     /// Measurements of 1000 samples once a second, without shadowing, for ten minutes.
     pub const fn of(scene: Scene) -> Self {
         Self {
@@ -117,8 +117,8 @@ impl Sky {
         let mut broken = self.broken.iter();
         let broken = broken.find(|broken| broken.node == node && now >= broken.since);
         match broken.map(|broken| broken.says) {
-            Some(Says::Times(times)) => (true_w * times + scene.noise_w) * self.mean(rng),
-            Some(Says::Always(power_w)) => power_w,
+            Some(SensorReading::Times(times)) => (true_w * times + scene.noise_w) * self.mean(rng),
+            Some(SensorReading::Always(power_w)) => power_w,
             None => (true_w + scene.noise_w) * self.mean(rng),
         }
     }

@@ -9,16 +9,16 @@ use uav_relay_scenario::{Interference as Known, Scenario, Source};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::simulator::sky::{Sky, Stand};
+use uav_relay_sim::simulator::true_interference::{Stand, TrueInterference};
 
-use crate::figures::trouble::Trouble;
+use crate::figures::error::FigureError;
 use crate::multi_interferer::optimum;
 
-const NO_SCENE: Trouble = Trouble::Unsettled("a scene");
+const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
 /// A random scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.
 #[derive(Clone, Debug)]
-pub struct Wild {
+pub struct RandomScene {
     /// Geometry, powers and the true interferers.
     pub scenario: Scenario,
     /// Number of relays.
@@ -27,7 +27,7 @@ pub struct Wild {
     pub seed: u64,
 }
 
-impl Wild {
+impl RandomScene {
     /// Draws a scene with that many relays and sources.
     pub fn new(seed: u64, relays: u16, sources: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -70,16 +70,16 @@ impl Wild {
     /// Returns the true scene.
     ///
     /// # Errors
-    /// [`Trouble::Unsettled`] if there are no sources.
-    pub fn scene(&self) -> Result<Scene, Trouble> {
+    /// [`FigureError::Unsettled`] if there are no sources.
+    pub fn scene(&self) -> Result<Scene, FigureError> {
         Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
     }
 
     /// Returns the mission of the relays, with `guess` as its interference.
     ///
     /// # Errors
-    /// [`Trouble::Mission`].
-    pub fn mission(&self, guess: Interference) -> Result<Mission, Trouble> {
+    /// [`FigureError::Mission`].
+    pub fn mission(&self, guess: Interference) -> Result<Mission, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
         let config = MissionConfig {
             interference: guess,
@@ -91,8 +91,8 @@ impl Wild {
     /// Returns the best SIR with full knowledge, linear: one source, the briefed chain's. Several, the exact optimum.
     ///
     /// # Errors
-    /// [`Trouble`].
-    pub fn optimum(&self) -> Result<f64, Trouble> {
+    /// [`FigureError`].
+    pub fn optimum(&self) -> Result<f64, FigureError> {
         let scene = self.scene()?;
         if scene.sources.len() > 1 {
             return Ok(optimum(&scene).ok_or(NO_SCENE)?.sir);
@@ -103,23 +103,23 @@ impl Wild {
     /// Returns the positions of a chain that knows the interferer. For several sources, the paper's hypothetical one.
     ///
     /// # Errors
-    /// [`Trouble`].
-    pub fn told(&self) -> Result<Vec<Placement>, Trouble> {
+    /// [`FigureError`].
+    pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
         let places: Option<_> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
-        places.ok_or(Trouble::Unsettled("a chain that was told"))
+        places.ok_or(FigureError::Unsettled("a chain that was told"))
     }
 
     /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.
     ///
     /// # Errors
-    /// [`Trouble`].
-    pub fn setup(&self, guess: Interference) -> Result<Setup, Trouble> {
+    /// [`FigureError`].
+    pub fn setup(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = Setup::new(self.mission(guess)?);
         setup.seed = self.seed;
         setup.settings.listen = Some(Listen::default());
-        let mut sky = Sky::of(self.scene()?);
+        let mut sky = TrueInterference::of(self.scene()?);
         sky.seed = self.seed;
         sky.period = Duration::from_millis(5_000);
         sky.until = Instant::from_millis(120_000);
@@ -131,8 +131,8 @@ impl Wild {
     /// Returns a simulation with drones of 10 m/s. They start beside the transmitter and measure every second in flight.
     ///
     /// # Errors
-    /// [`Trouble`].
-    pub fn flown(&self, guess: Interference) -> Result<Setup, Trouble> {
+    /// [`FigureError`].
+    pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = self.setup(guess)?;
         let start = (1..=self.relays)
             .map(|index| [5.0 * f64::from(index), 0.0, 20.0])

@@ -10,7 +10,7 @@ use std::time::{Duration as Span, Instant as Clock};
 
 use serde_json::json;
 use uav_relay::{Duration, Instant};
-use uav_relay_linux::keep::keep;
+use uav_relay_linux::atomic_file::replace;
 use uav_relay_linux::log::Log;
 
 const AGAIN: Duration = Duration::from_millis(1_000);
@@ -20,7 +20,7 @@ const LAST: Span = Span::from_millis(500);
 type Done = (std::io::Result<()>, Span);
 
 #[derive(Debug)]
-pub(crate) struct Kept {
+pub(crate) struct StoredFile {
     option: &'static str,
     file: PathBuf,
     orders: SyncSender<Vec<u8>>,
@@ -35,7 +35,7 @@ pub(crate) struct Kept {
     again_at: Instant,
 }
 
-impl Kept {
+impl StoredFile {
     /// Starts the writer thread of `file`, given by `option`; writes nothing yet.
     pub(crate) fn new(option: &'static str, file: &Path) -> Result<Self, String> {
         let named = |error: std::io::Error| format!("{option} {}: {error}", file.display());
@@ -47,7 +47,7 @@ impl Kept {
         let serve = move || {
             for bytes in taken {
                 let begun = Clock::now();
-                let result = keep(&path, &bytes);
+                let result = replace(&path, &bytes);
                 if told.send((result, begun.elapsed())).is_err() {
                     return;
                 }

@@ -2,7 +2,7 @@
 
 use uav_relay::Mission;
 
-use super::left::left;
+use super::remaining::left;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 

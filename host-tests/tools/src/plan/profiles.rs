@@ -11,13 +11,13 @@ use super::found::{NoPlan, Plan};
 pub(super) const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
 /// A mission, the relays' own profiles and the indices of relays with a fixed altitude.
-pub(super) struct Briefed {
+pub(super) struct ProfiledMission {
     pub(super) mission: Mission,
     pub(super) own: Vec<(u16, Profile)>,
     pub(super) held: Vec<u16>,
 }
 
-impl Briefed {
+impl ProfiledMission {
     pub(super) fn new(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Self, NoPlan> {
         let (mission, own) = mission::mission(scenario, relays, tolerance)?;
         Ok(Self {

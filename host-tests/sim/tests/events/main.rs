@@ -17,7 +17,7 @@ mod withheld;
 use air::mission;
 use uav_relay::Instant;
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::deaf::Deaf;
+use uav_relay_sim::simulator::one_way::OneWayFailure;
 use uav_relay_sim::simulator::outcome::{Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 
@@ -56,7 +56,7 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
 #[test]
 fn a_relay_that_is_not_heard_is_told_by_whom() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
-    setup.deaf = vec![Deaf {
+    setup.deaf = vec![OneWayFailure {
         by: 3,
         of: 2,
         from: at(60),

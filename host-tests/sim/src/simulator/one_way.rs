@@ -4,7 +4,7 @@ use uav_relay::Instant;
 
 /// Period in which relay `by` does not receive relay `of`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Deaf {
+pub struct OneWayFailure {
     /// The relay that does not receive, from 1.
     pub by: u16,
     /// The relay that is not received, from 1.
@@ -15,7 +15,7 @@ pub struct Deaf {
     pub until: Option<Instant>,
 }
 
-impl Deaf {
+impl OneWayFailure {
     /// Returns true if this failure keeps `by` from receiving `of` at `now`.
     pub fn applies(&self, by: u16, of: u16, now: Instant) -> bool {
         (self.by, self.of) == (by, of)

@@ -40,7 +40,7 @@ pub(crate) struct Off {
 
 /// Compares the drone's position with its line and geofence.
 #[derive(Debug, Default)]
-pub(crate) struct Astray {
+pub(crate) struct OffLineMonitor {
     newest: Option<(Instant, Placement)>,
     lines: Option<Lines>,
     away_m: Option<f64>,
@@ -48,7 +48,7 @@ pub(crate) struct Astray {
     fence_told_at: Option<Instant>,
 }
 
-impl Astray {
+impl OffLineMonitor {
     pub(crate) const fn handle_place(&mut self, now: Instant, place: Placement) {
         self.newest = Some((now, place));
     }
