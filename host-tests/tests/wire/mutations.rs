@@ -160,7 +160,7 @@ fn any_number_at_any_offset_is_judged_as_the_tables_say() {
 }
 
 #[test]
-fn cut_longer_padded_and_recounted_bodies_are_judged_as_the_tables_say() {
+fn damaged_bodies_are_judged_as_the_tables_say() {
     let mut seen = Seen::default();
     for vector in vectors().frames {
         let (name, body) = (&vector.name, &vector.body);

@@ -46,26 +46,10 @@ pub(crate) struct Offer {
     pub(crate) answer: u16,
 }
 
-/// Offset of each number in the body.
-pub(crate) const RELAYS: usize = 5;
-pub(crate) const DISTANCE: usize = 7;
-pub(crate) const SEPARATION: usize = 11;
-pub(crate) const TX_POWER: usize = 15;
-pub(crate) const ALTITUDE: usize = 19;
-pub(crate) const POWER: usize = 23;
-pub(crate) const INTERFERER: usize = 27;
-pub(crate) const X: usize = 31;
-pub(crate) const Y: usize = 35;
-pub(crate) const TOLERANCE: usize = 39;
-pub(crate) const MU_LOS: usize = 43;
-pub(crate) const MU_NLOS: usize = 51;
-pub(crate) const ETA: usize = 59;
-pub(crate) const LEAST: usize = 67;
-pub(crate) const MOST: usize = 71;
-pub(crate) const LEFT: usize = 75;
-pub(crate) const RIGHT: usize = 79;
-pub(crate) const NOISE: usize = 83;
-pub(crate) const SITES: usize = 87;
+/// Offsets in the body: number of relays, noise, and sites.
+const RELAYS: usize = 5;
+const NOISE: usize = 83;
+const SITES: usize = 87;
 
 /// Length of the body, and of the part stored across a reboot.
 pub(crate) const BYTES: usize = 113;

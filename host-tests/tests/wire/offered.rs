@@ -1,34 +1,10 @@
-//! Random offers: valid missions with all extremes, and offsets of numbers to spoil.
+//! Random offers: valid missions with all extremes.
 
 use proptest::prelude::*;
 
 use super::codec::Said;
-use super::offer::{
-    ALTITUDE, DISTANCE, ETA, INTERFERER, LEAST, LEFT, MOST, MU_LOS, MU_NLOS, NOISE, Offer, POWER,
-    RIGHT, SEPARATION, TOLERANCE, TX_POWER, X, Y,
-};
+use super::offer::Offer;
 use super::sited::A_KILOMETRE;
-
-/// Offsets of four bytes that are an f32 or the upper half of an f64.
-pub(crate) const NUMBERS: [usize; 17] = [
-    DISTANCE,
-    SEPARATION,
-    TX_POWER,
-    ALTITUDE,
-    POWER,
-    INTERFERER,
-    X,
-    Y,
-    TOLERANCE,
-    MU_LOS + 4,
-    MU_NLOS + 4,
-    ETA + 4,
-    LEAST,
-    MOST,
-    LEFT,
-    RIGHT,
-    NOISE,
-];
 
 /// Draws from `least` to `most`, log-uniform, with frequent limits.
 fn scaled(least: f32, most: f32) -> BoxedStrategy<f32> {
