@@ -262,7 +262,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         "--uavs 3 --explore 4",
         "--uavs 3 --stand-in",
         "--scenario EXAMPLES/scenario.toml --uavs 3",
-        "--scenario EXAMPLES/several.toml --uavs 8",
+        "--scenario EXAMPLES/multi_interferer.toml --uavs 8",
         "--uavs 3.5",
         "--uavs 3 --network x",
         "--uavs 3 --method algn",
@@ -294,7 +294,7 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let loss = report["hypothetical"]["loss"].as_f64().unwrap();
     assert!(loss > 0.15, "{report}");
-    let words = format!("{:.1} % less than the best places", 100.0 * loss);
+    let words = format!("{:.1} % less than the best positions", 100.0 * loss);
     let one = [
         "--scenario",
         &several,
