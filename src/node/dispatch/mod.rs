@@ -186,7 +186,7 @@ impl Node {
             None => {}
         }
         let sensed = effects.sensed;
-        if sensed.believes {
+        if cfg!(feature = "sensing") && sensed.believes {
             self.believe();
         }
         if sensed.unclear {
