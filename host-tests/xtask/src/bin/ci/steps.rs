@@ -131,6 +131,10 @@ pub(crate) fn all() -> Vec<Step> {
     steps.extend(firmware());
     steps.extend(embassy());
     steps.push(step(
+        "the slow commands of the pages",
+        "cargo run --quiet --package uav-relay-xtask --bin pages -- --slow",
+    ));
+    steps.push(step(
         "templates of a firmware, in empty folders",
         "cargo template --check",
     ));

@@ -8,7 +8,8 @@
 //! | none | is run |
 //! | `hardware` | needs a board, a drone, a radio or a simulator of one |
 //! | `root` | needs root |
-//! | `slow` | takes minutes, and is run by another step of `cargo ci` |
+//! | `slow` | takes minutes, and is run with `--slow` |
+//! | `itself` | runs this program, among others |
 //! | `tested` | is run by a test of its own |
 //! | `window` | opens a window |
 //!
@@ -57,12 +58,15 @@ struct Options {
     /// Run for pages whose names contain this only
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
+    /// The slow blocks, and no others
+    #[arg(long)]
+    slow: bool,
 }
 
 fn main() -> ExitCode {
-    let Options { only } = Options::parse();
+    let Options { only, slow } = Options::parse();
     let root = Path::new(".");
-    match walk(root, &only) {
+    match walk(root, &only, slow) {
         Ok(0) => ExitCode::SUCCESS,
         Ok(faults) => {
             println!("pages: {faults} blocks do not print what the page says");
@@ -76,7 +80,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs every runnable block; returns the number of blocks with different output.
-fn walk(root: &Path, only: &str) -> Result<usize, String> {
+fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     let shell = shell::Shell::build(root)?;
     let (mut faults, mut run, mut left_out, mut checked) = (0, 0, 0, 0);
     for name in PAGES.into_iter().filter(|name| name.contains(only)) {
@@ -88,24 +92,28 @@ fn walk(root: &Path, only: &str) -> Result<usize, String> {
             let Kind::Commands(why_not) = &block.kind else {
                 continue;
             };
-            if let Some(why_not) = why_not {
-                left_out += 1;
-                if why_not != "hardware" {
+            match (why_not.as_deref(), slow) {
+                (None, false) | (Some("slow"), true) => {}
+                (Some("hardware"), false) => {
+                    left_out += 1;
+                    for command in options::own_commands(&block.commands()) {
+                        checked += 1;
+                        let (status, output) = shell.begin(&command)?;
+                        if let Err(fault) = options::accepted(&command, status, &output) {
+                            faults += 1;
+                            println!("{name}:{}: {fault}", block.line);
+                        }
+                    }
                     continue;
                 }
-                for command in options::own_commands(&block.commands()) {
-                    checked += 1;
-                    let (status, output) = shell.begin(&command)?;
-                    if let Err(fault) = options::accepted(&command, status, &output) {
-                        faults += 1;
-                        println!("{name}:{}: {fault}", block.line);
-                    }
+                _ => {
+                    left_out += 1;
+                    continue;
                 }
-                continue;
             }
             run += 1;
             let begun = Instant::now();
-            let output = shell.run(&block.commands());
+            let output = shell.run(&block.commands(), slow);
             let seconds = begun.elapsed().as_secs_f64();
             println!("{name}:{}: {seconds:.1} s", block.line);
             let fault = output.and_then(|output| {
@@ -121,7 +129,7 @@ fn walk(root: &Path, only: &str) -> Result<usize, String> {
         }
     }
     println!(
-        "pages: {run} blocks were run, {left_out} cannot be; of those the options of {checked} commands were checked"
+        "pages: {run} blocks were run, {left_out} were not; of those the options of {checked} commands were checked"
     );
     Ok(faults)
 }

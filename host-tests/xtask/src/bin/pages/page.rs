@@ -1,7 +1,7 @@
 //! Parses the code blocks of a page.
 
 /// Words that mark a block of commands as not run.
-const WHY_NOT: [&str; 5] = ["hardware", "root", "slow", "tested", "window"];
+const WHY_NOT: [&str; 6] = ["hardware", "itself", "root", "slow", "tested", "window"];
 
 /// Content of a block.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -13,8 +13,9 @@ const PACKAGES: [&str; 4] = [
     "uav-relay-linux",
 ];
 
-/// Time limit of a block, s.
+/// Time limits of a block and of a slow one, s.
 const LIMIT_S: u32 = 60;
+const SLOW_S: u32 = 1_800;
 
 /// Time limit of a command without its hardware, s.
 const BEGUN_S: u32 = 2;
@@ -56,8 +57,8 @@ impl Shell {
             .map_err(|error| failed(".cargo/config.toml", &error))?;
         Ok(Self {
             folder: target.join("pages"),
+            before: functions(&aliases, &target.join("debug"), &root),
             root,
-            before: functions(&aliases, &target.join("debug")),
         })
     }
 
@@ -85,8 +86,9 @@ impl Shell {
     }
 
     /// Runs a script like a user, until its first command that fails; returns its output.
-    pub(crate) fn run(&self, script: &str) -> Result<String, String> {
-        let (status, said) = self.ended(script, LIMIT_S)?;
+    pub(crate) fn run(&self, script: &str, slow: bool) -> Result<String, String> {
+        let limit_s = if slow { SLOW_S } else { LIMIT_S };
+        let (status, said) = self.ended(script, limit_s)?;
         if status.success() {
             return Ok(said);
         }
@@ -118,8 +120,9 @@ impl Shell {
     }
 }
 
-/// Returns a shell function `cargo` that maps aliases to binaries. It has those aliases of `config` that are built in `bin`.
-fn functions(config: &str, bin: &Path) -> String {
+/// Returns a shell function `cargo` that runs the binaries in `bin` for those aliases of `config` that are built. It runs
+/// everything else in `root`, so that nothing is built again for other paths.
+fn functions(config: &str, bin: &Path, root: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {
         let Some((name, command)) = line.split_once(" = \"run ") else {
@@ -132,7 +135,10 @@ fn functions(config: &str, bin: &Path) -> String {
             let _ = writeln!(cases, "{name}) shift; '{}' \"$@\";;", path.display());
         }
     }
-    format!("cargo() {{ case \"$1\" in\n{cases}*) command cargo \"$@\";;\nesac; }}")
+    let root = root.display();
+    format!(
+        "cargo() {{ case \"$1\" in\n{cases}*) (cd '{root}' && command cargo \"$@\");;\nesac; }}"
+    )
 }
 
 #[cfg(test)]
@@ -142,8 +148,9 @@ mod tests {
     #[test]
     fn an_alias_whose_program_is_there_is_a_case_of_the_function() {
         let config = "[alias]\nsh = \"run --package p --bin sh --\"\nother = \"run --package p --bin not-there --\"\n";
-        let all = functions(config, std::path::Path::new("/bin"));
+        let all = functions(config, "/bin".as_ref(), "/root".as_ref());
         assert!(all.contains("sh) shift; '/bin/sh' \"$@\";;"), "{all}");
         assert!(!all.contains("other"), "{all}");
+        assert!(all.contains("(cd '/root' && command cargo"), "{all}");
     }
 }
