@@ -69,11 +69,7 @@ impl Positions {
 
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         if self.bad > 0 {
-            log.tell(
-                now,
-                "position",
-                format_args!("{} lines were none", self.bad),
-            );
+            log.tell(now, "position", format_args!("{} invalid lines", self.bad));
         }
     }
 }

@@ -351,7 +351,7 @@ impl Report {
         match told.belief {
             Belief::Source { source, receiver_w } => self.log.say(
                 now,
-                "believed",
+                "estimate",
                 json!({
                     "power_w": source.power_w, "x_m": source.x_m, "y_m": source.y_m, "receiver_w": receiver_w,
                 }),

@@ -97,7 +97,7 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
     let socket = drones.socket(2);
     assert_eq!(asked(&socket)["relay"]["lost"], serde_json::json!([3]));
     for (command, why) in [
-        ("land", "no such command; there is clear-lost N"),
+        ("land", "unknown command; the command is clear-lost N"),
         ("clear-lost", "name the relays that have landed"),
         ("clear-lost 2", "relay 2 is this relay"),
         ("clear-lost 1", "relay 1 is received and not lost"),

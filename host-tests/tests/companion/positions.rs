@@ -109,7 +109,7 @@ fn lines_that_are_no_position_are_counted_and_said_once() {
     assert!(
         stdout
             .iter()
-            .any(|line| line.contains("position: 8 lines were none")),
+            .any(|line| line.contains("position: 8 invalid lines")),
         "{stdout:?}"
     );
 }
