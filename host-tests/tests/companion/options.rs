@@ -43,7 +43,10 @@ const WRONG: &[(&[&str], &[&str])] = &[
         &["--index", "2", "--of", "2"],
         &["--upstream", "relay 1", "--shared"],
     ),
-    (&["--shared", "x"], &["--shared x", "without --upstream"]),
+    (
+        &["--shared", "x"],
+        &["--shared x", "cannot be combined with --upstream"],
+    ),
     (
         &["--baud", "1199"],
         &["--baud", "'1199'", "1200 to 4000000"],

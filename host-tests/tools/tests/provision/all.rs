@@ -285,7 +285,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         ),
         (
             &["--scenario", &several, "--uavs", "8"],
-            "% less than the best places: on board one hypothetical interferer replaces all",
+            "% less than the best positions: on board one hypothetical interferer replaces all",
         ),
         (
             &["--uavs", "3.5"],
@@ -319,7 +319,7 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let loss = report["hypothetical"]["loss"].as_f64().unwrap();
     assert!(loss > 0.15, "{report}");
-    let words = format!("{:.1} % less than the best places", 100.0 * loss);
+    let words = format!("{:.1} % less than the best positions", 100.0 * loss);
     let one = [
         "--scenario",
         &several,
