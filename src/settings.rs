@@ -145,8 +145,9 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Creates the default: bracketed with prediction, and two links of 57 600 baud or faster. Neighbours are lost after 15 s of
-    /// silence.
+    /// Returns the default settings: Algorithm 1 with a bracketed, predicted search for the target SIR.
+    ///
+    /// They suit two links of 57 600 baud or faster. A neighbour is lost after 15 s of silence.
     fn default() -> Self {
         Self::DEFAULT
     }

@@ -78,7 +78,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Required position of the relay before on the pass.
+/// Required position of the previous relay of the pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stand {

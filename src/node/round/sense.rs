@@ -198,7 +198,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Evaluates a search for the faulty relay; returns true if it continues, and the result is not used.
+    /// Continues the search for a faulty relay with a pass; returns true if the pass has no other use.
     fn tries(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
             return false;

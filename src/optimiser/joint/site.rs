@@ -245,7 +245,9 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the dependent coordinate for the free coordinates `at`, by the hop `from` the sender.
+    /// Returns the dependent coordinate at which the hop `from` the sender meets `target`.
+    ///
+    /// `at` are the two free coordinates.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {

@@ -99,7 +99,9 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Tries chains at one common cross-section position. Several lateral positions, each with the best of a few altitudes.
+    /// Tries chains at one common lateral position and altitude.
+    ///
+    /// Several lateral positions are tried, each at the best of a few altitudes.
     fn one_level(&mut self) {
         for side in [Side::Any, Side::Left, Side::Right] {
             let Some(room) = side.part(self.scene) else {
@@ -115,7 +117,7 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the best chain at one lateral position over several altitudes of a room.
+    /// Returns the best of the chains at lateral position `y` and one of several altitudes in `room`.
     fn best_altitude(&self, y: f64, room: &Room) -> Option<Vec<Triple>> {
         let mut best: Option<(f64, Vec<Triple>)> = None;
         for row in 0..8 {
