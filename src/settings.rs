@@ -139,8 +139,8 @@ pub struct Settings {
     /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence. `None` for no guard. With it the
     /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware converts positions to latitudes and longitudes. The line is between two configured sites. Then an
-    /// upload without sites of its own is rejected if its distance differs. Set it on all relays of a chain, or on none.
+    /// True if the firmware converts positions to latitudes and longitudes, between two configured sites. An upload
+    /// without sites is then rejected if its distance differs from theirs. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 

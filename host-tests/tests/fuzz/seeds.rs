@@ -27,7 +27,9 @@ fn golden() -> Vec<Frame> {
     Vectors::load().unwrap().frames
 }
 
-/// Returns golden frames after two lengths: each alone, then all of them with noise in between.
+/// Returns inputs of the target `deframe`: each golden frame, and three of them with noise in between.
+///
+/// Each starts with the two lengths of the pieces into which the stream is cut.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();

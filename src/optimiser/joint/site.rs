@@ -569,8 +569,9 @@ impl Site<'_> {
         }
     }
 
-    /// Returns the dependent coordinate and the slope of F by it. It has the steepest slope and is not at an end of its room
-    /// `low` to `high`.
+    /// Returns the dependent coordinate and the slope of F by it.
+    ///
+    /// It is the coordinate with the steepest slope of those that are not at an end of their room, `low` to `high`.
     fn axis(
         &self,
         c: f32,
