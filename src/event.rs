@@ -77,13 +77,13 @@ pub enum Event {
     /// the view use the last agreement. Raised once until a view is agreed on.
     LeaseLapsed,
     /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its positions.
-    /// Raised once until a view is agreed on. An operator brings the missing relays back into range, or lands this part.
+    /// Raised once until a view is agreed on. Bring the missing relays back into range, or land this part.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
     /// A newer mission was rejected. It has no valid line on earth, or leaves the relay's own geofence. The relay keeps its
-    /// mission, and the ground station is informed. Raised once for each such mission. An operator uploads one whose sites are as
-    /// far apart as its distance, and within the geofence.
+    /// mission, and the ground station is informed. Raised once for each such mission. Upload one whose sites are as far apart as
+    /// its distance, and within the geofence.
     UploadRefused {
         /// Reason of the rejection.
         why: LineError,

@@ -139,14 +139,15 @@ pub struct Settings {
     /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence. `None` for no guard. With it the
     /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware converts positions to latitudes and longitudes. The line is between two configured sites. Then an
-    /// upload without sites of its own is rejected if its distance differs. Set it on all relays of a chain, or on none.
+    /// True if the firmware converts positions to latitudes and longitudes, between two configured sites. An upload
+    /// without sites is then rejected if its distance differs from theirs. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
 impl Default for Settings {
-    /// Creates the default: bracketed with prediction, and two links of 57 600 baud or faster. Neighbours are lost after 15 s of
-    /// silence.
+    /// Returns the default settings: Algorithm 1 with a bracketed, predicted search for the target SIR.
+    ///
+    /// They suit two links of 57 600 baud or faster. A neighbour is lost after 15 s of silence.
     fn default() -> Self {
         Self::DEFAULT
     }

@@ -167,7 +167,7 @@ struct Slope {
 }
 
 impl Slope {
-    /// Returns true if phi at `at` is above 0.
+    /// Returns phi at `at`, which has the sign of the slope.
     fn sign(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s

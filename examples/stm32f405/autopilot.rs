@@ -50,7 +50,7 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Returns `of` with the drone's position error, m, and stopping time.
+    /// Returns the guard's configuration `of` with the position error and the stopping time of this drone.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"

@@ -80,8 +80,9 @@ struct Tally {
     plain: usize,
     worst: f64,
     sweeps: u32,
-    /// Ratios of bound to optimum: of all scenes, and of those below the optimum.
+    /// Ratios of bound to optimum of all scenes.
     bounds: Vec<f64>,
+    /// Ratios of bound to optimum of the scenes whose result is below the optimum.
     bounds_of_short: Vec<f64>,
 }
 

@@ -77,7 +77,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns the future that receives, the future that sends. A queue connects the relay and the sending future.
+    /// Returns the receiving future, the sending future, and the queue from the relay to the latter.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,

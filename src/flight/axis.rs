@@ -342,7 +342,7 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the arc over half a chord, from the middle.
+/// Converts a distance from the middle along a chord to the distance along its arc.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)

@@ -267,14 +267,15 @@ impl Association {
         self.told_halt
     }
 
-    /// Counts a reminder: a halt request, and a position, that is not repeated expires.
+    /// Counts a reminder. A received halt request or position expires unless it is repeated within some reminders.
     pub(super) const fn age(&mut self) {
         self.halt_left = self.halt_left.saturating_sub(1);
         self.seen_left = self.seen_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay without an association, not flown or just started. Its position, and a halt request to
-    /// forward.
+    /// Returns the message of a relay without an association: one that is not flown or has just started.
+    ///
+    /// It contains the relay's position, and a halt request to forward.
     pub(super) fn tell_alone(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.parting.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -360,7 +361,7 @@ impl KeepOut {
         self.unflown = None;
     }
 
-    /// Returns the keep-out for another line. Along it the position of a drone that is not flown is unknown.
+    /// Removes the obstacle because the line changes: the drone's position along the new line is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self

@@ -49,17 +49,21 @@ pub struct GuardConfig {
     pub separation_m: f32,
     /// Number of relays of the mission, 1 to 1000; the same on all relays.
     pub relays: u16,
-    /// Maximum deviation of a hovering relay's reported position from its setpoint, m in each coordinate. 0 to 1e3. It reduces the
-    /// separation by this much at each of two relays.
+    /// Maximum deviation of a hovering relay's reported position, 0 to 1e3 m per coordinate.
+    ///
+    /// It reduces the separation by this much at each of two relays.
     pub hover_m: f32,
-    /// Time after `Guard::steer` within which the relay flies toward the new setpoint. The latency to the flight controller plus
-    /// the stopping time from maximum speed. With the autopilot link it is
+    /// Maximum time from `Guard::steer` until the drone flies toward the new setpoint.
+    ///
+    /// It is the latency to the flight controller plus the stopping time from maximum speed. With the autopilot link it is
     /// [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
 }
 
 impl GuardConfig {
-    /// Returns the configuration for a mission. Its separation, distance, and altitude band including the profile's altitude.
+    /// Returns the configuration with the separation, distance and altitude band of a mission.
+    ///
+    /// The band is extended to the profile's altitude.
     ///
     /// If relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the geofence needs
     /// [room](Self::with_room_for) for that, because it limits them.

@@ -698,8 +698,10 @@ impl Mission {
         }
     }
 
-    /// Returns the mission with another `interference`, of which the receiver hears `receiver_w` if that is above 0. With `halved` the
-    /// first hop, or the last one, is half as long as the others.
+    /// Returns the mission with another `interference`.
+    ///
+    /// A `receiver_w` above 0 is its power at the ground receiver. With `halved` the first hop, or the last one, is half as
+    /// long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.

@@ -40,7 +40,7 @@ const LOG_MOST: u32 = 2;
 /// Hop times until the first retransmission on a lossy channel. In this time the neighbour has also replied to a duplicate.
 const SOON: u32 = 4;
 
-/// Messages for which the channel counts as lossy after a loss.
+/// Number of messages after a loss for which the channel counts as lossy.
 const MEMORY: u8 = 8;
 
 /// Progress of a message at one relay.
@@ -99,7 +99,7 @@ pub(crate) struct Circulation {
 }
 
 impl Circulation {
-    /// `seed` sets the random part of the waits.
+    /// Creates an idle circulation; `seed` sets the random part of its waits.
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             stage: Stage::Idle,

@@ -153,7 +153,9 @@ impl Link<'_> {
         }))
     }
 
-    /// Returns the maximum x of the relay before on a pass toward Tx, m. Relays may be above each other if their altitudes allow.
+    /// Returns the maximum x of the previous relay of a pass toward Tx, m.
+    ///
+    /// Relays may be above each other if their altitudes allow that.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }

@@ -143,7 +143,7 @@ pub struct Step {
 /// Interference at the receiver of a hop, by position.
 #[derive(Clone, Copy, Debug)]
 pub enum HopInterference<'a> {
-    /// Constant Upsilon over the field's largest, as measured by the receiver.
+    /// Ratio of the receiver's measured Upsilon to the field's largest; the same at every position.
     Evenly(f32),
     /// Agreed field.
     In(InNoise<'a>),
@@ -159,7 +159,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns Upsilon at `x_m` over the field's largest.
+    /// Returns the ratio of Upsilon at `x_m` to the field's largest.
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,

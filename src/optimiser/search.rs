@@ -73,7 +73,7 @@ pub struct Search {
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// infeasible / feasible - 1 before the last sweep.
+    /// Relative width of the bracket before the last sweep: `infeasible` / `feasible` - 1.
     width: f32,
     ladder: Ladder,
     tried: u32,

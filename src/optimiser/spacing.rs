@@ -78,7 +78,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Required position of the relay before on the pass.
+/// Required position of the previous relay of the pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stand {
@@ -618,7 +618,9 @@ mod tests {
         )
     }
 
-    /// An interferer behind the transmitter makes SIR_1 rise at first. At 10 m behind, from 1.04 above Tx to 1.22 at 45 m.
+    /// An interferer behind the transmitter makes SIR_1 rise at first.
+    ///
+    /// With one 10 m behind, SIR_1 rises from 1.04 above Tx to 1.22 at 45 m.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

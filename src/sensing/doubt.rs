@@ -1,4 +1,4 @@
-//! Identification of the receiver whose measurements do not fit those of the others. That of a relay, or of an end of the chain.
+//! Identification of a relay, or an end of the chain, whose measurements do not fit those of the others.
 //!
 //! # Relay
 //!
@@ -66,7 +66,8 @@ const REST: u8 = 4;
 /// Maximum squared difference at which a relay fits the others again. In squared standard deviations, and absolutely.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays for an identification. With four, an exclusion leaves three, which any three unknowns fit.
+/// Minimum number of relays for an identification. With four, an exclusion leaves three, and three unknowns fit any three
+/// measurements.
 const FEWEST: u16 = 5;
 
 /// Minimum number of positions, after fading; with fewer, any of them could be faulty.
@@ -92,21 +93,24 @@ pub(crate) struct Trial {
     rest: u8,
     /// Node without which the others fit best.
     best: u16,
-    /// Misfit with all relays and without the best one, and their variance. The last value is the smallest variance without any
-    /// other.
+    /// Residual of the fit to all relays.
     seen: f32,
+    /// Residual of the fit without the node `best`.
     seen_best: f32,
+    /// Variance of the fit without the node `best`.
     least: f32,
+    /// Second smallest variance of the fits without one node.
     second: f32,
 }
 
+/// Use of a pass in the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
-    /// Review the result.
+    /// Take the pass's result as the estimate.
     Review,
-    /// Review the result; it is inconsistent, and the faulty relay is unknown.
+    /// Take the result although the measurements are inconsistent: the faulty relay is unknown.
     Unknown,
-    /// Start another pass soon.
+    /// Discard the result, and start another pass soon.
     Again,
 }
 

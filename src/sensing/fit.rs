@@ -27,7 +27,7 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error, in positions.
+/// Weight of the operator's expected error in the fit's variance, as a number of measured positions.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of t that separates the sides of the line.

@@ -35,7 +35,7 @@ pub(crate) const HELLO: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference of two numbers in nonces of one epoch that belong to the same node.
+/// Maximum difference between the numbers of two nonces that one node uses in an epoch.
 const NEAR: u32 = 1 << 12;
 
 /// Number of handshakes of an older epoch in a row that cannot be delayed ones.

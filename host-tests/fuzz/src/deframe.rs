@@ -8,8 +8,9 @@ use super::cobs::unstuffed;
 use super::input::Input;
 use super::setting;
 
-/// Reads `data` as a stream and two lengths of pieces, for a deframer byte by byte, and for two relays. One relay gets the stream
-/// whole, the other in pieces of those lengths.
+/// Reads `data` as two lengths and a stream.
+///
+/// A deframer gets the stream byte by byte, one relay gets it whole, and another relay in pieces of those lengths.
 ///
 /// # Panics
 /// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it got (each

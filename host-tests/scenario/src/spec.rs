@@ -147,13 +147,13 @@ impl Noise {
 
     /// Returns the noise power of all receivers in a mission, W.
     ///
-    /// [`Self::receiver_w`] over the antenna gain, the lower one if those of the relays and of Rx differ.
+    /// It is [`Self::receiver_w`] divided by the antenna gain: the lower one if those of the relays and of Rx differ.
     pub fn power_w(&self) -> f64 {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise is too high for some receivers. There is noise, and the gains differ.
+    /// Returns true if the mission's noise is too high for some receivers: the antenna gains differ.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()

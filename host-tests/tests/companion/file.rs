@@ -83,7 +83,7 @@ fn three_with_one_file_settle_where_the_simulated_chain_does() {
     assert_ne!(settled, simulated(&Scenario::default(), 3));
 }
 
-/// Checks by the digest that all programs read the same mission. It covers every number of a mission.
+/// Checks by the digest, which covers all numbers of a mission, that all programs read the same one.
 #[test]
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Folder::new();

@@ -27,7 +27,9 @@ fn golden() -> Vec<Frame> {
     Vectors::load().unwrap().frames
 }
 
-/// Returns golden frames after two lengths: each alone, then all of them with noise in between.
+/// Returns inputs of the target `deframe`: each golden frame, and three of them with noise in between.
+///
+/// Each starts with the two lengths of the pieces into which the stream is cut.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();
@@ -68,7 +70,7 @@ fn missions() -> Vec<Vec<u8>> {
     align.chain(joint).chain(adjust).collect()
 }
 
-/// Returns chains that are started, commanded to agree at the end, and run for so many rounds.
+/// Returns inputs of the target `chain`: every mission, and each operation and fault between rounds.
 fn chain() -> Vec<Vec<u8>> {
     let with = |mission: &[u8], operations: &[u8]| {
         // Seed, four relays without individual settings, to the end.
@@ -188,7 +190,7 @@ fn formed(wiring: u8) -> Vec<u8> {
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 
-/// Returns a relay that requires tags and receives frames of another mission and without a tag.
+/// Returns the input of a relay with a key that receives frames of another mission, and without a tag.
 fn refused() -> Vec<u8> {
     let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
     let other = [9, 0, 3, 255, 0, 0];

@@ -51,7 +51,7 @@ impl<'a> World<'a> {
         Ok(world)
     }
 
-    /// Runs one turn of the main loop of relay `at`, counted from 0. Time, frames, events, next wake-up time.
+    /// Runs the main loop of relay `at`, counted from 0, once: timers, frames, events, next wake-up time.
     pub(crate) fn turn(&mut self, at: usize) -> Checked {
         let now = self.now;
         let relay = &mut self.relays[at];

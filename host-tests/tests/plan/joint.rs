@@ -180,7 +180,7 @@ fn a_relay_that_holds_its_altitude_has_the_others_take_the_side_that_suits_it() 
     }
 }
 
-/// Returns the plan's SIR over the reference's optimum.
+/// Returns the ratio of the plan's SIR to the reference's optimum.
 fn over_the_judge(number: u32, optimum: f64) -> f64 {
     let Drawn { link, corridor, .. } = numbered(number);
     let relays = u16::try_from(link.len()).unwrap();

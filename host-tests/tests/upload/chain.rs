@@ -6,7 +6,7 @@ use super::*;
 
 const AT: Instant = seconds(20);
 
-/// Runs `setup` with an upload of `config`. Returns the time until all have positions, ms, and the bytes.
+/// Runs `setup` with an upload of `config`. Returns the time until all relays have positions, ms, and the bytes sent for it.
 fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     let mut calm = setup.clone();
     calm.partitions.clear();

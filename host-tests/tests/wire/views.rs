@@ -10,7 +10,7 @@ use super::votes::{
     ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
 };
 
-/// Returns an idle relay `own` of 8 in `view`, received from relay `own` - 1 as a view of eight.
+/// Returns an idle relay `own` that has accepted `view` of all eight relays, and its mission's digest.
 fn in_view(own: u16, view: u32) -> (Relay, u16) {
     let mut relay = relay(own, 8, Wiring::Pair);
     let mission = digest(relay.mission());

@@ -26,7 +26,7 @@ pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     wire(&plain(header, &said.body()))
 }
 
-/// Returns the view of that number proposed by `node`.
+/// Returns the identifier of view `number` proposed by `node`.
 pub(crate) const fn id(number: u32, node: u16) -> u32 {
     number << 10 | node as u32
 }

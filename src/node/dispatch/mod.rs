@@ -346,7 +346,7 @@ const MOST: u32 = 4;
 /// Timer for dropping the links of a part without a quorum.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Adrift {
-    /// Expiry; `None` with a quorum.
+    /// Expiry of the timer; `None` while there is a quorum.
     at: Option<Instant>,
     again: bool,
 }

@@ -68,11 +68,13 @@ pub(crate) struct Liveness {
     lost: bool,
     /// True once a frame has been received since the start or the last loss.
     met: bool,
-    /// Number of the last question, 0 before any; then the times of the last questions, latest first.
+    /// Number of the last question, 0 before any.
     question: u16,
+    /// Times of the last questions, latest first.
     asked: [Instant; OPEN],
-    /// Questions since the last sign of life, and the recent maximum before an answer.
+    /// Number of questions since the last sign of life.
     unanswered: u16,
+    /// Recent maximum of `unanswered` at an answer.
     longest: u16,
 }
 

@@ -576,7 +576,9 @@ impl Neighbour {
         self.is_mutual() && self.liveness.is_there() && self.distance > distance
     }
 
-    /// Records a hello of node `distance` places away. The neighbour it has selected, and whether it hears this relay.
+    /// Records a hello of the node `distance` places away.
+    ///
+    /// `neighbour` is the one that it has selected toward this relay. `hears` is true if it receives this one.
     pub(crate) fn says(
         &mut self,
         distance: u16,

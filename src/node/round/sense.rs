@@ -198,7 +198,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Evaluates a search for the faulty relay; returns true if it continues, and the result is not used.
+    /// Continues the search for a faulty relay with a pass; returns true if the pass has no other use.
     fn tries(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
             return false;
@@ -326,11 +326,13 @@ pub(super) struct Ear {
     pub(super) receiver: Average,
     /// True while this relay excludes its own measurements, because they do not fit the others.
     pub(super) off: bool,
-    /// Node excluded from the last pass, and node known to be faulty; 0 for none.
+    /// Node excluded from the last pass; 0 for none.
     pub(super) left_out: u16,
+    /// Node known to be faulty; 0 for none.
     pub(super) named: u16,
-    /// Leader only: search for the faulty relay, and ground ends whose measurements do not fit.
+    /// Leader only: search for the faulty relay.
     pub(super) trial: Trial,
+    /// Leader only: ground ends whose measurements do not fit.
     pub(super) ends: EndsOff,
     /// True if the last result was inconsistent, and the faulty relay is unknown.
     pub(super) contradicted: bool,

@@ -243,7 +243,7 @@ impl Sweeping {
         self.done
     }
 
-    /// Accepts a verdict if its committed target is met and this relay can take a position for it.
+    /// Accepts a verdict, and returns true, if its target is met and this relay can take a position for it.
     pub(crate) fn take(&mut self, link: Link<'_>, answer: &Answer) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);

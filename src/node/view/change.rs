@@ -105,7 +105,7 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members have accepted `view` if it is the last accepted one. An agreement in it was received.
+    /// Records, after an agreement in `view`, that all its members have accepted it. Earlier views are ignored.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -522,8 +522,9 @@ pub(crate) struct Asking {
     /// Number of requests so far.
     tries: u8,
     at: Option<Instant>,
-    /// Consecutive refusals, and the earliest time of the next request if anything changes.
+    /// Number of consecutive refusals.
     refusals: u8,
+    /// Earliest time of the next request if anything changes.
     soon: Option<Instant>,
     jitter: Jitter,
 }
@@ -575,7 +576,9 @@ impl Asking {
         }
     }
 
-    /// Requests a view after about `wait`, which consecutive refusals double up to three times. A change ends the doubling.
+    /// Requests a view after about `wait`, which consecutive refusals double up to three times.
+    ///
+    /// [`ask_anew`](Self::ask_anew) ends the doubling.
     pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
         self.asks = true;
         let wait = self.jitter.spread(wait);

@@ -441,7 +441,9 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
     assert!(relay.handle(&later).news.is_some());
 }
 
-/// Regression test: two views had one identifier when only relay 1 had lost relay 2. They were relays 1 to 3, and 1 and 4.
+/// Regression test: when only relay 1 had lost relay 2, views with other members had one identifier.
+///
+/// One had relays 1 to 3, the other 1 and 4.
 #[test]
 fn a_proposal_is_handed_to_one_node_alone() {
     let mut relay = Relay::new(1);

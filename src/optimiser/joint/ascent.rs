@@ -24,8 +24,9 @@ const LEAST_SLOPE: f32 = 0.3;
 /// Initial distance of the target above the ceiling for a repeated probe, in ln gamma.
 const EXCESS: f32 = 0.03;
 
-/// Initial and minimum limit of the slack that counts where it would outweigh a penalty, in units of D.
+/// First limit of the slack that counts, in units of D. Without a limit, slack would outweigh a penalty.
 const SPARE: f32 = 3e-3;
+/// Limit below which it is not reduced further, in units of D.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of negative slack relative to positive slack.

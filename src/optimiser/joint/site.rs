@@ -245,7 +245,9 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the dependent coordinate for the free coordinates `at`, by the hop `from` the sender.
+    /// Returns the dependent coordinate at which the hop `from` the sender meets `target`.
+    ///
+    /// `at` are the two free coordinates.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -567,8 +569,9 @@ impl Site<'_> {
         }
     }
 
-    /// Returns the dependent coordinate and the slope of F by it. It has the steepest slope and is not at an end of its room
-    /// `low` to `high`.
+    /// Returns the dependent coordinate and the slope of F by it.
+    ///
+    /// It is the coordinate with the steepest slope of those that are not at an end of their room, `low` to `high`.
     fn axis(
         &self,
         c: f32,

@@ -20,8 +20,9 @@ pub(super) enum Start {
     Around { aside: f32, up: f32, far: f32 },
     /// Arch without a minimum separation. The sweep's rules, which let relays hold back, judge it.
     Through { aside: f32, up: f32 },
-    /// Arch to the side, with altitudes interpolated between relays with a fixed altitude. Before the first and after the last of
-    /// them `level`, or down to Tx and Rx.
+    /// Arch to the side, with altitudes interpolated between relays with a fixed altitude.
+    ///
+    /// Before the first and after the last of those relays the chain is `level`, or goes down to Tx and Rx.
     Held { aside: f32, level: bool },
     /// Relays at the outer corner of the room and one minimum separation beside it, alternately. For relays without room for a row.
     Turns,

@@ -272,7 +272,7 @@ pub enum FreeCase {
     Highest(PlaceCase),
     /// Position above Rx, by Theorem 2.
     AboveRx(AltitudeCase),
-    /// Touching position of the level lines of both SIRs inside the box, with noise.
+    /// Point inside the box at which the level lines of both SIRs touch; only with noise.
     Touching,
 }
 

@@ -131,7 +131,7 @@ fn pieces<E>(
     }
 }
 
-/// Converts the time of a packet, because the reader assumes nanoseconds whatever the resolution.
+/// Converts the time of a packet from its resolution: the reader takes every unit for a nanosecond.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

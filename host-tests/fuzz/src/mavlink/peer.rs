@@ -33,10 +33,12 @@ pub(super) struct Peer {
     /// Current stamp of the autopilot, and its signed frames.
     stamp: u64,
     history: Vec<Vec<u8>>,
-    /// State of the link: the time in stamps at a time of its clock, the known senders, the last own stamp.
+    /// Stamp of the link's clock at the instant `at`.
     time: u64,
     at: Instant,
+    /// Senders known to the link.
     senders: Vec<Sender>,
+    /// Last stamp that the link sent.
     sent: u64,
     parser: Parser,
     pub(super) refused: u32,

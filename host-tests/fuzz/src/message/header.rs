@@ -7,9 +7,9 @@ use uav_relay::CRC_32C;
 pub struct Header {
     /// Network number.
     pub network: u16,
-    /// Sender, and above it the version less 1.
+    /// Sender's index; any bits above it change the version in the frame.
     pub sender: u16,
-    /// Destination, and above it flags.
+    /// Destination's index; the bits above it are flags.
     pub destination: u16,
 }
 

@@ -152,12 +152,12 @@ impl Setup {
         }
     }
 
-    /// Run on one ideal channel without collisions ([`Access::Ideal`]).
+    /// Creates the setup of a run on one ideal channel without collisions ([`Access::Ideal`]).
     pub fn on_shared_channel(mission: Mission) -> Self {
         Self::on_air(mission, Access::Ideal)
     }
 
-    /// Run on one shared channel with the given access method.
+    /// Creates the setup of a run on one shared channel with the given access method.
     pub fn on_air(mission: Mission, access: Access) -> Self {
         let mut setup = Self::new(mission);
         setup.settings.wiring = Wiring::Shared;

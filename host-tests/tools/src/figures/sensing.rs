@@ -40,9 +40,9 @@ pub struct Followed {
     pub relays: u16,
     /// Speed of the interferer, m/s.
     pub speed_mps: f64,
-    /// Mean share of the momentary optimum of the chain that tracks the interferer.
+    /// Mean ratio to the optimum at the same moment, for the chain that tracks the interferer.
     pub followed_linear: f64,
-    /// Mean share of the momentary optimum of the chain that keeps its first positions.
+    /// Mean ratio to the optimum at the same moment, for the chain that keeps its first positions.
     pub stayed_linear: f64,
 }
 

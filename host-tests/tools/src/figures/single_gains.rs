@@ -166,7 +166,9 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference from the printed averages, percentage points. `middle` replaces the blind method.
+/// Returns the larger difference of a row from the paper's two averages, percentage points.
+///
+/// With `middle` the second average is that over the relay in the middle, instead of the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent

@@ -10,16 +10,16 @@ use crate::figures::error::FigureError;
 /// Start of the evaluation, s after the start of the run.
 const BEGUN_S: u32 = 60;
 
-/// Mean shares of the momentary optimum, per scene, from a minute after the start on.
+/// Mean ratios of a chain's SIR to the optimum at the same moment, per scene, after the first minute.
 #[derive(Clone, Debug, Default)]
 pub struct Shares {
-    /// Shares of the chain that tracks the interferer.
+    /// Ratios of the chain that tracks the interferer.
     pub followed: Vec<f64>,
-    /// Shares of the chain that keeps its first optimal positions.
+    /// Ratios of the chain that keeps its first optimal positions.
     pub stayed: Vec<f64>,
 }
 
-/// Returns the shares in `scenes` scenes while a single interferer passes at a distance of 300 m.
+/// Returns the ratios in `scenes` scenes while a single interferer passes at a distance of 300 m.
 ///
 /// # Errors
 /// [`FigureError`].

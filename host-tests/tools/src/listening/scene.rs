@@ -88,7 +88,9 @@ impl RandomScene {
         Mission::try_new(config).map_err(|_| NO_SCENE)
     }
 
-    /// Returns the best SIR with full knowledge, linear: one source, the briefed chain's. Several, the exact optimum.
+    /// Returns the best SIR with the interferers known, linear.
+    ///
+    /// For one source it is the SIR of the chain that knows it, for several the exact optimum.
     ///
     /// # Errors
     /// [`FigureError`].

@@ -26,7 +26,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Returns true if the least separation costs more than a millionth of the SIR. It is kept in any case.
+    /// Returns true if the least separation, which the chain keeps, costs more than a millionth of the SIR.
     pub fn separation_binds(&self) -> bool {
         self.sir < self.free_sir * (1.0 - 1e-6)
     }

@@ -11,7 +11,7 @@ use super::multi_interferer::with_one;
 use super::request::{Number, PlanRequest};
 use super::{altitude, source};
 
-/// A chain as the relays settle by themselves.
+/// Chain at the positions that the on-board code finds.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
     /// Positions, with SIRs against the full interference.

@@ -155,7 +155,7 @@ impl Planner<'_> {
 
     /// Returns single-interferer scenarios whose chains may take another route.
     ///
-    /// The hypothetical interferer on the other side, with room on one side or none, and each of the first interferers alone.
+    /// They have the hypothetical interferer on the other side, room on one side or none, or one of the first interferers alone.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();

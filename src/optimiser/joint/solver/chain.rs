@@ -77,7 +77,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns relay `index`, which receives from `from`.
+    /// Returns the solver's description of relay `index`, whose sender is at `from`.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)

@@ -251,8 +251,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of a polished chain that meets `sigma`. One relay by a fraction of its room, halved round by round. It
-    /// finds gains that the derivatives do not show because another constraint is active.
+    /// Tries the next move of a chain that meets `sigma`: one relay by a fraction of its room.
+    ///
+    /// The fraction is halved from round to round. The moves find gains that the derivatives do not show, because another
+    /// constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -185,7 +185,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 /// Relays in one portion of a plain pass.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty of a chain that is judged, in units of D.
+/// Maximum penalty at which the judged chain still counts as possible, in units of D.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -309,9 +309,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation. The chain is solved.
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
     ///
-    /// It equals the limit in the passes with the sweep's rules, to the bit.
+    /// To be called once the chain is solved. The limit is equal, to the bit, to the one in the passes with the sweep's rules.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
         let first = mission.config().distance_m - steps.clone().sum::<f32>();

@@ -39,18 +39,21 @@ const FINE: f64 = 1e-12;
 /// Least improvement on the best chain, in ln SIR, for which polishing continues.
 const WORTH: f64 = 1e-8;
 
-/// Initial slack of polishing, in ln SIR: large to move far from the chain, small to stay near.
+/// Initial slack of a polishing that may move far from its chain, in ln SIR.
 const FAR: f64 = 1.0;
+/// Initial slack of a polishing that stays near its chain, in ln SIR.
 const NEAR: f64 = 0.03;
 
 const ANYWHERE: (f64, f64) = (0.0, 1.0);
 
-/// Columns and rows of the levels by round.
+/// Columns and rows of the grid of lateral positions and altitudes, by round.
 const GRIDS: [(u32, u32); 4] = [(5, 4), (4, 6), (7, 4), (6, 5)];
 
-/// Bent chains, random chains and perturbations of the best chain per round.
+/// Number of bent chains per round.
 const BOWS: u32 = 8;
+/// Number of random chains per round.
 const SCATTERED: u32 = 2;
+/// Number of perturbations of the best chain per round.
 const KICKS: u32 = 10;
 
 pub(super) fn search(scene: &Scene, effort: Effort) -> Option<Vec<Triple>> {
@@ -99,7 +102,9 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Tries chains at one common cross-section position. Several lateral positions, each with the best of a few altitudes.
+    /// Tries chains at one common lateral position and altitude.
+    ///
+    /// Several lateral positions are tried, each at the best of a few altitudes.
     fn one_level(&mut self) {
         for side in [Side::Any, Side::Left, Side::Right] {
             let Some(room) = side.part(self.scene) else {
@@ -115,7 +120,7 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the best chain at one lateral position over several altitudes of a room.
+    /// Returns the best of the chains at lateral position `y` and one of several altitudes in `room`.
     fn best_altitude(&self, y: f64, room: &Room) -> Option<Vec<Triple>> {
         let mut best: Option<(f64, Vec<Triple>)> = None;
         for row in 0..8 {

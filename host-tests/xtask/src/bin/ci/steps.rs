@@ -264,7 +264,9 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that need a nightly compiler. Every fuzz target, starting with its corpus, and the corpora under Miri.
+/// Returns the steps that need a nightly compiler: every fuzz target, and the corpora under Miri.
+///
+/// A fuzz target starts with its corpus.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {
