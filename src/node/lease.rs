@@ -14,7 +14,7 @@
 //! | any | duplicate renewal received | reply whether it has completed |
 //! | last | renewal received | reply: completed |
 //! | any | completion received | forward it; at the leader: extend the lease from the start of this renewal, schedule the next one |
-//! | any | lease expired | drop the agreement; request a new view |
+//! | any | lease expired | request a new view; the setpoint stays |
 //!
 //! # Safety
 //! No relay uses an old agreement once positions of a later view may be used. Suppose that every member took part in renewal n

@@ -496,7 +496,8 @@ impl Relay {
 
     /// Returns the expiry time of the lease; `None` before the first lease and after its expiry.
     ///
-    /// Without a renewal the relay drops the agreement at that time; no other relay uses another agreement before.
+    /// Without a renewal the relay requests a new view at that time, and keeps its setpoint. No other relay uses another agreement
+    /// before.
     pub fn lease(&self) -> Option<Instant> {
         let until = self.node.lease()?;
         Some(self.clock.external(until))
