@@ -401,7 +401,7 @@ impl Vector {
         .unit()
     }
 
-    /// Returns latitude and longitude of a point near the ellipsoid, by one step of Bowring's method; radians.
+    /// Returns latitude and longitude of a point near the ellipsoid, rad. It takes one step of Bowring's method.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
         // b / a. The tangent of the parametric latitude is z / (p b / a).
@@ -457,7 +457,7 @@ impl Vector {
     }
 }
 
-/// Returns the ellipsoid's radius of curvature where its normal is `normal`, in the direction `along`, m.
+/// Returns the ellipsoid's radius of curvature, m. Its normal is `normal`, and the direction is `along`.
 pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
     let cos2 = 1.0 - sin2;

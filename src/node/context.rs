@@ -1,4 +1,4 @@
-//! Shared state that every layer receives, the effects of a layer on the others, and durations that several layers share.
+//! State that every layer receives, effects of a layer on the others, and shared durations.
 
 use crate::mission::{Band, Heading, Interference, Mission};
 use crate::node::circulation::Path;
@@ -201,7 +201,7 @@ pub(crate) struct Effects {
     pub(crate) alive: Option<(Peer, Instant)>,
     /// Origin of the proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,
-    /// That proposal is outstanding, and no pass continues before its decision.
+    /// Outstanding proposal: no pass continues before its decision.
     pub(crate) view_proposed: bool,
     pub(crate) news: Option<News>,
     /// Changes of the interference estimate and of the faulty receivers.

@@ -228,9 +228,9 @@ impl MissionUpdate {
         }
     }
 
-    /// Returns the pending offer to the neighbour `to` at `side` that `holds` an older or unknown mission, and marks it as sent. The number is
-    /// that of the hello that it answers; `None` if a hello has to be requested first, because the last one is older than half of
-    /// `dead_after`.
+    /// Returns the pending offer to the neighbour `to` at `side`, and marks it as sent. The neighbour `holds` an older or unknown
+    /// mission. The number is that of the hello that it answers; `None` if a hello has to be requested first, because the last
+    /// one is older than half of `dead_after`.
     pub(crate) fn take_offer(
         &mut self,
         (side, to): (Side, u16),
@@ -270,7 +270,7 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules a hello to the ground station at `side`, or the stored upload in answer to its hello `asks`.
+    /// Schedules a hello to the ground station at `side`. If its hello `asks`, schedules the stored upload instead.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;

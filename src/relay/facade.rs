@@ -305,7 +305,7 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the acceptor state if it has changed since the last [`persisted`](Self::persisted), to be stored now.
+    /// Returns the acceptor state, to be stored now, if it differs from the stored one.
     ///
     /// [`poll_transmit`](Self::poll_transmit) returns no frame until the state is confirmed: a restarted relay that has forgotten
     /// what it sent could vote twice, and the chain could split. Takes constant time.
@@ -343,7 +343,7 @@ impl Relay {
         }
     }
 
-    /// Restores the record that was [`persisted`](Self::persisted) before the relay was switched off in flight.
+    /// Restores the record that was stored before the relay was switched off in flight.
     ///
     /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
     ///

@@ -1,4 +1,4 @@
-//! Identification of a relay, or an end of the chain, whose measurements do not fit those of the others.
+//! Identification of a relay or an end of the chain with measurements that do not fit the others.
 //!
 //! # Relay
 //!

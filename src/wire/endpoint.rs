@@ -25,7 +25,7 @@ pub(crate) struct Endpoint {
     network: u16,
     node: u16,
     counter: u32,
-    /// Sessions with other nodes; `None` if this node does not sign, and without the feature `auth` not even that.
+    /// Sessions with other nodes. `None` if this node does not sign; without the feature `auth` the type is uninhabited.
     session: [Option<Session>; AUTH as usize],
 }
 

@@ -162,7 +162,8 @@ impl Upload {
     }
 }
 
-/// Mission with a version; uninhabited without the feature `upload`, so that the compiler drops all that handles one.
+/// Mission with a version. The type is uninhabited without the feature `upload`, so that the compiler drops all code that handles
+/// one.
 #[cfg(not(feature = "upload"))]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Upload {}

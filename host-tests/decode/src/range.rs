@@ -49,7 +49,8 @@ fn is_between(range: &str, number: f64) -> bool {
     (least..=most).contains(&number) || zero && number == 0.0
 }
 
-/// Reads `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`: true if 0 is allowed in addition, and the bounds.
+/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`. Returns true if 0 is allowed in addition, and the
+/// bounds.
 pub fn bounds(range: &str) -> (bool, f64, f64) {
     let first = range.split(';').next().unwrap_or_default();
     let (zero, rest) = ["`00000000` or ", "0 or "]

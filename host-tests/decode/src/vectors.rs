@@ -1,4 +1,5 @@
-//! Test vectors of the wire format: `host-tests/tests/data/vectors.json`, from an independent Python program.
+//! Test vectors of the wire format, made by an independent Python program. Their file is
+//! `host-tests/tests/data/vectors.json`.
 //!
 //! It encodes bodies by the byte tables (tags 0 and 2 also by the postcard implementation pohlednice 0.2.1), CRC bit by bit,
 //! COBS by definition, and ladders with each step rounded. `FORMAT.md` describes the file.

@@ -99,7 +99,7 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
     }
 }
 
-/// Checks commands of which a cable or a router delivers two at once: the second one is as good as lost, and its repetition counts.
+/// Checks commands that a cable or a router delivers two at once. The second one is as good as lost, and its repetition counts.
 #[test]
 fn two_commands_at_once_are_obeyed_one_after_the_other() {
     let mut vehicle = Vehicle::new(Kind::Px4);

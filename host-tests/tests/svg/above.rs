@@ -104,7 +104,7 @@ fn an_interferer_beside_the_line_is_seen_beside_it() {
     }
 }
 
-/// Checks interferers farther from the line than the line is long: an arrow at the edge of a plot with readable axes.
+/// Checks interferers farther from the line than its length. An arrow is at the edge of a plot with readable axes.
 #[test]
 fn an_interferer_far_beside_the_line_is_an_arrow_at_the_edge() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();

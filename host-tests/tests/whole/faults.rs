@@ -96,7 +96,7 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
     assert!(worst.is_empty(), "{worst:?}");
 }
 
-/// Checks a chain that has closed over relay 3, whose hello counted relays 1 and 2 although it was linked to neither. Relay 6 then
+/// Checks a chain that has closed over relay 3. Its hello counted relays 1 and 2 although it was linked to neither. Relay 6 then
 /// selected it in place of relay 5 every 16 s.
 #[test]
 fn a_relay_that_is_left_out_draws_no_other_away() {

@@ -1,4 +1,4 @@
-//! Second codec: bodies by the tables of `FORMAT.md` (`uav_relay_decode`), CRC and COBS of other crates.
+//! Second codec: bodies by the tables of `FORMAT.md`, CRC and COBS of other crates.
 //!
 //! The names of the tables connect the values of a message here with its bytes, and `message` with the crate's type.
 //!

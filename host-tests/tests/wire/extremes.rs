@@ -1,4 +1,4 @@
-//! Coverage of the golden vectors: both bounds of every field, every flag, and the longest and shortest messages.
+//! Coverage of the golden vectors: bounds of every field, every flag, longest and shortest messages.
 
 use std::collections::{BTreeMap, BTreeSet};
 

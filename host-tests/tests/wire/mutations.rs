@@ -1,4 +1,4 @@
-//! Every golden body with changed numbers, at every offset: the crate accepts and refuses what the tables do.
+//! Mutated golden bodies. For changed numbers at every offset the verdict of the crate is that of the tables.
 
 use uav_relay::wire::message::{Message, MessageError};
 
@@ -55,8 +55,8 @@ const NODES: [u16; 20] = [
 
 const SITES: [i32; 2] = [900_000_000, 1_800_000_000];
 
-/// Returns all 4-byte numbers to try: f32, views and sites, and those of the body itself with their neighbours if the rules of its
-/// message compare them.
+/// Returns all 4-byte numbers to try. They are f32, views and sites, and numbers of the body itself with their neighbours if the
+/// rules of its message compare them.
 fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     let mut floats: Vec<f32> = BOUNDS.iter().map(|bound| *bound as f32).collect();
     let own = match message {

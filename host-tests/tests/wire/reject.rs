@@ -1,4 +1,4 @@
-//! Refusals of versions, flags and node numbers, and of values that the crate may encode; `mutations.rs` has the ranges.
+//! Refusals of versions, flags, node numbers and encodable values. `mutations.rs` has the ranges.
 
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::optimiser::{PerTarget, pass::Verdict};

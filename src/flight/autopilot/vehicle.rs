@@ -1,4 +1,5 @@
-//! The autopilot as it is known: its kind, its reports and its clock, the delay of the link, the drone's position, and what a SiK radio hears.
+//! State of the autopilot as received. It has the kind, reports and clock, the delay of the link, the drone's position, and the
+//! noise that a SiK radio measures.
 
 use super::state::FlightMode;
 use crate::flight::autopilot::state::Observed;

@@ -117,7 +117,7 @@ impl Node {
         there && (far.is_two_way(distance, now, settings) || far.comes_along(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this one if `far` is this relay's other side.
+    /// Returns the number of relays that a neighbour reaches through this one. `far` is this relay's other side.
     fn behind(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.

@@ -1,4 +1,4 @@
-//! Model check of the view change: the code of the firmware in short chains, under every order of events.
+//! Model check of the view change. It runs the code of the firmware in short chains, under every order of events.
 //!
 //! | event | model |
 //! | --- | --- |

@@ -326,8 +326,8 @@ mod tests {
         assert_eq!(first.unpersisted(), None);
     }
 
-    /// Runs relay 2 of three on a shared channel, where it searches for its silent neighbours, while another record is stored than
-    /// its own.
+    /// Checks relay 2 of three on a shared channel. It searches for its silent neighbours while another record is stored than its
+    /// own.
     #[test]
     fn nothing_is_sent_before_the_record_is_stored() {
         let mission = Mission::try_new(paper(3)).unwrap();

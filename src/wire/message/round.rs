@@ -1,4 +1,4 @@
-//! Messages of a round: sweep and verdict, profiles of the joint method, token of Algorithm 2, interference measurements.
+//! Messages of a round: sweeps and verdicts, profiles, tokens of Algorithm 2, measurements.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};

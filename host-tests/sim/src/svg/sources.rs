@@ -51,7 +51,7 @@ pub(super) fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
 }
 
-/// Returns an arrow at the bottom edge `y` of the top view that points down, or at the top edge one that points up.
+/// Returns an arrow at an edge of the top view. It points down at the bottom edge `y`, and up at the top edge.
 fn arrow((x, y): Point, down: bool) -> [Point; 3] {
     let inward = if down { -1.0 } else { 1.0 };
     let (tip, back) = (y + 2.0 * inward, y + 10.0 * inward);

@@ -28,7 +28,7 @@ fn what_is_heard_comes_from_an_interferer() {
     assert!(json(&options)["sir"].is_number());
 }
 
-/// Checks the strip of events in a picture of relays that spread evenly at first: they have agreed on no SIR then.
+/// Checks the strip of events of relays that spread evenly at first. They have agreed on no SIR then.
 #[test]
 fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Chain as seen by the passes: senders, fixed altitudes, and the ceilings of the first and the last hop.
+//! Chain for the passes: senders, fixed altitudes, ceilings of the first and the last hop.
 //!
 //! Powers and rooms of the relays are given as [`Seat`]. A chain is stored in segments, with the value function at the end of
 //! each, and the policies of one.

@@ -1,4 +1,4 @@
-//! Commands of this project in blocks that need hardware: without it they start far enough to accept or refuse their options.
+//! Commands of this project in blocks that need hardware. Without it they start far enough to accept or refuse their options.
 
 /// Programs for Linux, and the aliases of `.cargo/config.toml` for them.
 const PROGRAMS: [(&str, &str); 2] = [("linux_companion", "companion"), ("linux_ground", "ground")];
@@ -13,7 +13,7 @@ const ALIASES: [&str; 6] = [
     "provision",
 ];
 
-/// Exit statuses of a program that has accepted its options: it succeeded, it found no hardware, or it was still running at the
+/// Exit statuses of a program that has accepted its options. It succeeded, it found no hardware, or it was still running at the
 /// time limit.
 const ACCEPTED: [i32; 3] = [0, 1, TIMEOUT];
 

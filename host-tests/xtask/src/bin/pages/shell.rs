@@ -99,7 +99,7 @@ impl Shell {
         Err(format!("ends with {status} after\n  {}", last.join("\n  ")))
     }
 
-    /// Starts a command without its hardware; returns its exit status, `None` after a signal, and its output.
+    /// Starts a command without its hardware. Returns its exit status, `None` after a signal, and its output.
     pub(crate) fn begin(&self, command: &str) -> Result<(Option<i32>, String), String> {
         let (status, said) = self.ended(command, BEGUN_S)?;
         Ok((status.code(), said))
@@ -120,8 +120,8 @@ impl Shell {
     }
 }
 
-/// Returns a shell function `cargo` that runs the binaries in `bin` for those aliases of `config` that are built. It runs
-/// everything else in `root`, so that nothing is built again for other paths.
+/// Returns a shell function `cargo` that runs the built binaries in `bin` for aliases of `config`. It runs everything else in
+/// `root`, so that nothing is built again for other paths.
 fn functions(config: &str, bin: &Path, root: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {
