@@ -16,7 +16,7 @@
 //! | [`socket`], [`counters`] | status socket; frame counters as JSON |
 //! | [`refusals`] | reasons of rejected frames, in words |
 //! | [`notify`] | systemd notifications |
-//! | [`epoch`], [`keep`] | epoch file; atomic file replacement |
+//! | [`epoch`], [`atomic_file`] | epoch file; atomic file replacement |
 #![cfg(unix)]
 #![forbid(unsafe_code)]
 

@@ -2,7 +2,7 @@
 //!
 //! `Terms` are those of which 1 / I is a linear combination; a source has a coefficient for each. A [`Level`] is the interference
 //! at an end of the chain, on the ground, within the measurable range of powers.
-//! A [`Listener`] has the measurements of one relay: the average at its position, and faded sums of earlier positions.
+//! A `Listener` has the measurements of one relay: the average at its position, and faded sums of earlier positions.
 
 use crate::mission::{Interferer, Mission};
 use crate::place::Placement;

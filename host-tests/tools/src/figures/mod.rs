@@ -15,7 +15,7 @@
 //! | [`walk`], [`flight`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
 //! | [`chart`], [`scale`], [`draw`] | a chart, its axes, its SVG |
 //! | [`sheet`], [`page`] | a figure with its tables and text; the page of all figures |
-//! | [`trouble`] | errors |
+//! | [`error`] | errors |
 
 pub mod adjust;
 pub mod altitude;

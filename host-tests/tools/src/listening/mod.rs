@@ -2,9 +2,9 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`wild`] | a random scene and its simulation setups |
+//! | [`scene`] | a random scene and its simulation setups |
 //! | [`found`] | static sources: share of the optimum after each agreement |
-//! | [`followed`] | a moving source: mean share of the optimum over time |
+//! | [`moving`] | a moving source: mean share of the optimum over time |
 
 pub mod found;
 pub mod moving;
