@@ -112,7 +112,9 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     );
     let beside = beside(&relay, link.as_ref(), autopilot);
     let store = |record: &ViewRecord| {
-        votes.iter_mut().for_each(|votes| votes.store(record));
+        if let Some(votes) = &mut votes {
+            votes.store(record);
+        }
         true
     };
     let runs = ports.run(&relay, &EmbassyClock, store);
@@ -140,7 +142,9 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
     let beside = beside(&relay, link.as_ref(), autopilot);
     let store = |record: &ViewRecord| {
-        votes.iter_mut().for_each(|votes| votes.store(record));
+        if let Some(votes) = &mut votes {
+            votes.store(record);
+        }
         true
     };
     let runs = ports.run(&relay, &EmbassyClock, store);
