@@ -90,7 +90,7 @@ impl Flight {
             auth,
             ..plan.settings
         };
-        let views = Views::load(plan.view_file.as_deref())?;
+        let mut views = Views::load(plan.view_file.as_deref())?;
         let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), service.now())
             .map_err(|error| error.to_string())?;
         let resumed = resume(plan, &mut relay, &log);
@@ -124,6 +124,9 @@ impl Flight {
         }
         if views.stored().is_some() {
             report.stands_by();
+        } else {
+            // Written at once, so that a failure of the disk is reported before flight.
+            views.store(&relay.view_record());
         }
         Ok(Self {
             service,

@@ -326,6 +326,12 @@ impl Relay {
         self.node.unpersisted()
     }
 
+    /// Returns the present acceptor state: to be stored at the start, for instance, so that a failure of the storage shows before
+    /// flight. Takes constant time.
+    pub const fn view_record(&self) -> ViewRecord {
+        self.node.view_record()
+    }
+
     /// Confirms that `record`, returned by [`unpersisted`](Self::unpersisted), is stored. Takes constant time.
     ///
     /// A firmware without storage confirms each record at once; its relay must then stay off for the rest of the flight after a

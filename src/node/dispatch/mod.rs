@@ -257,8 +257,12 @@ impl Node {
 
     /// Returns the acceptor state if it differs from the one that is stored.
     pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
-        let record = self.layers.view.record(self.member.digest);
+        let record = self.view_record();
         (record != self.persisted).then_some(record)
+    }
+
+    pub(crate) const fn view_record(&self) -> ViewRecord {
+        self.layers.view.record(self.member.digest)
     }
 
     /// Records that `record` is stored.
