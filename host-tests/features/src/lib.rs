@@ -145,6 +145,7 @@ impl Chain {
         let mut frame = [0; MAX_FRAME];
         let count = self.relays.len();
         for (index, (relay, silent)) in self.relays.iter_mut().zip(&self.silent).enumerate() {
+            relay.persist(|_| true);
             while let Some(transmit) = relay
                 .poll_transmit(self.now, &mut frame)
                 .filter(|_| !silent)

@@ -69,6 +69,9 @@ fn cut(stream: &[u8], lengths: u16) {
     assert_eq!(whole.stats(), pieces.stats());
     assert_eq!(whole.phase(), pieces.phase());
     assert_eq!(whole.setpoint(), pieces.setpoint());
+    assert_eq!(whole.unpersisted(), pieces.unpersisted());
+    whole.persist(|_| true);
+    pieces.persist(|_| true);
     let mut buffers = ([0; MAX_FRAME], [0; MAX_FRAME]);
     loop {
         let one = whole.poll_transmit(Instant::ZERO, &mut buffers.0);
