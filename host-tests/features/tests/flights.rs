@@ -22,7 +22,7 @@ const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
 /// CRCs of all bytes sent in the flights below.
 const SAID_BY_WIRES: u32 = 0x81db_29ac;
-const SAID_ON_A_CHANNEL: u32 = 0x9f11_89c6;
+const SAID_ON_A_CHANNEL: u32 = 0xfa29_11d7;
 
 const MINUTE: Duration = Duration::from_millis(60_000);
 
