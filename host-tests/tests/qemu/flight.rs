@@ -59,7 +59,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     fleet.wait("line to fly along", |lines| {
         lines
             .iter()
-            .any(|line| line.text.starts_with("the autopilot flies along 1343.79"))
+            .any(|line| line.text.starts_with("autopilot: line of 1343.79"))
     });
     let from = Placement {
         x_m: to.x_m - 80.0,
