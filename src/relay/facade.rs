@@ -326,8 +326,9 @@ impl Relay {
         self.node.unpersisted()
     }
 
-    /// Returns the present acceptor state: to be stored at the start, for instance, so that a failure of the storage shows before
-    /// flight. Takes constant time.
+    /// Returns the present acceptor state, stored or not.
+    ///
+    /// A firmware may store it at the start, so that a failure of the storage shows before flight. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
         self.node.view_record()
     }

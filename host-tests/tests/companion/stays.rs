@@ -378,7 +378,7 @@ fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
     drop(second);
     first.line("lost: relay 2");
     let socket = hub.folder().join("status1");
-    let sent = |said: &serde_json::Value| said["links"]["ports"][0]["bytes_out"].as_u64();
+    let sent = |said: &Value| said["links"]["ports"][0]["bytes_out"].as_u64();
     let end = Instant::now() + Duration::from_secs(30);
     let mut slowest = Duration::ZERO;
     let (mut before, mut since) = (None, Instant::now());
