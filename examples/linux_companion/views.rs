@@ -66,34 +66,32 @@ impl Views {
                 self.stored = self.tried;
             }
         }
-        if self.tried != self.stored && kept.is_due(now) {
-            self.writing = self.tried;
-            self.write();
+        if self.tried != self.stored
+            && kept.is_due(now)
+            && let Some(record) = self.tried
+        {
+            self.write(record);
         }
     }
 
     /// Begins to write `record`. Returns true once it is written, or once the write has failed: a drone in the air must not fall
     /// silent for a full disk.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
-        let Some(kept) = &self.kept else { return true };
-        let record = Some(*record);
-        if self.stored == record || self.tried == record {
-            return true;
+        let is_known = [self.stored, self.tried].contains(&Some(*record));
+        if self.kept.is_some() && !is_known {
+            self.write(*record);
         }
-        if !kept.is_writing() {
-            self.writing = record;
-            self.write();
-        }
-        false
+        self.kept.is_none() || is_known
     }
 
-    /// Hands the record `writing` to the thread that writes.
-    fn write(&mut self) {
-        if let (Some(kept), Some(record)) = (&mut self.kept, self.writing)
+    /// Passes `record` to the thread that writes, unless that is busy with another one.
+    fn write(&mut self, record: ViewRecord) {
+        if let Some(kept) = &mut self.kept
             && !kept.is_writing()
         {
             let body = record.to_bytes();
             kept.put([&body[..], &sum(&body)].concat());
+            self.writing = Some(record);
         }
     }
 

@@ -13,7 +13,8 @@
 //! | `tested` | is run by a test of its own |
 //! | `window` | opens a window |
 //!
-//! Of a block that needs hardware the options of this project's commands are checked: a program must not refuse them (status 2).
+//! A block that needs hardware is not run. The options of this project's commands in it are checked: a program must not refuse
+//! them (status 2).
 //!
 //! A command must succeed, unless its comment begins with `exit status N`: then it must end with that status.
 //!
