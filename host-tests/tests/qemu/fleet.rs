@@ -24,6 +24,9 @@ pub(crate) const OF_THE_CHIP: [&str; 2] = ["started: unknown", "clock 16 MHz, no
 /// Timeout of any step of a test.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
+/// Maximum time until a drone has logged its first lines.
+const START: Duration = Duration::from_secs(30);
+
 /// Additional timeout for each drone, since all share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
@@ -74,6 +77,10 @@ fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
     let all = 1..=flight.mission().relays();
     all.map(|index| flight.block(index).unwrap().to_vec())
         .collect()
+}
+
+fn lines_of(lines: &[Line], drone: u16) -> usize {
+    lines.iter().filter(|line| line.drone == drone).count()
 }
 
 /// Lock for one fleet at a time, so that the drones' clocks keep up with the wall clock.
@@ -165,6 +172,19 @@ impl Fleet {
             hearers.push((0..in_range).collect());
             ports.push(socket);
         }
+        // A serial port drops bytes until its firmware has enabled it, so a frame on its way would be truncated. The ports are
+        // enabled before the line after those about the chip.
+        let mut begun = Vec::new();
+        let started = Instant::now();
+        while (1..)
+            .zip(&drones)
+            .any(|(drone, _)| lines_of(&begun, drone) <= OF_THE_CHIP.len())
+        {
+            match new.recv_timeout(START.saturating_sub(started.elapsed())) {
+                Ok(line) => begun.push(line),
+                Err(error) => panic!("not every drone has started ({error}): {begun:?}"),
+            }
+        }
         let medium = Medium::new(
             ports.len(),
             LinkSpec::default(),
@@ -178,7 +198,7 @@ impl Fleet {
             consoles,
             autopilots,
             new,
-            lines: Vec::new(),
+            lines: begun,
             _folder: folder,
             _air: air,
         }
