@@ -16,7 +16,7 @@ use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
 /// Maximum time to write a frame once there is room for its beginning.
-const PATIENCE: Duration = Duration::from_secs(2);
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Kernel buffer for frames waiting at a port, bytes: some four frames with their overhead.
 const WAITING: usize = 16_384;
