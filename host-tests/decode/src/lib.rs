@@ -1,12 +1,14 @@
 //! Decoder of uav-relay frames: each field by the tables of `FORMAT.md`, or the reason for rejection.
 //!
-//! `format`, `value`, `walk`, `write` and `range` are the second codec: they share no code with the crate.
+//! `format`, `value`, `walk`, `write`, `range` and `draw` are the second codec: they share no code with the crate.
 //!
 //! | module | content |
 //! | --- | --- |
 //! | [`mod@format`] | the tables of `FORMAT.md` |
 //! | [`value`], [`walk`], [`mod@write`] | values of fields; decoding and encoding of a body |
 //! | [`range`] | ranges of the values |
+//! | [`draw`] | random messages, valid over the whole range of every field |
+//! | [`envelope`] | frame around a body: header, CRC and COBS |
 //! | [`frame`], [`refusal`] | a decoded frame; reasons for rejection |
 //! | [`members`] | verification of tags |
 //! | [`source`] | frames from a capture or a byte stream |
@@ -15,6 +17,8 @@
 //! | [`dissector`] | the Wireshark dissector |
 
 pub mod dissector;
+pub mod draw;
+pub mod envelope;
 pub mod format;
 pub mod frame;
 pub mod members;

@@ -84,10 +84,10 @@ fn is_view(range: &str, view: u32) -> bool {
 }
 
 /// Numbers of a body by name; NaN if there is none.
-struct Numbers<'a, 'f>(&'a Fields<'f>);
+pub(crate) struct Numbers<'a, 'f>(pub(crate) &'a Fields<'f>);
 
 impl<'f> Numbers<'_, 'f> {
-    fn get(&self, name: &str) -> f64 {
+    pub(crate) fn get(&self, name: &str) -> f64 {
         match self.0.get(name) {
             Some(Value::Single(number)) => (*number).into(),
             Some(Value::Double(number)) => *number,
@@ -218,7 +218,7 @@ fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
 }
 
 /// Returns true if the relays of an offer have room between Tx and Rx.
-fn has_room(offer: &Numbers<'_, '_>) -> bool {
+pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     let single = |number: f64| f64::from(number as f32);
     let distance = offer.get("distance_m");
     let step = single(offer.get("min_separation_m") + single(distance / 2_097_152.0));

@@ -47,6 +47,13 @@ impl<'f> Fields<'f> {
         all.find(|(field, _)| field.name == name)
             .map(|(_, value)| value)
     }
+
+    /// Replaces the value of the field with this name, if there is one.
+    pub fn set(&mut self, name: &str, value: Value<'f>) {
+        if let Some((_, old)) = self.0.iter_mut().find(|(field, _)| field.name == name) {
+            *old = value;
+        }
+    }
 }
 
 /// Values as they are on the wire: a digest or flags are a number.

@@ -3,6 +3,7 @@
 use serde_json::Value as Json;
 
 use crate::format::{Field, Format, Kind};
+use crate::value::{Fields, Value};
 
 /// Encodes the message `name`. `fields` are as `cargo decode --json` prints them; digests and flags may also be numbers.
 ///
@@ -14,68 +15,114 @@ pub fn write(format: &Format, name: &str, fields: &Json) -> Result<Vec<u8>, Stri
         .find(|(_, layout)| layout.name == name)
         .ok_or_else(|| format!("no such message: {name}"))?;
     let mut body = vec![tag];
-    each(&layout.fields, fields, &mut body)?;
+    write_fields(&read(&layout.fields, fields)?, &mut body);
     Ok(body)
 }
 
-fn each(fields: &[Field], values: &Json, body: &mut Vec<u8>) -> Result<(), String> {
+/// Appends the bytes of all fields, valid or not.
+pub fn write_fields(fields: &Fields<'_>, body: &mut Vec<u8>) {
+    for (field, value) in &fields.0 {
+        one(&field.kind, value, body);
+    }
+}
+
+fn one(kind: &Kind, value: &Value<'_>, body: &mut Vec<u8>) {
+    match (kind, value) {
+        (Kind::Option(_), Value::None) => body.push(0),
+        (Kind::Option(of), value) => {
+            body.push(1);
+            one(of, value, body);
+        }
+        (Kind::List(_, of) | Kind::Array(_, of), Value::List(values)) => {
+            if matches!(kind, Kind::List(..)) {
+                // A count up to 127 is its own varint.
+                body.push(u8::try_from(values.len()).unwrap_or(u8::MAX));
+            }
+            for value in values {
+                one(of, value, body);
+            }
+        }
+        (_, Value::Group(fields)) => write_fields(fields, body),
+        (kind, Value::Unsigned(number)) => {
+            let bytes = number.to_le_bytes();
+            body.extend(bytes.iter().take(kind.size()));
+        }
+        (kind, Value::Signed(number)) => {
+            let bytes = number.to_le_bytes();
+            body.extend(bytes.iter().take(kind.size()));
+        }
+        (_, Value::Digest(digest)) => body.extend(digest.to_le_bytes()),
+        (_, Value::View(view)) => body.extend(view.to_le_bytes()),
+        (_, Value::Single(number)) => body.extend(number.to_le_bytes()),
+        (_, Value::Double(number)) => body.extend(number.to_le_bytes()),
+        (_, Value::Bool(said)) => body.push((*said).into()),
+        (_, Value::Flags(bits, _)) => body.push(*bits),
+        (_, Value::Word(word, _)) => body.push(*word),
+        // Only an Option has no value, and only the two kinds above have several.
+        (_, Value::None | Value::List(_)) => {}
+    }
+}
+
+fn read<'f>(fields: &'f [Field], values: &Json) -> Result<Fields<'f>, String> {
+    let mut all = Fields::default();
     for field in fields {
         let value = values.get(&field.name).unwrap_or(&Json::Null);
-        one(&field.kind, value, body).ok_or_else(|| format!("{}: {value}", field.name))?;
+        let read = from_json(&field.kind, value);
+        all.0.push((
+            field,
+            read.ok_or_else(|| format!("{}: {value}", field.name))?,
+        ));
     }
     let names = values.as_object().map_or(0, serde_json::Map::len);
     if names == fields.len() {
-        Ok(())
+        Ok(all)
     } else {
         Err(format!("unknown fields in {values}"))
     }
 }
 
-/// Encodes one value; `None` if it does not fit.
-fn one(kind: &Kind, value: &Json, body: &mut Vec<u8>) -> Option<()> {
-    let unsigned = || value.as_u64();
-    match kind {
-        Kind::U8 | Kind::Words(_) => body.push(u8::try_from(unsigned()?).ok()?),
-        Kind::U16 => body.extend(u16::try_from(unsigned()?).ok()?.to_le_bytes()),
-        Kind::U32 | Kind::View => body.extend(u32::try_from(unsigned()?).ok()?.to_le_bytes()),
-        Kind::U64 => body.extend(unsigned()?.to_le_bytes()),
-        Kind::I32 => body.extend(i32::try_from(value.as_i64()?).ok()?.to_le_bytes()),
-        #[expect(clippy::cast_possible_truncation, reason = "to the nearest")]
-        Kind::F32 => body.extend((value.as_f64()? as f32).to_le_bytes()),
-        Kind::F64 => body.extend(value.as_f64()?.to_le_bytes()),
-        Kind::Bool => body.push(value.as_bool()?.into()),
-        Kind::Digest => {
-            let digits = value
-                .as_str()
-                .map(|digits| u16::from_str_radix(digits, 16).ok());
-            let digest = digits.unwrap_or_else(|| u16::try_from(unsigned()?).ok())?;
-            body.extend(digest.to_le_bytes());
+/// Returns a value of this kind; `None` if it does not fit.
+fn from_json<'f>(kind: &'f Kind, value: &Json) -> Option<Value<'f>> {
+    let byte = || u8::try_from(value.as_u64()?).ok();
+    Some(match kind {
+        Kind::U8 | Kind::U16 | Kind::U32 | Kind::U64 => {
+            let fits = |number: &u64| kind.size() == 8 || number >> (8 * kind.size()) == 0;
+            Value::Unsigned(value.as_u64().filter(fits)?)
         }
-        Kind::Flags(names) => body.push(match value.as_array() {
-            None => u8::try_from(unsigned()?).ok()?,
-            Some(set) => set.iter().try_fold(0, |bits, name| {
+        Kind::View => Value::View(u32::try_from(value.as_u64()?).ok()?),
+        Kind::Words(_) => Value::Word(byte()?, None),
+        Kind::I32 => Value::Signed(i32::try_from(value.as_i64()?).ok()?.into()),
+        #[expect(clippy::cast_possible_truncation, reason = "to the nearest")]
+        Kind::F32 => Value::Single(value.as_f64()? as f32),
+        Kind::F64 => Value::Double(value.as_f64()?),
+        Kind::Bool => Value::Bool(value.as_bool()?),
+        Kind::Digest => Value::Digest(match value.as_str() {
+            Some(digits) => u16::from_str_radix(digits, 16).ok()?,
+            None => u16::try_from(value.as_u64()?).ok()?,
+        }),
+        Kind::Flags(names) => {
+            let bit = |bits, name: &Json| {
                 let bit = names.iter().position(|known| name == known)?;
                 Some(bits | 1 << bit)
-            })?,
-        }),
-        Kind::Array(count, of) => {
-            let values = value.as_array().filter(|values| values.len() == *count)?;
-            values.iter().try_for_each(|value| one(of, value, body))?;
+            };
+            let bits = match value.as_array() {
+                None => byte()?,
+                Some(set) => set.iter().try_fold(0, bit)?,
+            };
+            Value::Flags(bits, names)
         }
-        Kind::Option(of) => {
-            body.push((!value.is_null()).into());
-            if !value.is_null() {
-                one(of, value, body)?;
-            }
-        }
-        Kind::List(most, of) => {
+        Kind::Option(_) if value.is_null() => Value::None,
+        Kind::Option(of) => from_json(of, value)?,
+        Kind::Array(..) | Kind::List(..) => {
             let values = value.as_array()?;
-            // A count up to 127 is its own varint.
-            let fits = values.len() as u64 <= *most && *most < 0x80;
-            body.push(u8::try_from(values.len()).ok().filter(|_| fits)?);
-            values.iter().try_for_each(|value| one(of, value, body))?;
+            let (of, fits) = match kind {
+                Kind::Array(count, of) => (of, values.len() == *count),
+                Kind::List(most, of) => (of, values.len() as u64 <= *most && *most < 0x80),
+                _ => return None,
+            };
+            let values = values.iter().map(|value| from_json(of, value));
+            Value::List(values.collect::<Option<_>>().filter(|_| fits)?)
         }
-        Kind::Group(fields) => each(fields, value, body).ok()?,
-    }
-    Some(())
+        Kind::Group(fields) => Value::Group(read(fields, value).ok()?),
+    })
 }

@@ -3,8 +3,8 @@
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{MAX_DECODED, MAX_FRAME};
 use uav_relay::{Identity, Instant, Port, Relay, Settings};
+use uav_relay_decode::envelope::unstuffed;
 
-use super::cobs::unstuffed;
 use super::input::Input;
 use super::setting;
 

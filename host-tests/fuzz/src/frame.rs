@@ -4,17 +4,18 @@ use std::sync::LazyLock;
 
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
-use uav_relay::wire::frame::{self, FrameError, HEADER, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION};
+use uav_relay::wire::frame::{
+    self, FrameError, HEADER, Header, MAX_DECODED, MAX_FRAME, MAX_NODE, VERSION,
+};
 use uav_relay::wire::message::{Message, MessageError};
 use uav_relay::{Identity, Instant, Port, Relay, Stats};
+use uav_relay_decode::envelope::{sealed, stuffed};
 use uav_relay_decode::format::Format;
 use uav_relay_decode::refusal::Refusal;
 use uav_relay_decode::walk;
 
-use super::cobs::stuffed;
 use super::input::Input;
 use super::member::Member;
-use super::message::{Header, sealed};
 use super::setting;
 use super::watch::NETWORK;
 
@@ -29,8 +30,7 @@ const SIGNS: u8 = 8;
 /// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a body is not accepted or rejected
 /// as the tables of `FORMAT.md` say.
 pub fn frame(data: &[u8]) {
-    let mut plain = data.to_vec();
-    sealed(&mut plain);
+    let plain = sealed(data.to_vec());
     let wire = stuffed(&plain);
     comes_through(&plain, &wire);
     flipped(&plain);
@@ -55,7 +55,7 @@ pub fn frame(data: &[u8]) {
         if let Some(flags) = bare.get_mut(3) {
             *flags &= 0x0F;
         }
-        sealed(&mut bare);
+        bare = sealed(bare);
     }
     assert_eq!(again.get(..len), Some(&*stuffed(&bare)), "{message:?}");
     let written = again.get(..len).unwrap_or_default();
@@ -106,6 +106,7 @@ fn signed(plain: &[u8]) {
         network: NETWORK,
         sender: 1,
         destination: 2,
+        counter: 0,
     };
     let right = member.signed(header, body);
     if right.len() > MAX_DECODED {
@@ -118,7 +119,7 @@ fn signed(plain: &[u8]) {
     if let Some(byte) = altered.get_mut(HEADER + chosen / 8) {
         *byte ^= 1 << (chosen % 8);
     }
-    sealed(&mut altered);
+    let altered = sealed(altered);
     let (before, now) = (*relay.stats(), Instant::ZERO);
     for plain in [&altered, &right, &right] {
         relay.handle_bytes(now, Port::Upstream, &stuffed(plain));
@@ -178,6 +179,7 @@ fn meet() -> Option<Met> {
         network: NETWORK,
         sender: 1,
         destination: 2,
+        counter: 0,
     };
     relay.handle_bytes(now, Port::Upstream, &stuffed(&member.handshake(header)));
     assert_eq!(relay.stats().rejected(), 0);

@@ -13,13 +13,11 @@
 //! | [`member`] | frames signed with the network's key |
 //! | [`setting`] | missions and settings from bytes |
 //! | [`input`] | numbers and choices from bytes |
-//! | [`cobs`] | COBS by a published encoder, and decoding by its definition |
 //! | [`heap`] | check that the crate never allocates |
 //!
 //! Every target accepts any bytes and panics if a promise is broken.
 
 pub mod chain;
-pub mod cobs;
 pub mod counted;
 pub mod deframe;
 pub mod frame;

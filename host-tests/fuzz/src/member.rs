@@ -7,16 +7,16 @@ use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
 use blake2::digest::{FixedOutput, Mac};
 use uav_relay::wire::deframe::Deframer;
-use uav_relay::wire::frame::{self, Opened};
+use uav_relay::wire::frame::{self, Header, Opened};
+use uav_relay_decode::envelope::{before, sealed};
 
-use super::message::{Header, sealed};
 use super::setting::KEY;
 
 /// Flag of a frame with a tag.
-const SIGNED: u16 = 0x1000;
+const SIGNED: u16 = 1;
 
 /// Flag of a handshake.
-const HELLO: u16 = 0x2000;
+const HELLO: u16 = 2;
 
 const NONCE: usize = 8;
 
@@ -95,12 +95,12 @@ impl Member {
     }
 
     fn frame(&mut self, header: Header, flags: u16, to: &[u8], body: &[u8]) -> Vec<u8> {
-        let mut plain = header.before(flags, self.counter, body);
+        let counter = self.counter;
+        let mut plain = before(Header { counter, ..header }, flags, body);
         self.counter += 1;
         let tag = self.tag(to, &plain);
         plain.extend_from_slice(&tag);
-        sealed(&mut plain);
-        plain
+        sealed(plain)
     }
 
     /// Returns the tag: keyed BLAKE2s over both nonces and the signed bytes, cut to eight bytes.

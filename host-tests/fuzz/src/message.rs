@@ -2,7 +2,6 @@
 //!
 //! Bodies are written from the byte tables, independently of the crate, because they must include what the crate never writes.
 
-mod header;
 mod hearing;
 mod offer;
 mod parts;
@@ -12,7 +11,6 @@ use uav_relay::wire::digest::MissionId;
 use super::input::Input;
 use parts::Body;
 
-pub use header::{Header, sealed};
 pub use parts::Known;
 
 /// Builds a body of any of the twenty kinds, or of none.

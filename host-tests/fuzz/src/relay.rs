@@ -3,14 +3,14 @@
 mod addresses;
 
 use uav_relay::wire::digest::{MissionId, digest};
-use uav_relay::wire::frame::MAX_DECODED;
+use uav_relay::wire::frame::{Header, MAX_DECODED};
 use uav_relay::{Duration, Instant, Mission, Port, Sample, Side, Stats, Upload, Wiring};
+use uav_relay_decode::envelope::{sealed, stuffed, unsigned};
 
-use super::cobs::stuffed;
 use super::counted::intact;
 use super::input::Input;
 use super::member::Member;
-use super::message::{Header, Known, body, sealed};
+use super::message::{Known, body};
 use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
@@ -332,7 +332,7 @@ impl Bench {
     /// Builds the frame of a body, signed if the relay requires tags, or as an attacker would.
     fn said(&mut self, side: usize, header: Header, body: &[u8], input: &mut Input<'_>) -> Said {
         let Some(Some(member)) = self.members.get_mut(side) else {
-            let (wire, fate) = (stuffed(&header.unsigned(body)), Fate::Counted);
+            let (wire, fate) = (stuffed(&unsigned(header, body)), Fate::Counted);
             return Said { wire, fate };
         };
         let (plain, fate) = match input.below(16) {
@@ -343,10 +343,9 @@ impl Bench {
                 if let Some(byte) = plain.get_mut(place) {
                     *byte ^= 1 << input.below(8);
                 }
-                sealed(&mut plain);
-                (plain, Fate::Forged)
+                (sealed(plain), Fate::Forged)
             }
-            11 => (header.unsigned(body), Fate::Unsigned),
+            11 => (unsigned(header, body), Fate::Unsigned),
             12 => (member.stranger().signed(header, body), Fate::Forged),
             // Restarted, but without a new handshake.
             13 => (member.restarted().signed(header, body), Fate::Forged),

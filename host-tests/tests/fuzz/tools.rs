@@ -2,7 +2,7 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use uav_relay_fuzz::cobs::{stuffed, unstuffed};
+use uav_relay_decode::envelope::{stuffed, unstuffed};
 use uav_relay_fuzz::input::Input;
 
 proptest! {

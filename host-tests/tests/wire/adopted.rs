@@ -1,57 +1,51 @@
 //! Adoption of an uploaded mission by a view, and its use after a reboot.
 
 use host_tests::fixtures::paper;
+use serde_json::json;
 use uav_relay::wire::digest::digest;
 use uav_relay::{
-    Duration, Event, Interference, Mission, MissionConfig, Port, Relay, Upload, ViewId, Wiring,
+    Duration, Event, Interference, Mission, MissionConfig, Port, Upload, ViewId, Wiring,
 };
 
-use super::codec::{Greeting, Said};
-use super::kinds::{FIRST, one_of_each};
-use super::offer::{KEPT, Offer};
-use super::receive::{FIELD, counted};
-use super::signed::{Peer, said, set};
-use super::votes::{ASKS, FLIES, FORMS, FRESH, events, hearing, id, long, mark};
+use super::kinds::{FIELD, FIRST, beat, one_of_each};
+use super::offer::{KEPT, kept, mission_id, upload};
+use super::said::Said;
+use super::signed::{Met, NOW, settings};
+use super::votes::*;
 
-use super::uploads::*;
-
-/// Returns a relay that received version 2 from its neighbours and flies it in view 1 of all eight.
-fn adopted() -> (Relay, [Peer; 2], u16, Offer) {
-    let (mut relay, mut peers, base) = relay_4();
-    let newer = upload(2, base);
-    adopts(&mut relay, &mut peers, &newer);
-    (relay, peers, base, newer)
+/// Returns relay 4, which received version 2 from its neighbours and flies it in view 1 of all eight.
+fn adopted() -> (Met, Said) {
+    let mut met = Met::fourth();
+    let newer = upload(2, met.base);
+    adopts(&mut met, &newer);
+    (met, newer)
 }
 
 /// Makes relay 4 accept `newer` and fly it in view 1 of all eight.
-pub(crate) fn adopts(relay: &mut Relay, peers: &mut [Peer; 2], newer: &Offer) {
-    let base = newer.base;
-    peers[0].says(relay, NOW, &Said::Offer(*newer));
-    peers[1].says(relay, NOW, &hello(base, 4, mission_id(newer), 0));
-    both(relay);
-    peers[0].says(relay, NOW, &forming(11, 1, mission_id(newer), 3));
-    assert_eq!(
-        said(relay, NOW),
-        [(5, forming(11, 1, mission_id(newer), 4))]
-    );
-    assert_eq!((relay.version(), relay.view()), (0, ViewId::LOADED));
-    peers[1].says(relay, NOW, &forming(12, 1, mission_id(newer), 5));
-    assert_eq!(
-        said(relay, NOW),
-        [(3, forming(12, 1, mission_id(newer), 4))]
-    );
+pub(crate) fn adopts(met: &mut Met, newer: &Said) {
+    let of = mission_id(newer);
+    met.hears(0, newer);
+    met.hears(1, &hello(met.base, 4, of, 0));
+    met.sends_after(NOW);
+    let out = met.hears(0, &proposed(id(1, 1), of, 3, 8));
+    assert_eq!(out, [(5, proposed(id(1, 1), of, 4, 8))]);
+    assert_eq!((met.version(), met.view()), (0, ViewId::LOADED));
+    let out = met.hears(1, &granted(id(1, 1), of, 5, 8));
+    assert_eq!(out, [(3, granted(id(1, 1), of, 4, 8))]);
 }
 
 #[test]
-fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
-    let (mut relay, peers, base, newer) = adopted();
-    assert_eq!((relay.version(), relay.view().number()), (2, 1));
-    assert_eq!(digest(relay.mission()), newer.digest());
-    let told = events(&mut relay);
-    assert_eq!(told, [Event::Reformed, Event::Uploaded, Event::Adopted]);
-    assert_eq!(relay.stats().rejected(), 0);
-    let mark = mark(relay.view().bits());
-    let own = newer.digest().wrapping_add(mark);
+fn a_granted_view_flies_the_mission_of_its_proposal() {
+    let (mut met, newer) = adopted();
+    let base = met.base;
+    let (flown, version) = mission_id(&newer);
+    assert_eq!((met.version(), met.view().number()), (version, 1));
+    assert_eq!(digest(met.mission()), flown);
+    let told = [Event::Reformed, Event::Uploaded, Event::Adopted];
+    assert_eq!(met.events(), told);
+    assert_eq!(met.stats().rejected(), 0);
+    let mark = mark(met.view().bits());
+    let own = flown.wrapping_add(mark);
     // Digests of a pass: of the same view, of another view of that mission, of the earlier mission, of neither.
     for (digest, expected) in [
         (own, [0, 0]),
@@ -59,122 +53,84 @@ fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
         (base.wrapping_add(mark), [1, 0]),
         (base ^ 0x4000, [1, 0]),
     ] {
-        let mut after = relay.clone();
-        let sweep = &one_of_each(FIRST, digest)[0];
-        peers[0].clone().says(&mut after, NOW, sweep);
+        let mut after = met.clone();
+        let out = after.hears(0, &one_of_each(FIRST, digest)[0]);
         let stats = after.stats();
         assert_eq!([stats.view, stats.mission], expected, "{digest:04x}");
-        let greeted = said(&mut after, NOW).iter().any(|(to, said)| {
-            *to == 3 && matches!(said, Said::Hello(hello) if hello.flags & FLIES != 0)
-        });
-        assert_eq!(greeted, expected != [0, 0], "{digest:04x}");
+        let hello = |(to, said): &(u16, Said)| *to == 3 && said.is("Hello") && said.has(FLIES);
+        assert_eq!(out.iter().any(hello), expected != [0, 0], "{digest:04x}");
     }
     // Heartbeats always carry the base's digest.
-    for (mission, expected) in [(base, 0), (newer.digest(), 1), (own, 1)] {
-        let mut after = relay.clone();
-        let beat = Said::Heartbeat {
-            mission,
-            ask: 0,
-            answer: 0,
-        };
-        peers[0].clone().says(&mut after, NOW, &beat);
+    for (mission, expected) in [(base, 0), (flown, 1), (own, 1)] {
+        let mut after = met.clone();
+        after.hears(0, &beat(mission, 0, 0));
         assert_eq!(after.stats().mission, expected);
     }
 }
 
 #[test]
-fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_older_one_is_not() {
-    let (mut relay, mut peers, base, flown) = adopted();
-    events(&mut relay);
-    peers[0].says(&mut relay, NOW, &forming(11, 2, mission_id(&flown), 3));
-    said(&mut relay, NOW);
-    let next = upload(3, base);
-    peers[0].says(&mut relay, NOW, &Said::Offer(next));
-    both(&mut relay);
+fn a_decision_of_the_flown_mission_is_taken_of_others_not() {
+    let (mut met, flown) = adopted();
+    met.events();
+    met.hears(0, &proposed(id(2, 1), mission_id(&flown), 3, 8));
+    let next = upload(3, met.base);
+    met.hears(0, &next);
+    met.sends_after(NOW);
     for (of, view) in [
-        ((base, 0), 1),
+        ((met.base, 0), 1),
         (mission_id(&next), 1),
         (mission_id(&flown), 2),
     ] {
-        let mut after = relay.clone();
-        peers[1]
-            .clone()
-            .says(&mut after, NOW, &forming(12, 2, of, 5));
-        assert_eq!(
-            (after.version(), after.view().number()),
-            (2, view),
-            "{of:?}"
-        );
+        let mut after = met.clone();
+        after.hears(1, &granted(id(2, 1), of, 5, 8));
+        let flies = (after.version(), after.view().number());
+        assert_eq!(flies, (2, view), "{of:?}");
         if view == 2 {
             // The relay still holds a newer mission than it flies.
-            let [_, later] = both_at(&mut after, NOW + Duration::from_millis(1));
-            let call = Greeting {
-                mission: base,
-                neighbour: 3,
-                behind: 5,
-                newest: id(2, 1),
-                holds: (next.digest(), 3),
-                nonce: 0,
-                hears: 1,
-                flags: ASKS | FORMS,
-            };
-            assert_eq!(later, [(3, Said::Hello(call))]);
+            let out = after.sends_after(NOW + Duration::from_millis(1));
+            let call = near(1, 5, &hello(met.base, 3, mission_id(&next), ASKS | FORMS));
+            let call = call.with(json!({ "newest_view": id(2, 1) }));
+            assert_eq!(out, [(3, call)]);
         }
     }
 }
 
 #[test]
-fn in_a_field_nothing_is_held() {
+fn in_a_field_no_upload_is_held() {
     let mission = MissionConfig {
         interference: Interference::Field(FIELD),
         ..paper(8)
     };
     let mission = Mission::try_new(mission).unwrap();
-    let (identity, settings) = set(4, Wiring::Pair);
-    let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
-    let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
-    said(&mut relay, NOW);
+    let mut met = Met::new(mission, 4, settings(Wiring::Pair), &[(3, Port::Upstream)]);
     // The mission and the base happen to have the same digest.
-    let number = peer.clone().number(relay.clone(), NOW);
-    let offer = Offer {
-        answer: number,
-        ..upload(1, digest(&mission))
-    };
-    peer.says_as_it_is(&mut relay, NOW, &Said::Offer(offer));
-    assert_eq!(
-        (held(&relay), counted(relay.stats())),
-        (None, vec!["received"])
-    );
+    met.hears(0, &upload(1, met.base));
+    assert_eq!((met.held(), met.counted()), (None, vec!["received"]));
 }
 
 #[test]
-fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
-    let (relay, _, base, newer) = adopted();
-    let mut kept = [0; KEPT];
-    relay.upload().unwrap().encode(&mut kept).unwrap();
-    assert_eq!(kept[..], newer.kept());
-    let upload = Upload::decode(&kept).unwrap();
-    let loaded = Mission::try_new(paper(8)).unwrap();
+fn a_stored_mission_is_held_and_flown_after_a_reboot() {
+    let (met, newer) = adopted();
+    let mut bytes = [0; KEPT];
+    met.upload().unwrap().encode(&mut bytes).unwrap();
+    assert_eq!(bytes[..], kept(&newer));
+    let upload = Upload::decode(&bytes).unwrap();
     for remembers in [false, true] {
-        let (identity, settings) = set(4, Wiring::Pair);
-        let mut relay = Relay::new(loaded, identity, settings, 1, NOW).unwrap();
+        let mut met = Met::fourth();
         if remembers {
-            relay.resume(&upload).unwrap();
+            met.resume(&upload).unwrap();
         }
-        let mut peer = Peer::meets(&mut relay, 4, 3, Port::Upstream);
-        said(&mut relay, NOW);
-        peer.says(&mut relay, NOW, &hello(base, 4, mission_id(&newer), ASKS));
+        let asks = hello(met.base, 4, mission_id(&newer), ASKS);
         let holds = if remembers {
             mission_id(&newer)
         } else {
-            (base, 0)
+            (met.base, 0)
         };
-        let answer = long(1, hearing(1, hello(base, 3, holds, FRESH | FLIES)));
-        assert_eq!(said(&mut relay, NOW), [(3, answer)]);
-        assert_eq!((relay.version(), relay.view()), (holds.1, ViewId::LOADED));
-        let sweep = &one_of_each(FIRST, newer.digest())[0];
-        peer.says(&mut relay, NOW, sweep);
-        assert_eq!(relay.stats().view, u32::from(!remembers));
+        let answer = near(1, 1, &hello(met.base, 3, holds, FRESH | FLIES));
+        assert_eq!(met.hears(0, &asks), [(3, answer)]);
+        assert_eq!((met.version(), met.view()), (holds.1, ViewId::LOADED));
+        met.hears(0, &one_of_each(FIRST, mission_id(&newer).0)[0]);
+        assert_eq!(met.stats().view, u32::from(!remembers));
     }
 }
 
@@ -183,16 +139,15 @@ fn what_was_kept_is_held_and_flown_after_a_reboot_and_else_what_was_loaded() {
 /// A number changes `dead_after` after its first use. An offer must have one of the last two, sent at most twice `dead_after`
 /// ago; a relay's offer repeats the number that it received.
 #[test]
-fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
-    let (relay, peers, base) = relay_4();
-    let newer = upload(2, base);
+fn an_offer_that_answers_no_recent_hello_is_stale() {
+    let met = Met::fourth();
+    let newer = upload(2, met.base);
     let after = |ms| NOW + Duration::from_millis(ms);
-    let number = |relay: &Relay, ms| peers[0].clone().number(relay.clone(), after(ms));
-    let first = number(&relay, 0);
+    let first = met.number(0, NOW);
     assert_ne!(first, 0);
-    assert_eq!(number(&relay, 14_999), first);
+    assert_eq!(met.number(0, after(14_999)), first);
     let next = if first == u16::MAX { 1 } else { first + 1 };
-    assert_eq!(number(&relay, 15_000), next);
+    assert_eq!(met.number(0, after(15_000)), next);
     // The relay has not sent a hello with the second number yet.
     for (answer, ms, counts) in [
         (first, 0, true),
@@ -202,48 +157,30 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
         (next, 0, false),
         (first ^ 0x4000, 0, false),
     ] {
-        let mut after_it = relay.clone();
-        let offer = Said::Offer(Offer { answer, ..newer });
-        peers[0]
-            .clone()
-            .says_as_it_is(&mut after_it, after(ms), &offer);
+        let mut met = met.clone();
+        let offer = newer.with(json!({ "answer": answer }));
+        let out = met.hears_as_it_is(0, after(ms), &offer);
         let expected = counts.then_some(mission_id(&newer));
-        assert_eq!(held(&after_it), expected, "{answer} at {ms}");
-        assert_eq!(after_it.stats().stale, u32::from(!counts));
+        assert_eq!(met.held(), expected, "{answer} at {ms}");
+        assert_eq!(met.stats().stale, u32::from(!counts));
         // In either case the neighbour gets a hello, whose number the next offer repeats.
-        let hellos = said(&mut after_it, after(ms));
-        let told = |(to, said): &(u16, Said)| *to == 3 && matches!(said, Said::Hello(_));
-        assert!(hellos.iter().any(told), "{answer} at {ms}: {hellos:?}");
+        let told = |(to, said): &(u16, Said)| *to == 3 && said.is("Hello");
+        assert!(out.iter().any(told), "{answer} at {ms}: {out:?}");
     }
     // A hello with the next number was sent, and another with the one after that.
-    let mut later = relay.clone();
-    let mut peer = peers[0].clone();
+    let mut later = met.clone();
+    let asks = hello(met.base, 4, (met.base, 0), ASKS);
     for (ms, first_counts) in [(15_000, true), (30_000, false)] {
-        let asks = hello(base, 4, (base, 0), ASKS);
-        peer.says_as_it_is(&mut later, after(ms), &asks);
-        said(&mut later, after(ms));
+        later.hears_as_it_is(0, after(ms), &asks);
         let mut after_it = later.clone();
-        let offer = Said::Offer(Offer {
-            answer: first,
-            ..newer
-        });
-        peers[1]
-            .clone()
-            .says_as_it_is(&mut after_it, after(ms), &offer);
-        assert_eq!(held(&after_it).is_some(), first_counts, "at {ms}");
+        let offer = newer.with(json!({ "answer": first }));
+        after_it.hears_as_it_is(1, after(ms), &offer);
+        assert_eq!(after_it.held().is_some(), first_counts, "at {ms}");
     }
-    let mut told = relay.clone();
-    peers[0].clone().says(&mut told, NOW, &Said::Offer(newer));
-    both(&mut told);
-    let Said::Hello(greeting) = hello(base, 4, (base, 0), 0) else {
-        panic!("a hello");
-    };
-    let nonce = 0xABCD;
-    let asks = Said::Hello(Greeting { nonce, ..greeting });
-    peers[1].clone().says(&mut told, NOW, &asks);
-    let answers = Offer {
-        answer: nonce,
-        ..newer
-    };
-    assert_eq!(said(&mut told, NOW), [(5, Said::Offer(answers))]);
+    let mut told = met.clone();
+    told.hears(0, &newer);
+    told.sends_after(NOW);
+    let older = hello(met.base, 4, (met.base, 0), 0).with(json!({ "offer_number": 0xABCD }));
+    let answers = newer.with(json!({ "answer": 0xABCD }));
+    assert_eq!(told.hears(1, &older), [(5, answers)]);
 }

@@ -3,98 +3,97 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
+use host_tests::fixtures::{NETWORK, paper};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use uav_relay::wire::digest::digest;
-use uav_relay::{
-    Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, ViewId, Wiring,
-};
+use serde_json::json;
+use uav_relay::wire::frame::{Header, MAX_FRAME};
+use uav_relay::{Interference, MissionConfig, Port, ViewId, Wiring};
+use uav_relay_decode::envelope::unsigned;
 
-use super::codec::{Judged, Proposed, Said, SizedView};
+use super::bench::Bench;
 use super::config;
-use super::kinds::{FIRST, WEAK, framed, mission, one_of_each, placed, source};
-use super::lies::renamed;
-use super::receive::{FIELD, drain, relay_of};
+use super::kinds::{FIELD, FIRST, WEAK, WILD, mission, one_of_each, place, source, ways};
+use super::said::{Said, plain_of};
 use super::strategies::messages;
 use super::votes::mark;
 
-/// Field of the strongest and the weakest interference.
-const WILD: Field = Field::new(&[
-    FieldPoint {
-        x_m: 0.0,
-        upsilon_per_w: 1e32,
-    },
-    FieldPoint {
-        x_m: 1000.0,
-        upsilon_per_w: 1e-9,
-    },
-]);
+/// Sets the number and digest of a message, where it has them.
+fn renamed(said: &Said, number: u16, mission: u16) -> Said {
+    // The view of that number proposed by relay 1; proposed numbers are above 0.
+    let view = u32::from(number.max(1)) << 10 | 1;
+    said.with(match said.name() {
+        "Claim" => json!({ "claim": number }),
+        "Busy" => json!({ "number": number }),
+        "Heartbeat" | "Level" => json!({ "mission": mission }),
+        // A fence's number is that of its association, never 0.
+        "Fence" => json!({ "line": mission }),
+        "Offer" => json!({ "base": mission }),
+        "Hello" => json!({ "mission": mission, "newest_view": view }),
+        // The view has the loaded mission; no earlier view is known.
+        "Proposal" => json!({
+            "mission": mission, "version": 0, "proposed_view": view, "agreed_view": 0, "successor": null,
+        }),
+        "Decision" => {
+            // A relay that accepted a view later than its proposal would send proposals that are out of range.
+            let mut accepted = json!(said.fields())["accepted"].take();
+            if let Some(accepted) = accepted.as_object_mut() {
+                let least = view.min(accepted["view"].as_u64().unwrap() as u32);
+                accepted["view"] = least.into();
+            }
+            json!({
+                "mission": mission, "version": 0, "proposed_view": view, "base_view": 0, "accepted": accepted,
+            })
+        }
+        _ => json!({ "number": number, "view": mission }),
+    })
+}
 
 /// Changes a message so that it is plausible in this mission.
-fn tamed(said: Said) -> Said {
-    let into = |reach: f32| reach % 1000.0;
-    match said {
-        Said::Sweep(mut sweep) => {
-            sweep.anchor = 1.0_f32.copysign(sweep.anchor);
-            sweep.growth = if sweep.gap == 0 {
+fn tamed(said: &Said) -> Said {
+    let within = |numbers: Vec<f32>| numbers.into_iter().map(|number| number % 1000.0);
+    match said.name() {
+        "Sweep" | "Aside" => {
+            let gap = if said.is("Aside") {
                 0
             } else {
-                sweep.growth.min(4)
+                (said.number("gap") as u8).min(140)
             };
-            sweep.gap = sweep.gap.min(140);
-            sweep.reaches = sweep.reaches.into_iter().map(into).collect();
-            Said::Sweep(sweep)
-        }
-        Said::Verdict(Judged {
-            number,
-            mission,
-            own,
-            mut slacks,
-            stand,
-            ..
-        }) => {
-            slacks.truncate(1);
-            for slack in &mut slacks {
-                *slack = slack.abs();
+            let growth = (said.number("growth") as u8).min(if gap == 0 { 0 } else { 4 });
+            let mut reaches: Vec<f32> = within(said.list("reach_m")).collect();
+            reaches.truncate(if gap == 0 { 1 } else { 16 });
+            let tame = said.with(json!({
+                "anchor": 1.0_f64.copysign(said.number("anchor")), "gap": gap, "growth": growth,
+                "reach_m": reaches,
+            }));
+            if said.is("Sweep") {
+                return tame;
             }
-            Said::Verdict(Judged {
-                number,
-                mission,
-                own,
-                commit: (!slacks.is_empty()).then_some(0),
-                slacks,
-                stand: stand.map(into),
-            })
+            tame.with(json!({ "power_w": 1.0, "y_m": said.number("y_m") % 100.0 }))
         }
-        Said::Aside { mut sweep, y_m } => {
-            (sweep.anchor, sweep.gap, sweep.growth) = (1.0, 0, 0);
-            sweep.power_w = 1.0;
-            sweep.reaches = sweep.reaches.into_iter().take(1).map(into).collect();
-            Said::Aside {
-                sweep,
-                y_m: y_m % 100.0,
+        "Verdict" => {
+            let slack = said.list("slack_m").first().map(|slack| slack.abs());
+            let commit = slack.map(|_| 0);
+            said.with(
+                json!({ "slack_m": Vec::from_iter(slack), "commit": commit, "stand_m": null }),
+            )
+        }
+        "Gather" => {
+            let fields = json!(said.fields());
+            let mut seats = fields["seats"].as_array().unwrap().clone();
+            seats.truncate(2);
+            for (seat, index) in seats.iter_mut().zip(1..) {
+                seat["relay"] = index.into();
             }
+            said.with(json!({ "after": 0, "seats": seats }))
         }
-        Said::Gather(mut seats) => {
-            seats.after = 0;
-            seats.seats.truncate(2);
-            for (seat, index) in seats.seats.iter_mut().zip(1..) {
-                seat.0 = index;
-            }
-            Said::Gather(seats)
+        "Proposal" => {
+            let relays = said.number("agreed_relays").min(8.0) as u16;
+            let votes = (said.number("votes") as u16).min(relays);
+            said.with(json!({ "place": 3, "agreed_relays": relays, "votes": votes }))
         }
-        Said::Proposal(mut proposed) => {
-            proposed.call.place = 3;
-            let SizedView { id, relays } = proposed.agreed;
-            let relays = relays.min(8);
-            Said::Proposal(Proposed {
-                agreed: SizedView { id, relays },
-                votes: proposed.votes.min(relays),
-                ..proposed
-            })
-        }
-        other => other,
+        _ => said.clone(),
     }
 }
 
@@ -140,104 +139,130 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     vec(step, 1..40)
 }
 
+/// Flight of a relay among any messages.
+struct Flight {
+    bench: Bench,
+    /// A message of each tag.
+    kinds: Vec<Said>,
+    ports: (Port, Port),
+    /// True once a pass may have been accepted, the number of the pass sent, and that of the last one accepted.
+    begun: bool,
+    pass: u16,
+    last: u16,
+    view: ViewId,
+}
+
+impl Flight {
+    /// Returns the messages of a step, each with its port: the step's own, and perhaps the answer to a pass.
+    fn said(&mut self, step: &Step) -> Vec<(Port, Said)> {
+        let (from, to) = self.ports;
+        let tag = step.said.tag();
+        let onward = [0, 4, 5, 6, 8, 11, 15, 17].contains(&tag);
+        let port = if onward == step.right_side { from } else { to };
+        // These relays do not measure: collection passes do not count.
+        if onward && ![11, 15, 17].contains(&tag) {
+            self.pass = if self.begun {
+                self.last + 1
+            } else {
+                (self.last / 64 + 1) * 64
+            };
+            if port == from && step.right_mission && step.off == 0 {
+                (self.begun, self.last) = (true, self.pass);
+            }
+        }
+        let base = self.bench.mission;
+        let of_view = base.wrapping_add(mark(self.view.bits()));
+        let (number, mission) = match tag {
+            10..=12 => ((self.view.number() as u16).wrapping_add(1), base),
+            3 | 13 | 14 => (0, base),
+            15 | 16 => (0, of_view),
+            _ => (self.pass, of_view),
+        };
+        let number = number.wrapping_add_signed(step.off);
+        let wrong = if step.right_mission { 0 } else { 0x4000 };
+        let said = renamed(&step.said, number, mission ^ wrong);
+        let said = if step.tame { tamed(&said) } else { said };
+        let answer = match tag {
+            0 | 4 | 5 => 1,
+            6 => 7,
+            11 => 12,
+            15 => 16,
+            17 => 18,
+            _ => 9,
+        };
+        let answer = renamed(&self.kinds[answer], number, mission);
+        let answer = (onward && step.answered).then_some((to, answer));
+        [(port, said)].into_iter().chain(answer).collect()
+    }
+}
+
 /// Sends a relay of 8 any messages and checks its bounds; all causes in `expected` must occur.
-#[expect(clippy::too_many_lines, reason = "all that is looked at in one flight")]
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
-    let (from, to) = match mission.interference {
-        Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),
-        Interference::Field(_) => (Port::Downstream, Port::Upstream),
-    };
+    let ports = ways(mission.interference);
+    let kinds = one_of_each(FIRST, 0);
     TestRunner::new(config(1500))
         .run(&(steps(), any::<bool>()), |(steps, with_place)| {
-            let mut relay = relay_of(mission, own, Wiring::Pair);
-            let digest = digest(relay.mission());
-            let mut now = Instant::ZERO;
+            let mut bench = Bench::of(mission, own, Wiring::Pair);
             if with_place && own == 4 {
-                placed(&mut relay, (from, to), &mut now, FIRST);
+                place(&mut bench, ports, FIRST);
             }
             let mut counts = seen.take();
-            let mut place = relay.setpoint();
-            let mut begun = place.is_some();
-            // Number of the pass sent, and of the last one that the relay may have accepted.
-            let mut pass = if begun { FIRST } else { 0 };
-            let mut last = pass;
-            let mut view = ViewId::LOADED;
+            let mut held = bench.setpoint();
+            let begun = held.is_some();
+            let pass = if begun { FIRST } else { 0 };
+            let mut flight = Flight {
+                bench,
+                kinds: kinds.clone(),
+                ports,
+                begun,
+                pass,
+                last: pass,
+                view: ViewId::LOADED,
+            };
             for step in steps {
-                if relay.view() != view {
+                let view = flight.bench.view();
+                if view != flight.view {
                     *counts.entry("view").or_insert(0) += 1;
-                    (view, begun) = (relay.view(), false);
+                    (flight.view, flight.begun) = (view, false);
                 }
-                let kind = step.said.body()[0];
-                let onward = [0, 4, 5, 6, 8, 11, 15, 17].contains(&kind);
-                let port = if onward == step.right_side { from } else { to };
-                // These relays do not measure: collection passes do not count.
-                if onward && ![11, 15, 17].contains(&kind) {
-                    pass = if begun {
-                        last + 1
-                    } else {
-                        (last / 64 + 1) * 64
-                    };
-                    if port == from && step.right_mission && step.off == 0 {
-                        (begun, last) = (true, pass);
+                for (port, said) in flight.said(&step) {
+                    for pause in 0..=step.wait_ms {
+                        let bench = &mut flight.bench;
+                        if pause == 0 {
+                            bench.hears(port, &said);
+                        } else {
+                            bench.sends();
+                        }
+                        bench.events();
+                        prop_assert!((1..=bench.mission().relays()).contains(&bench.index()));
+                        if let Some(at) = bench.setpoint() {
+                            let (band, lateral) = (mission.band, mission.lateral);
+                            prop_assert!((0.0..=1000.0).contains(&at.x_m), "{at:?}");
+                            prop_assert!(
+                                (lateral.least_m..=lateral.most_m).contains(&at.y_m),
+                                "{at:?}"
+                            );
+                            prop_assert!(
+                                (band.least_m..=band.most_m).contains(&at.altitude_m),
+                                "{at:?}"
+                            );
+                        }
+                        if bench.setpoint() != held {
+                            let cause = match (said.tag(), pause) {
+                                (1, 0) => "verdict",
+                                (8, _) => "turn",
+                                (0 | 4 | 5, 0) => "sweep at the last",
+                                _ => "work",
+                            };
+                            *counts.entry(cause).or_insert(0) += 1;
+                            held = bench.setpoint();
+                        }
+                        bench.ticks();
                     }
-                }
-                let (number, mission) = match kind {
-                    10..=12 => {
-                        let low = u16::try_from(view.number() & 0xFFFF).unwrap();
-                        (low.wrapping_add(1), digest)
-                    }
-                    3 | 13 | 14 => (0, digest),
-                    15 | 16 => (0, digest.wrapping_add(mark(view.bits()))),
-                    _ => (pass, digest.wrapping_add(mark(view.bits()))),
-                };
-                let number = number.wrapping_add_signed(step.off);
-                let wrong = if step.right_mission { 0 } else { 0x4000 };
-                let said = renamed(step.said, number, mission ^ wrong);
-                let said = if step.tame { tamed(said) } else { said };
-                let answer = match kind {
-                    0 | 4 | 5 => 1,
-                    6 => 7,
-                    11 => 12,
-                    15 => 16,
-                    17 => 18,
-                    _ => 9,
-                };
-                let answer = one_of_each(number, mission)[answer].clone();
-                let mut heard = vec![(port, said)];
-                if onward && step.answered {
-                    heard.push((to, answer));
-                }
-                for ((port, said), pause) in heard.iter().flat_map(|message| {
-                    let pauses = 0..=step.wait_ms;
-                    pauses.map(move |pause| (message, pause))
-                }) {
-                    if pause == 0 {
-                        relay.handle_bytes(now, *port, &framed(own, *port, said));
-                    }
-                    drain(&mut relay, now);
-                    prop_assert!((1..=relay.mission().relays()).contains(&relay.index()));
-                    if let Some(at) = relay.setpoint() {
-                        prop_assert!((0.0..=1000.0).contains(&at.x_m), "{at:?}");
-                        prop_assert!((-60.0..=40.0).contains(&at.y_m), "{at:?}");
-                        prop_assert!((20.0..=300.0).contains(&at.altitude_m), "{at:?}");
-                    }
-                    if relay.setpoint() != place {
-                        let cause = match (said.body()[0], pause) {
-                            (1, 0) => "verdict",
-                            (8, _) => "turn",
-                            (0 | 4 | 5, 0) => "sweep at the last",
-                            _ => "work",
-                        };
-                        *counts.entry(cause).or_insert(0) += 1;
-                        place = relay.setpoint();
-                    }
-                    now = now + Duration::from_millis(1);
-                    relay.handle_timeout(now);
                 }
             }
-            drain(&mut relay, now);
-            prop_assert_eq!(relay.stats().malformed, 0);
+            prop_assert_eq!(flight.bench.stats().malformed, 0);
             seen.set(counts);
             Ok(())
         })
@@ -257,6 +282,12 @@ fn any_messages_leave_a_relay_in_bounds() {
 }
 
 #[test]
+fn any_messages_leave_a_relay_on_the_line_in_bounds() {
+    led_by_anything(paper(8), 4, &["verdict", "view"]);
+    led_by_anything(paper(8), 8, &["sweep at the last", "view"]);
+}
+
+#[test]
 fn any_messages_leave_a_relay_in_a_field_in_bounds() {
     let field = mission(Interference::Field(FIELD));
     led_by_anything(field, 4, &["verdict", "view"]);
@@ -267,4 +298,33 @@ fn any_messages_leave_a_relay_in_a_field_in_bounds() {
     led_by_anything(wild, 1, &[]);
     let weak = mission(Interference::Field(WEAK));
     led_by_anything(weak, 1, &[]);
+}
+
+/// Checks the headers and the counter of a leader's first frames.
+#[test]
+fn a_relays_frames_have_its_header_and_a_rising_counter() {
+    let mut head = Bench::new(1, 8, Wiring::Pair);
+    let mut buffer = [0; MAX_FRAME];
+    let mut counter = 0;
+    while counter < 3 {
+        head.now = head.poll_timeout().unwrap();
+        let now = head.now;
+        head.handle_timeout(now);
+        head.persist(|_| true);
+        while let Some(transmit) = head.poll_transmit(now, &mut buffer) {
+            let plain = plain_of(&buffer[..transmit.len]);
+            let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
+            let header = Header {
+                network: NETWORK,
+                sender: 1,
+                destination: 2,
+                counter,
+            };
+            assert_eq!(plain, unsigned(header, said.body()), "frame {counter}");
+            if said.is("Sweep") {
+                assert_eq!(said.number("view"), f64::from(head.mission));
+            }
+            counter += 1;
+        }
+    }
 }

@@ -4,10 +4,11 @@ use proptest::collection::{btree_set, vec};
 use proptest::prelude::*;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, FrameError};
+use uav_relay_decode::envelope::unsigned;
 
-use super::codec::{plain, wire};
 use super::config;
 use super::golden::vectors;
+use super::said::wire;
 use super::strategies::{headers, messages};
 
 /// Returns the number of frames that a receiver accepts from a stream.
@@ -72,7 +73,7 @@ proptest! {
         head in headers(),
         flips in btree_set(any::<u16>(), 1..=5),
     ) {
-        let mut bad = plain(head, &said.body());
+        let mut bad = unsigned(head, said.body());
         let good = bad.clone();
         for flip in flips {
             let bit = usize::from(flip) % (8 * bad.len());
@@ -90,7 +91,7 @@ proptest! {
         start in any::<u16>(),
         burst in 1..=u32::MAX,
     ) {
-        let mut bad = plain(head, &said.body());
+        let mut bad = unsigned(head, said.body());
         let start = usize::from(start) % (8 * bad.len() - 31);
         for bit in (0..32).filter(|bit| burst >> bit & 1 == 1) {
             bad[(start + bit) / 8] ^= 1 << ((start + bit) % 8);
@@ -104,7 +105,7 @@ proptest! {
         head in headers(),
         damage in vec((any::<u16>(), 1..=u8::MAX), 1..=6),
     ) {
-        let good = wire(&plain(head, &said.body()));
+        let good = wire(head, said.body());
         let mut bad = good.clone();
         for (at, change) in damage {
             let at = usize::from(at) % (bad.len() - 1);

@@ -1,12 +1,14 @@
 //! `FORMAT.md` as a test: examples, ladders, digest; and every rejected stream of the vectors.
 
-use crc::{CRC_32_ISCSI, Crc};
+use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
-use uav_relay::{Band, Interference, Mission, MissionConfig, Port, Wiring};
+use uav_relay::{Interference, Mission, MissionConfig, Port, Wiring};
 use uav_relay_decode::vectors::bytes;
 
+use super::bench::Bench;
 use super::golden::vectors;
-use super::receive::{FIELD, counted, relay};
+use super::kinds::{FIELD, mission, source};
+use super::offer::low_half;
 
 const DOCUMENT: &str = include_str!("../../../src/wire/FORMAT.md");
 
@@ -66,18 +68,6 @@ fn the_examples_of_the_document_are_golden_vectors() {
 }
 
 #[test]
-fn the_vectors_have_each_tag() {
-    let mut tags: Vec<u8> = vectors()
-        .frames
-        .iter()
-        .map(|vector| vector.body[0])
-        .collect();
-    tags.sort_unstable();
-    tags.dedup();
-    assert_eq!(tags, (0..=20).collect::<Vec<u8>>());
-}
-
-#[test]
 fn the_ladders_of_the_document_are_golden_vectors() {
     let section = DOCUMENT.split("## Ladder").nth(1).unwrap();
     let vectors = vectors().ladders;
@@ -95,13 +85,13 @@ fn every_rejected_stream_is_counted_as_it_says() {
     let rejected = vectors().rejected;
     assert!(rejected.len() >= 224, "{}", rejected.len());
     for vector in rejected {
-        let mut relay = relay(2, 8, Wiring::Pair);
-        assert_ne!(digest(relay.mission()), 0x5A3C);
-        let now = uav_relay::Instant::ZERO;
-        relay.handle_bytes(now, Port::Upstream, &vector.wire);
+        let mut bench = Bench::new(2, 8, Wiring::Pair);
+        assert_ne!(bench.mission, 0x5A3C);
+        let now = bench.now;
+        bench.handle_bytes(now, Port::Upstream, &vector.wire);
         let mut wanted = vector.counted;
         wanted.sort_unstable();
-        assert_eq!(counted(relay.stats()), wanted, "{}", vector.what);
+        assert_eq!(bench.counted(), wanted, "{}", vector.what);
     }
 }
 
@@ -129,45 +119,36 @@ fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
         bytes.extend(band.least_m.to_le_bytes());
         bytes.extend(band.most_m.to_le_bytes());
     }
-    let crc = Crc::<u32>::new(&CRC_32_ISCSI).checksum(&bytes);
-    u16::try_from(crc & 0xFFFF).unwrap()
+    low_half(&bytes)
 }
 
 #[test]
 fn the_digest_is_what_the_document_says() {
-    let base = *relay(1, 8, Wiring::Pair).mission().config();
+    let base = paper(8);
     let Interference::Source(interferer) = base.interference else {
         panic!("the paper's mission has an interferer");
     };
-    let source = [interferer.power_w, interferer.x_m, interferer.y_m];
+    let source_numbers = [interferer.power_w, interferer.x_m, interferer.y_m];
     let points = FIELD.points().iter();
     let field: Vec<f32> = points
         .flat_map(|point| [point.x_m, point.upsilon_per_w])
         .collect();
     assert!(field.len() > 4);
-    let wide = Band {
-        least_m: 20.0,
-        most_m: 300.0,
-    };
-    let beside = Band {
-        least_m: -60.0,
-        most_m: 40.0,
-    };
+    let wide = source();
     let mut seen = Vec::new();
     for (interference, numbers) in [
-        (base.interference, &source[..]),
+        (base.interference, &source_numbers[..]),
         (Interference::Field(FIELD), &field),
     ] {
         for (band, lateral) in [
             (base.band, base.lateral),
-            (wide, base.lateral),
-            (wide, beside),
+            (wide.band, base.lateral),
+            (wide.band, wide.lateral),
         ] {
             let config = MissionConfig {
-                interference,
                 band,
                 lateral,
-                ..base
+                ..mission(interference)
             };
             let mission = Mission::try_new(config).unwrap();
             let by_the_rules = digest_by_the_rules(&mission, numbers);

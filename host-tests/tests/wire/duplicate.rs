@@ -1,69 +1,61 @@
 //! Claims to a node number without a key, and frames with a relay's own number under a key.
 
+use host_tests::fixtures::paper;
 use uav_relay::MAX_FRAME;
-use uav_relay::wire::digest::digest;
-use uav_relay::{Auth, Event, Identity, Instant, Key, Port, Relay, Settings, Wiring};
+use uav_relay::{Auth, Duration, Event, Instant, Key, Mission, Port, Relay, Settings, Wiring};
 
-use super::codec::Said;
-use super::kinds::{FIRST, framed, one_of_each, sent_with_claims};
-use super::receive::relay;
-use super::votes::{between, events};
+use super::bench::{Bench, between};
+use super::kinds::{FIRST, claim, one_of_each};
+use super::said::Said;
 
 const NOW: Instant = Instant::from_millis(1_000);
 
 const ECHO: u8 = 2;
 
-/// Returns a claim by a node that has received claim `heard`.
-const fn claim(number: u32, heard: u32, flags: u8) -> Said {
-    Said::Claim {
-        number,
-        heard,
-        flags,
-    }
+const PORTS: [(Wiring, Port); 2] = [
+    (Wiring::Pair, Port::Upstream),
+    (Wiring::Shared, Port::Shared),
+];
+
+/// Delivers a frame to relay 4 of 8; returns the claims and echoes that it sends.
+fn hears(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, Said)> {
+    let now = bench.now;
+    bench.handle_bytes(now, port, bytes);
+    bench.sends_with_claims()
 }
 
-/// Returns relay 4 of 8 and its claim number, with which it answers another frame with its number.
-fn relay_4(wiring: Wiring) -> (Relay, u32) {
-    let mut relay = relay(4, 8, wiring);
-    let sweep = &one_of_each(FIRST, digest(relay.mission()))[0];
-    let port = match wiring {
-        Wiring::Pair => Port::Upstream,
-        Wiring::Shared => Port::Shared,
-    };
-    relay.handle_bytes(NOW, port, &between(4, 5, sweep));
-    assert_eq!(events(&mut relay), [], "it may be an echo");
-    let out = sent_with_claims(&mut relay, NOW);
-    let [(_, Said::Claim { number, .. })] = out[..] else {
-        panic!("{out:?}");
-    };
-    assert_eq!(out[0].1, claim(number, 0, 0));
+/// Returns relay 4 of 8, its own sweep, and its claim number, with which it answers another frame with its number.
+fn relay_4(wiring: Wiring, port: Port) -> (Bench, Said, u32) {
+    let mut bench = Bench::new(4, 8, wiring);
+    bench.now = NOW;
+    let sweep = one_of_each(FIRST, bench.mission)[0].clone();
+    let out = hears(&mut bench, port, &between(4, 5, &sweep));
+    assert_eq!(bench.events(), [], "it may be an echo");
+    let number = out[0].1.number("claim") as u32;
+    assert_eq!(out, [(out[0].0, claim(number, 0, 0))]);
     assert!(number < 1 << 30);
-    assert!(!relay.stands_down());
-    (relay, number)
+    assert!(!bench.stands_down());
+    (bench, sweep, number)
 }
 
 #[test]
-fn a_claim_of_a_neighbour_is_repeated_to_its_number() {
+fn a_neighbours_claim_is_echoed_to_its_number() {
     for (port, from) in [(Port::Upstream, 3), (Port::Downstream, 5)] {
-        let (mut relay, _) = relay_4(Wiring::Pair);
+        let (mut bench, _, _) = relay_4(Wiring::Pair, Port::Upstream);
         for flags in 0..2 {
-            relay.handle_bytes(NOW, port, &between(from, 4, &claim(7, 9, flags)));
-            let echo = claim(7, 9, flags | ECHO);
-            assert_eq!(sent_with_claims(&mut relay, NOW), [(port, echo)]);
+            let out = hears(&mut bench, port, &between(from, 4, &claim(7, 9, flags)));
+            assert_eq!(out, [(port, claim(7, 9, flags | ECHO))]);
         }
-        assert!(!relay.stands_down() && events(&mut relay).is_empty());
+        assert!(!bench.stands_down() && bench.events().is_empty());
     }
 }
 
 /// Checks claims. One that does not name the relay's own may be from before its start: it is only answered.
 #[test]
 fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
-    for (wiring, port) in [
-        (Wiring::Pair, Port::Upstream),
-        (Wiring::Shared, Port::Shared),
-    ] {
-        let (relay, own) = relay_4(wiring);
-        let late = NOW + uav_relay::Duration::from_millis(200);
+    for (wiring, port) in PORTS {
+        let (mut bench, _, own) = relay_4(wiring, port);
+        bench.now = NOW + Duration::from_millis(200);
         for echo in [false, true] {
             for (number, heard) in [
                 (own + 1, own),
@@ -71,26 +63,19 @@ fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
                 (own + 1, 0),
                 (own + 1, own - 1),
             ] {
-                let mut after = relay.clone();
+                let mut after = bench.clone();
                 let bytes = if echo {
-                    framed(4, Port::Upstream, &claim(number, heard, ECHO))
+                    between(3, 4, &claim(number, heard, ECHO))
                 } else {
                     between(4, 3, &claim(number, heard, 0))
                 };
-                after.handle_bytes(late, port, &bytes);
+                let out = hears(&mut after, port, &bytes);
                 let passive = number > own && heard == own;
                 assert_eq!(after.stands_down(), passive, "{number} {heard} {echo}");
-                let told = events(&mut after);
-                let expected: &[Event] = if heard == own {
-                    &[Event::IndexTaken { node: 4 }]
-                } else {
-                    &[]
-                };
-                assert_eq!(told, expected);
-                let answer = claim(own, number, u8::from(passive));
-                let out = sent_with_claims(&mut after, late);
+                let told = (heard == own).then_some(Event::IndexTaken { node: 4 });
+                assert_eq!(after.events(), Vec::from_iter(told));
                 assert_eq!(out.len(), 1);
-                assert_eq!(out[0].1, answer);
+                assert_eq!(out[0].1, claim(own, number, u8::from(passive)));
             }
         }
     }
@@ -99,31 +84,35 @@ fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
 /// Checks a radio that returns a relay's own frames.
 #[test]
 fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
-    for wiring in [Wiring::Pair, Wiring::Shared] {
-        let (mut relay, own) = relay_4(wiring);
-        let port = match wiring {
-            Wiring::Pair => Port::Upstream,
-            Wiring::Shared => Port::Shared,
-        };
-        let sweep = one_of_each(FIRST, digest(relay.mission()))[0].clone();
-        let late = NOW + uav_relay::Duration::from_millis(200);
+    for (wiring, port) in PORTS {
+        let (mut bench, sweep, own) = relay_4(wiring, port);
+        bench.now = NOW + Duration::from_millis(200);
         for bytes in [
             between(4, 3, &claim(own, 0, 0)),
-            framed(4, Port::Upstream, &claim(own, 0, ECHO)),
+            between(3, 4, &claim(own, 0, ECHO)),
             between(4, 5, &sweep),
             between(4, 3, &claim(own, 0, 0)),
         ] {
-            relay.handle_bytes(late, port, &bytes);
-            assert_eq!(sent_with_claims(&mut relay, late), []);
-            assert_eq!(events(&mut relay), []);
-            assert!(!relay.stands_down());
+            assert_eq!(hears(&mut bench, port, &bytes), []);
+            assert_eq!(bench.events(), []);
+            assert!(!bench.stands_down());
         }
     }
 }
 
+/// Returns all frames that a relay sends.
+fn frames(relay: &mut Relay) -> Vec<Vec<u8>> {
+    let mut buffer = [0; MAX_FRAME];
+    let mut frames = Vec::new();
+    relay.persist(|_| true);
+    while let Some(transmit) = relay.poll_transmit(NOW, &mut buffer) {
+        frames.push(buffer[..transmit.len].to_vec());
+    }
+    frames
+}
+
 /// Returns relay 4 of 8 with a key, and its first two frames, which are handshakes.
 fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
-    let mission = *relay(4, 8, Wiring::Shared).mission();
     let settings = Settings {
         wiring: Wiring::Shared,
         auth: Some(Auth {
@@ -132,17 +121,13 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
         }),
         ..Settings::default()
     };
-    let identity = Identity {
+    let identity = uav_relay::Identity {
         network: 7,
         index: 4,
     };
+    let mission = Mission::try_new(paper(8)).unwrap();
     let mut relay = Relay::new(mission, identity, settings, seed, NOW).unwrap();
-    let mut buffer = [0; MAX_FRAME];
-    let mut frames = Vec::new();
-    relay.persist(|_| true);
-    while let Some(transmit) = relay.poll_transmit(NOW, &mut buffer) {
-        frames.push(buffer[..transmit.len].to_vec());
-    }
+    let frames = frames(&mut relay);
     assert_eq!(frames.len(), 2);
     (relay, frames)
 }
@@ -158,12 +143,7 @@ fn with_a_key_handshakes_are_the_claims() {
         let given = |relay: &Relay, frame: &[u8]| {
             let mut relay = relay.clone();
             relay.handle_bytes(NOW, Port::Shared, frame);
-            let mut buffer = [0; MAX_FRAME];
-            let mut sent = 0;
-            relay.persist(|_| true);
-            while relay.poll_transmit(NOW, &mut buffer).is_some() {
-                sent += 1;
-            }
+            let sent = frames(&mut relay).len();
             (relay.stands_down(), sent)
         };
         for frame in own.iter().chain(&forged) {

@@ -1,64 +1,51 @@
 //! Formation of a chain frame by frame: hellos, proposal, decision, and refusals.
 
-use host_tests::fixtures::{NETWORK, paper};
-use uav_relay::wire::digest::digest;
-use uav_relay::{
-    Duration, Event, Identity, Instant, Mission, Port, Relay, Settings, ViewId, Wiring,
-};
+use host_tests::fixtures::paper;
+use serde_json::json;
+use uav_relay::{Event, Port, Settings, ViewId, Wiring};
 
-use super::codec::{Call, Decided, Proposed, Said, SizedView};
-use super::kinds::{framed, sent};
-use super::receive::{counted, relay};
+use super::bench::Bench;
+use super::kinds::one_of_each;
+use super::said::Said;
 use super::votes::*;
 
 #[test]
-fn a_proposal_goes_through_three_relays_and_the_decision_back() {
-    let mut chain: Vec<Relay> = (1..=3).map(|own| relay(own, 3, Wiring::Pair)).collect();
-    let [head, middle, tail] = &mut chain[..] else {
-        panic!("three relays");
-    };
-    let mission = digest(head.mission());
-    let now = Instant::ZERO;
-    // A view is requested: the head, which has no predecessor, proposes the first one.
-    let hello = a_hello(0, mission, 1, FORMS | READY);
-    head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &hello));
+fn a_proposal_passes_three_relays_and_the_decision_returns() {
+    let mut chain = [1, 2, 3].map(|own| Bench::new(own, 3, Wiring::Pair));
+    let [head, middle, tail] = &mut chain;
+    let (up, down) = (Port::Upstream, Port::Downstream);
+    let mission = head.mission;
     let view = id(1, 1);
-    let proposal = |place| Said::Proposal(proposed(view, (mission, 0), place, 3));
+    let proposal = |place| proposed(view, (mission, 0), place, 3);
     let decision = |place| granted(view, (mission, 0), place, 3);
-    assert_eq!(soon(head, now), [(Port::Downstream, proposal(1))]);
-    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
-    assert_eq!(only(middle, now), (Port::Downstream, proposal(2)));
+    // A view is requested: the head, which has no predecessor, proposes the first one.
+    let mut out = head.hears(down, &a_hello(0, mission, 1, FORMS | READY));
+    out.extend(head.ticks());
+    assert_eq!(out, [(down, proposal(1))]);
+    assert_eq!(middle.hears(up, &proposal(1)), [(down, proposal(2))]);
     assert_eq!(middle.view(), ViewId::LOADED, "not before it is decided");
     // The proposal is repeated while its result is unknown.
-    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
-    let busy = Said::Busy { number: mark(view) };
-    assert_eq!(only(middle, now), (Port::Upstream, busy));
-    tail.handle_bytes(now, Port::Upstream, &between(2, 3, &proposal(2)));
-    assert_eq!(only(tail, now), (Port::Upstream, decision(3)));
-    middle.handle_bytes(now, Port::Downstream, &between(3, 2, &decision(3)));
-    assert_eq!(only(middle, now), (Port::Upstream, decision(2)));
+    let busy = &one_of_each(mark(view), mission)[2];
+    assert_eq!(middle.hears(up, &proposal(1)), [(up, busy.clone())]);
+    assert_eq!(tail.hears(up, &proposal(2)), [(up, decision(3))]);
+    assert_eq!(middle.hears(down, &decision(3)), [(up, decision(2))]);
     // The answer was lost and is repeated.
-    middle.handle_bytes(now, Port::Upstream, &between(1, 2, &proposal(1)));
-    assert_eq!(only(middle, now), (Port::Upstream, decision(2)));
-    head.handle_bytes(now, Port::Downstream, &between(2, 1, &decision(2)));
-    for (relay, index) in [head, middle, tail].into_iter().zip(1..) {
-        assert_eq!((relay.view().bits(), relay.index()), (view, index));
-        assert_eq!(relay.stats().views, 1);
-        assert_eq!(relay.lease(), None, "nothing to hold yet");
-        assert_eq!(events(relay), [Event::Reformed]);
-        assert_eq!(relay.stats().rejected(), 0);
+    assert_eq!(middle.hears(up, &proposal(1)), [(up, decision(2))]);
+    head.hears(down, &decision(2));
+    for (bench, index) in chain.iter_mut().zip(1..) {
+        assert_eq!((bench.view().bits(), bench.index()), (view, index));
+        assert_eq!(bench.stats().views, 1);
+        assert_eq!(bench.lease(), None, "nothing to hold yet");
+        assert_eq!(bench.events(), [Event::Reformed]);
+        assert_eq!(bench.stats().rejected(), 0);
     }
 }
 
 #[test]
 fn a_decision_that_is_not_awaited_is_stale() {
-    let now = Instant::ZERO;
-    let mut waiting = relay(4, 8, Wiring::Pair);
-    let mission = digest(waiting.mission());
-    let (view, of) = (id(2, 1), (mission, 0));
-    let proposal = Said::Proposal(proposed(view, of, 3, 8));
-    waiting.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
-    sent(&mut waiting, now);
+    let mut waiting = Bench::new(4, 8, Wiring::Pair);
+    let (view, of) = (id(2, 1), (waiting.mission, 0));
+    waiting.hears(Port::Upstream, &proposed(view, of, 3, 8));
     for (decided, place, relays) in [
         (view, 4, 8),
         (view, 6, 8),
@@ -71,107 +58,64 @@ fn a_decision_that_is_not_awaited_is_stale() {
     ] {
         let mut after = waiting.clone();
         let decision = granted(decided, of, place, relays);
-        after.handle_bytes(
-            now,
-            Port::Downstream,
-            &framed(4, Port::Downstream, &decision),
-        );
-        assert_eq!(
-            counted(after.stats()),
-            ["received", "stale"],
-            "{decision:?}"
-        );
+        assert_eq!(after.hears(Port::Downstream, &decision), []);
+        assert_eq!(after.counted(), ["received", "stale"], "{decision:?}");
         assert_eq!(after.view(), ViewId::LOADED);
-        assert_eq!(sent(&mut after, now), []);
     }
     let decision = granted(view, of, 5, 5);
-    waiting.handle_bytes(
-        now,
-        Port::Downstream,
-        &framed(4, Port::Downstream, &decision),
-    );
-    assert_eq!(
-        (waiting.view().bits(), waiting.mission().relays()),
-        (view, 5)
-    );
-    waiting.handle_bytes(
-        now,
-        Port::Downstream,
-        &framed(4, Port::Downstream, &decision),
-    );
+    waiting.hears(Port::Downstream, &decision);
+    let (agreed, relays) = (waiting.view().bits(), waiting.mission().relays());
+    assert_eq!((agreed, relays), (view, 5));
+    waiting.hears(Port::Downstream, &decision);
     assert_eq!(waiting.stats().stale, 1);
 }
 
-fn last_of_20(quorum: bool) -> (Relay, u16) {
-    let mission = Mission::try_new(paper(20)).unwrap();
-    let identity = Identity {
-        network: NETWORK,
-        index: 20,
-    };
+fn last_of_20(quorum: bool) -> Bench {
     let settings = Settings {
         quorum,
         ..Settings::default()
     };
-    let relay = Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap();
-    let mission = digest(relay.mission());
-    (relay, mission)
+    Bench::with(paper(20), 20, settings)
 }
 
 /// Returns the decision on a proposal.
-fn decided_by(last: &mut Relay, proposal: Proposed) -> Decided {
-    let now = Instant::ZERO;
-    let proposal = Said::Proposal(proposal);
-    last.handle_bytes(now, Port::Upstream, &framed(20, Port::Upstream, &proposal));
-    match only(last, now) {
-        (Port::Upstream, Said::Decision(decided)) => decided,
-        other => panic!("{other:?}"),
-    }
+fn decided_by(last: &mut Bench, proposal: &Said) -> Said {
+    let mut out = last.hears(Port::Upstream, proposal);
+    let (port, said) = out.pop().unwrap();
+    assert!(out.is_empty() && port == Port::Upstream && said.is("Decision"));
+    said
 }
 
 /// Checks the quorum: more than half of the earlier view's members, or half with its proposer.
 #[test]
-fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
+fn a_quorum_is_over_half_or_half_with_the_proposer() {
     for quorum in [true, false] {
-        let (last, mission) = last_of_20(quorum);
+        let last = last_of_20(quorum);
+        let of = (last.mission, 0);
+        let proposal = proposed(id(9, 1), of, 11, 20);
         for relays in 1..=20 {
             for votes in 0..=relays {
                 for proposer in [false, true] {
                     // The view is newer than the last relay's own, which is no member of it.
-                    let proposal = Proposed {
-                        agreed: SizedView {
-                            id: id(8, 3),
-                            relays,
-                        },
-                        votes,
-                        lease_left: 77,
-                        proposer,
-                        ..proposed(id(9, 1), (mission, 0), 11, 20)
-                    };
+                    let proposal = proposal.with(json!({
+                        "agreed_view": id(8, 3), "agreed_relays": relays, "votes": votes,
+                        "lease_left_ds": 77, "proposer": proposer,
+                    }));
                     let mut last = last.clone();
-                    let decided = decided_by(&mut last, proposal);
+                    let decided = decided_by(&mut last, &proposal);
                     let enough = 2 * votes + u16::from(proposer) > relays || !quorum;
-                    let all = votes == relays;
-                    let expected = Decided {
-                        call: Call {
-                            place: 12,
-                            ..proposal.call
-                        },
-                        base: proposal.agreed,
-                        view: enough.then_some(SizedView {
-                            id: id(9, 1),
-                            relays: 12,
-                        }),
-                        there: 12,
-                        // A missing member may hold the earlier view for as long.
-                        lease_left: if all { 0 } else { 77 },
-                    };
-                    assert_eq!(decided, expected, "{votes} of {relays}, {proposer}");
-                    let (event, view) = if enough {
-                        (Event::Reformed, id(9, 1))
+                    let (event, view, decision) = if enough {
+                        (Event::Reformed, id(9, 1), granted(id(9, 1), of, 12, 12))
                     } else {
-                        (Event::NoQuorum, 0)
+                        (Event::NoQuorum, 0, refused(id(9, 1), of, 12, 12))
                     };
-                    assert_eq!(events(&mut last), [event]);
+                    // A missing member may hold the earlier view for as long.
+                    let left = if votes == relays { 0 } else { 77 };
+                    let expected = decision.with(json!({
+                        "base_view": id(8, 3), "base_relays": relays, "lease_left_ds": left,
+                    }));
+                    assert_eq!(decided, expected, "{votes} of {relays}, {proposer}");
+                    assert_eq!(last.events(), [event]);
                     assert_eq!(last.view().bits(), view);
                 }
             }
@@ -181,132 +125,73 @@ fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
 
 /// Checks that a member adds its vote, and its own lease if that is shorter.
 #[test]
-fn a_member_adds_its_voice() {
-    let (last, mission) = last_of_20(true);
+fn a_member_adds_its_vote() {
+    let last = last_of_20(true);
     for (votes, lease_left) in [(10, 30), (10, 400), (9, 30)] {
-        let proposal = Proposed {
-            votes,
-            lease_left,
-            proposer: false,
-            ..proposed(id(9, 2), (mission, 0), 10, 20)
+        let proposal = proposed(id(9, 2), (last.mission, 0), 10, 20).with(json!({
+            "votes": votes, "lease_left_ds": lease_left, "proposer": false,
+        }));
+        let decided = decided_by(&mut last.clone(), &proposal);
+        let accepted = if votes == 10 {
+            json!({ "view": id(9, 2), "relays": 11 })
+        } else {
+            json!(null)
         };
-        let decided = decided_by(&mut last.clone(), proposal);
-        let view = SizedView {
-            id: id(9, 2),
-            relays: 11,
-        };
-        assert_eq!(
-            decided.view,
-            (votes == 10).then_some(view),
-            "11 of 20 or 10"
-        );
-        assert_eq!(decided.lease_left, lease_left.min(RELIED));
+        let expected = decided.with(json!({
+            "accepted": accepted, "lease_left_ds": lease_left.min(RELIED),
+        }));
+        assert_eq!(decided, expected, "11 of 20 or 10");
     }
 }
 
 /// Checks that an accepted view, which may have been agreed on, is decided again.
 #[test]
-fn what_may_have_been_agreed_on_is_decided_on_again() {
-    let (mut last, mission) = last_of_20(true);
-    let now = Instant::ZERO;
-    let before = SizedView {
-        id: id(4, 3),
-        relays: 17,
+fn a_view_that_may_have_been_agreed_on_is_decided_again() {
+    let mut last = last_of_20(true);
+    let of = (last.mission, 0);
+    // Proposal by which the view of relay 3 was decided, and its size.
+    let successor = |proposal: u32, relays: u16| json!({ "proposal": proposal, "view": id(4, 3), "relays": relays });
+    let accepts = |decided: &Said, relays: u16| {
+        let accepted = json!({ "view": id(4, 3), "relays": relays });
+        assert_eq!(*decided, decided.with(json!({ "accepted": accepted })));
     };
-    let proposal = Proposed {
-        successor: Some((id(6, 2), before)),
-        ..proposed(id(9, 1), (mission, 0), 11, 20)
-    };
-    let decided = decided_by(&mut last, proposal);
-    assert_eq!(decided.view, Some(before));
-    assert_eq!((last.view(), events(&mut last)), (ViewId::LOADED, vec![]));
+    let proposal =
+        proposed(id(9, 1), of, 11, 20).with(json!({ "successor": successor(id(6, 2), 17) }));
+    accepts(&decided_by(&mut last, &proposal), 17);
+    assert_eq!((last.view(), last.events()), (ViewId::LOADED, vec![]));
     // The relay has accepted that view by this proposal too, and reports it unless a later acceptance is reported.
-    for (told, expected) in [
-        (None, before),
-        (
-            Some((
-                id(8, 2),
-                SizedView {
-                    relays: 9,
-                    ..before
-                },
-            )),
-            before,
-        ),
-        (
-            Some((
-                id(9, 1),
-                SizedView {
-                    relays: 9,
-                    ..before
-                },
-            )),
-            SizedView {
-                relays: 9,
-                ..before
-            },
-        ),
-        (
-            Some((
-                id(9, 2),
-                SizedView {
-                    relays: 8,
-                    ..before
-                },
-            )),
-            SizedView {
-                relays: 8,
-                ..before
-            },
-        ),
+    for (told, relays) in [
+        (json!(null), 17),
+        (successor(id(8, 2), 9), 17),
+        (successor(id(9, 1), 9), 9),
+        (successor(id(9, 2), 8), 8),
     ] {
-        let proposal = Proposed {
-            successor: told,
-            ..proposed(id(10, 1), (mission, 0), 11, 20)
-        };
-        let decided = decided_by(&mut last.clone(), proposal);
-        assert_eq!(decided.view, Some(expected), "{told:?}");
+        let proposal = proposed(id(10, 1), of, 11, 20).with(json!({ "successor": told }));
+        accepts(&decided_by(&mut last.clone(), &proposal), relays);
     }
-    // The leader continues with the next proposal.
-    let mut head = relay(1, 8, Wiring::Pair);
-    let mission = digest(head.mission());
-    let hello = a_hello(0, mission, 1, FORMS | READY);
-    head.handle_bytes(now, Port::Downstream, &framed(1, Port::Downstream, &hello));
-    soon(&mut head, now);
-    let before = SizedView {
-        id: id(1, 2),
-        relays: 7,
-    };
-    let decision = Said::Decision(Decided {
-        call: Call {
-            of: (mission, 0),
-            view: id(1, 1),
-            place: 2,
-        },
-        base: SizedView { id: 0, relays: 8 },
-        view: Some(before),
-        there: 8,
-        lease_left: 40,
-    });
-    head.handle_bytes(
-        now,
+}
+
+/// Checks a leader whose proposal has led to an earlier view: it continues with the next proposal.
+#[test]
+fn a_leader_continues_after_an_earlier_view_is_decided() {
+    let mut head = Bench::new(1, 8, Wiring::Pair);
+    let of = (head.mission, 0);
+    head.hears(
         Port::Downstream,
-        &framed(1, Port::Downstream, &decision),
+        &a_hello(0, head.mission, 1, FORMS | READY),
     );
+    head.ticks();
+    let before = json!({ "view": id(1, 2), "relays": 7 });
+    let decision =
+        refused(id(1, 1), of, 2, 8).with(json!({ "accepted": before, "lease_left_ds": 40 }));
+    let mut out = head.hears(Port::Downstream, &decision);
     assert_eq!(head.view(), ViewId::LOADED);
-    assert_eq!(counted(head.stats()), ["received"]);
+    assert_eq!(head.counted(), ["received"]);
     // All have accepted the view, so its members decide on the next one; this relay does not vote.
-    let next = Proposed {
-        agreed: before,
-        votes: 0,
-        lease_left: u16::MAX,
-        rest: u16::MAX,
-        proposer: false,
-        ..proposed(id(2, 1), (mission, 0), 1, 8)
-    };
-    let now = now + Duration::from_millis(1);
-    assert_eq!(
-        soon(&mut head, now),
-        [(Port::Downstream, Said::Proposal(next))]
-    );
+    let next = proposed(id(2, 1), of, 1, 8).with(json!({
+        "agreed_view": id(1, 2), "agreed_relays": 7, "votes": 0, "lease_left_ds": u16::MAX,
+        "rest_ds": u16::MAX, "proposer": false,
+    }));
+    out.extend(head.ticks());
+    assert_eq!(out, [(Port::Downstream, next)]);
 }

@@ -1,51 +1,37 @@
 //! Profile collection at a relay: forwarding, results, and stale messages.
 
-use host_tests::fixtures::{self, paper};
-use uav_relay::wire::digest::digest;
-use uav_relay::{
-    Instant, Interference, Method, Mission, MissionConfig, Port, Profile, Relay, Settings, Wiring,
-};
+use host_tests::fixtures::paper;
+use serde_json::json;
+use uav_relay::{Interference, Method, MissionConfig, Port, Profile, Settings, Wiring};
 
-use super::codec::{Said, Seats};
-use super::kinds::{FIRST, SECOND, framed, one_of_each, sent, settle, source};
-use super::receive::{FIELD, counted, relay_of};
+use super::bench::Bench;
+use super::kinds::{FIELD, FIRST, SECOND, mission, one_of_each, source};
+use super::said::Said;
+use super::votes::FORMS;
 
-/// Returns the counters that a message of the due pass, received at `port`, increments at relay 4 of 8.
-fn counted_of(interference: Interference, port: Port, tag: usize) -> Vec<&'static str> {
-    let mission = MissionConfig {
-        interference,
-        ..paper(8)
-    };
-    let mut relay = relay_of(mission, 4, Wiring::Pair);
-    let said = &one_of_each(FIRST, digest(relay.mission()))[tag];
-    relay.handle_bytes(Instant::ZERO, port, &framed(4, port, said));
-    assert_eq!(relay.setpoint(), None);
-    counted(relay.stats())
-}
+const UP: Port = Port::Upstream;
+const DOWN: Port = Port::Downstream;
 
+/// Checks results that are not awaited, and profiles and chosen positions in a field.
 #[test]
-fn what_came_of_a_gathering_that_is_not_awaited_is_stale() {
-    let read = counted_of(paper(8).interference, Port::Downstream, 7);
-    assert_eq!(read, ["received", "stale"]);
-}
-
-#[test]
-fn gatherings_and_asides_are_stale_in_a_field() {
-    for tag in [5, 6] {
-        let field = Interference::Field(FIELD);
-        let read = counted_of(field, Port::Downstream, tag);
-        assert_eq!(read, ["received", "stale"], "{tag}");
+fn profiles_that_are_not_awaited_are_stale() {
+    let field = Interference::Field(FIELD);
+    for (interference, tag) in [(paper(8).interference, 7), (field, 5), (field, 6)] {
+        let config = MissionConfig {
+            interference,
+            ..paper(8)
+        };
+        let mut bench = Bench::of(config, 4, Wiring::Pair);
+        let said = &one_of_each(FIRST, bench.mission)[tag];
+        bench.hears(DOWN, said);
+        assert_eq!(bench.setpoint(), None);
+        assert_eq!(bench.counted(), ["received", "stale"], "{said:?}");
     }
 }
 
-fn hear(relay: &mut Relay, now: Instant, port: Port, said: &Said) {
-    relay.handle_bytes(now, port, &framed(4, port, said));
-}
-
 /// Returns relay 4 of 8; with `differs` it holds 33 m.
-fn fourth(differs: bool) -> Relay {
-    let mission = Mission::try_new(source()).unwrap();
-    let common = mission.config().common;
+fn fourth(differs: bool) -> Bench {
+    let common = source().common;
     let settings = Settings {
         method: Method::Joint,
         hold_altitude: differs,
@@ -55,190 +41,131 @@ fn fourth(differs: bool) -> Relay {
         }),
         ..Settings::default()
     };
-    fixtures::relay(mission, 4, settings)
+    Bench::with(source(), 4, settings)
 }
 
 /// Returns a collection, or its result, with profiles of the relays `indices`.
-fn of(relay: &Relay, number: u16, after: u16, indices: &[u16]) -> Seats {
-    Seats {
-        number,
-        mission: digest(relay.mission()),
-        after,
-        seats: indices.iter().map(|&index| (index, 30.0, 0.5)).collect(),
-    }
+fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Said {
+    let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
+    let seats: Vec<_> = indices.iter().map(seat).collect();
+    let fields = json!({ "number": number, "view": bench.mission, "after": after, "seats": seats });
+    Said::new(name, &fields)
+}
+
+/// Returns a collection, or its result, with one profile more.
+fn and(said: &Said, name: &str, index: u16, altitude_m: f32, power_w: f32) -> Said {
+    let mut fields = json!(said.fields());
+    let seat = json!({ "relay": index, "altitude_m": altitude_m, "power_w": power_w });
+    fields["seats"].as_array_mut().unwrap().push(seat);
+    Said::new(name, &fields)
 }
 
 #[test]
-fn a_gathering_goes_onward_with_who_differs_and_what_came_of_it_back() {
-    let now = Instant::ZERO;
+fn a_collection_is_forwarded_and_its_result_returned() {
     for differs in [false, true] {
-        let mut relay = fourth(differs);
-        let told = of(&relay, FIRST, 0, &[1, 3]);
-        let mut own = told.clone();
-        if differs {
-            own.seats.push((4, 33.0, 1.0));
-        }
-        hear(&mut relay, now, Port::Upstream, &Said::Gather(told.clone()));
-        assert_eq!(
-            sent(&mut relay, now),
-            [(Port::Downstream, Said::Gather(own.clone()))]
-        );
-
+        let mut bench = fourth(differs);
+        let told = of(&bench, "Gather", FIRST, 0, &[1, 3]);
+        let own = if differs {
+            and(&told, "Gather", 4, 33.0, 1.0)
+        } else {
+            told.clone()
+        };
+        assert_eq!(bench.hears(UP, &told), [(DOWN, own.clone())]);
         // The collection is repeated while its result is pending.
-        hear(&mut relay, now, Port::Upstream, &Said::Gather(told.clone()));
-        let busy = Said::Busy { number: FIRST };
-        assert_eq!(sent(&mut relay, now), [(Port::Upstream, busy)]);
-
-        let mut all = own.clone();
-        all.seats.push((6, 0.0, 2.0));
-        let back = [(Port::Upstream, Said::Gathered(all.clone()))];
-        hear(
-            &mut relay,
-            now,
-            Port::Downstream,
-            &Said::Gathered(all.clone()),
-        );
-        assert_eq!(sent(&mut relay, now), back);
-        // No relay moves.
-        assert_eq!(relay.setpoint(), None);
-
+        let busy = one_of_each(FIRST, bench.mission)[2].clone();
+        assert_eq!(bench.hears(UP, &told), [(UP, busy)]);
+        let all = and(&own, "Gathered", 6, 0.0, 2.0);
+        assert_eq!(bench.hears(DOWN, &all), [(UP, all.clone())]);
+        assert_eq!(bench.setpoint(), None, "no relay moves");
         // The collection is repeated after its result.
-        hear(&mut relay, now, Port::Upstream, &Said::Gather(told));
-        assert_eq!(sent(&mut relay, now), back);
-        assert_eq!(counted(relay.stats()), ["received", "repeated"]);
+        assert_eq!(bench.hears(UP, &told), [(UP, all)]);
+        assert_eq!(bench.counted(), ["received", "repeated"]);
     }
 }
 
 /// Checks that a full roster is forwarded unchanged, and that the next pass continues behind it.
 #[test]
-fn who_finds_no_room_is_asked_by_the_next_pass() {
-    let mission = MissionConfig {
-        band: uav_relay::Band {
-            least_m: 20.0,
-            most_m: 300.0,
-        },
+fn a_full_roster_is_continued_by_the_next_pass() {
+    let config = MissionConfig {
+        band: mission(paper(8).interference).band,
         ..paper(20)
     };
-    let mission = Mission::try_new(mission).unwrap();
     let settings = Settings {
         hold_altitude: true,
         ..Settings::default()
     };
-    let mut relay = fixtures::relay(mission, 10, settings);
-    let now = Instant::ZERO;
-    let full = of(&relay, FIRST, 0, &[1, 2, 3, 4, 5, 6, 7, 8]);
-    let next = of(&relay, SECOND, 8, &[9]);
-    let say = |relay: &mut Relay, port, said: &Said| {
-        relay.handle_bytes(now, port, &framed(10, port, said));
-        sent(relay, now)
-    };
-    let out = say(&mut relay, Port::Upstream, &Said::Gather(full.clone()));
-    assert_eq!(out, [(Port::Downstream, Said::Gather(full.clone()))]);
-    let out = say(&mut relay, Port::Downstream, &Said::Gathered(full.clone()));
-    assert_eq!(out, [(Port::Upstream, Said::Gathered(full))]);
-    // Some relays have not been asked, so a sweep is too early.
-    let mut early = relay.clone();
-    let aside = &one_of_each(SECOND, digest(relay.mission()))[5];
-    assert_eq!(say(&mut early, Port::Upstream, aside), []);
-    assert_eq!(counted(early.stats()), ["received", "stale"]);
-    // A collection behind other relays is stale.
-    let mut other = relay.clone();
-    let later = Said::Gather(of(&relay, SECOND, 7, &[8]));
-    assert_eq!(say(&mut other, Port::Upstream, &later), []);
-    assert_eq!(counted(other.stats()), ["received", "stale"]);
-    let out = say(&mut relay, Port::Upstream, &Said::Gather(next.clone()));
-    let mut own = next;
-    own.seats.push((10, 20.0, 1.0));
-    assert_eq!(out, [(Port::Downstream, Said::Gather(own))]);
+    let mut bench = Bench::with(config, 10, settings);
+    let eight = [1, 2, 3, 4, 5, 6, 7, 8];
+    for (name, port, to) in [("Gather", UP, DOWN), ("Gathered", DOWN, UP)] {
+        let full = of(&bench, name, FIRST, 0, &eight);
+        assert_eq!(bench.hears(port, &full), [(to, full)]);
+    }
+    // Some relays have not been asked, so a sweep is too early; and a collection behind other relays is stale.
+    let aside = one_of_each(SECOND, bench.mission)[5].clone();
+    for said in [aside, of(&bench, "Gather", SECOND, 7, &[8])] {
+        let mut after = bench.clone();
+        assert_eq!(after.hears(UP, &said), []);
+        assert_eq!(after.counted(), ["received", "stale"], "{said:?}");
+    }
+    let next = of(&bench, "Gather", SECOND, 8, &[9]);
+    let own = and(&next, "Gather", 10, 20.0, 1.0);
+    assert_eq!(bench.hears(UP, &next), [(DOWN, own)]);
 }
 
-/// Checks that the number alone does not identify a collection.
+/// Checks that the number alone does not identify a collection, and a relay that missed earlier ones, as after a reboot.
 #[test]
-fn a_gathering_of_others_does_not_repeat_and_asks_for_a_new_view() {
-    let mut now = Instant::ZERO;
-    let mut relay = fourth(false);
-    let said = Said::Gather(of(&relay, FIRST, 0, &[2]));
-    hear(&mut relay, now, Port::Upstream, &said);
-    assert_eq!(sent(&mut relay, now).len(), 1);
-    let said = Said::Gather(of(&relay, FIRST, 0, &[3]));
-    hear(&mut relay, now, Port::Upstream, &said);
-    assert_eq!(counted(relay.stats()), ["received", "stale"]);
-    assert_asks_for_a_view(&mut relay, &mut now);
-}
-
-/// Checks a relay that missed the others' profiles, as after a reboot.
-#[test]
-fn a_sweep_of_places_chosen_asks_a_relay_for_a_new_view_that_was_told_nothing() {
-    let mut now = Instant::ZERO;
-    let mut relay = fourth(false);
-    let said = Said::Gather(of(&relay, FIRST, 0, &[2]));
-    hear(&mut relay, now, Port::Upstream, &said);
-    assert_eq!(sent(&mut relay, now).len(), 1);
-    let aside = &one_of_each(SECOND, digest(relay.mission()))[5];
-    hear(&mut relay, now, Port::Upstream, aside);
-    assert_eq!(counted(relay.stats()), ["received", "stale"]);
-    assert_asks_for_a_view(&mut relay, &mut now);
-}
-
-#[test]
-fn a_relay_that_missed_the_gatherings_before_asks_for_a_new_view() {
-    let mut now = Instant::ZERO;
-    let mut relay = fourth(false);
-    let said = Said::Gather(of(&relay, FIRST, 2, &[3]));
-    hear(&mut relay, now, Port::Upstream, &said);
-    assert_eq!(counted(relay.stats()), ["received", "stale"]);
-    assert_asks_for_a_view(&mut relay, &mut now);
-}
-
-/// Asserts that the relay soon requests a view, by the second flag of a hello.
-fn assert_asks_for_a_view(relay: &mut Relay, now: &mut Instant) {
-    let out = settle(relay, now);
-    let calls = |said: &Said| matches!(said, Said::Hello(hello) if hello.flags & 2 > 0);
-    assert!(out.iter().any(|(_, said)| calls(said)), "{out:?}");
+fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
+    let fresh = fourth(false);
+    let asked = |said: &Said| said.is("Hello") && said.has(FORMS);
+    let first = of(&fresh, "Gather", FIRST, 0, &[2]);
+    for (told, said) in [
+        (true, of(&fresh, "Gather", FIRST, 0, &[3])),
+        (true, one_of_each(SECOND, fresh.mission)[5].clone()),
+        (false, of(&fresh, "Gather", FIRST, 2, &[3])),
+    ] {
+        let mut bench = fresh.clone();
+        if told {
+            assert_eq!(bench.hears(UP, &first).len(), 1);
+        }
+        let mut out = bench.hears(UP, &said);
+        assert_eq!(bench.counted(), ["received", "stale"], "{said:?}");
+        out.extend(bench.settles());
+        assert!(out.iter().any(|(_, said)| asked(said)), "{out:?}");
+    }
 }
 
 /// Checks that earlier relays never report a relay's own profile or a later one.
 #[test]
-fn a_gathering_with_a_seat_of_its_receiver_is_stale() {
+fn a_collection_with_its_receivers_profile_is_stale() {
     for index in [4, 5] {
-        let mut relay = fourth(false);
-        let said = Said::Gather(of(&relay, FIRST, 0, &[index]));
-        hear(&mut relay, Instant::ZERO, Port::Upstream, &said);
-        assert_eq!(sent(&mut relay, Instant::ZERO), []);
-        assert_eq!(counted(relay.stats()), ["received", "stale"]);
+        let mut bench = fourth(false);
+        let said = of(&bench, "Gather", FIRST, 0, &[index]);
+        assert_eq!(bench.hears(UP, &said), []);
+        assert_eq!(bench.counted(), ["received", "stale"]);
     }
 }
 
 /// Checks invalid rosters: another pass, other relays, incomplete, beyond the chain, duplicates.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
-    let now = Instant::ZERO;
-    let mut relay = fourth(false);
-    let said = Said::Gather(of(&relay, FIRST, 0, &[2]));
-    hear(&mut relay, now, Port::Upstream, &said);
-    assert_eq!(sent(&mut relay, now).len(), 1);
-    for seats in [
-        of(&relay, SECOND, 0, &[2, 6]),
-        of(&relay, FIRST, 1, &[2, 6]),
-        of(&relay, FIRST, 0, &[6]),
-        of(&relay, FIRST, 0, &[]),
-        of(&relay, FIRST, 0, &[2, 9]),
+    let mut bench = fourth(false);
+    let gather = of(&bench, "Gather", FIRST, 0, &[2]);
+    assert_eq!(bench.hears(UP, &gather).len(), 1);
+    for (number, after, indices) in [
+        (SECOND, 0, &[2, 6][..]),
+        (FIRST, 1, &[2, 6]),
+        (FIRST, 0, &[6]),
+        (FIRST, 0, &[]),
+        (FIRST, 0, &[2, 9]),
     ] {
-        let mut after = relay.clone();
-        hear(
-            &mut after,
-            now,
-            Port::Downstream,
-            &Said::Gathered(seats.clone()),
-        );
-        assert_eq!(counted(after.stats()), ["received", "stale"], "{seats:?}");
-        assert_eq!(sent(&mut after, now), []);
-        assert_eq!(after.phase(), relay.phase());
+        let mut other = bench.clone();
+        let roster = of(&bench, "Gathered", number, after, indices);
+        assert_eq!(other.hears(DOWN, &roster), []);
+        assert_eq!(other.counted(), ["received", "stale"], "{roster:?}");
+        assert_eq!(other.phase(), bench.phase());
     }
-    let fits = Said::Gathered(of(&relay, FIRST, 0, &[2, 8]));
-    hear(&mut relay, now, Port::Downstream, &fits);
-    assert_eq!(sent(&mut relay, now), [(Port::Upstream, fits.clone())]);
-    hear(&mut relay, now, Port::Downstream, &fits);
-    assert_eq!(counted(relay.stats()), ["received", "stale"]);
-    assert_eq!(sent(&mut relay, now), []);
+    let fits = of(&bench, "Gathered", FIRST, 0, &[2, 8]);
+    assert_eq!(bench.hears(DOWN, &fits), [(UP, fits.clone())]);
+    assert_eq!(bench.hears(DOWN, &fits), []);
+    assert_eq!(bench.counted(), ["received", "stale"]);
 }

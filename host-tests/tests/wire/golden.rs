@@ -5,10 +5,12 @@ use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::{MAX_BODY, Message};
-use uav_relay_decode::vectors::{Frame, Vectors};
-use uav_relay_decode::{range, walk, write};
+use uav_relay_decode::envelope::{stuffed, unsigned};
+use uav_relay_decode::vectors::Vectors;
+use uav_relay_decode::{range, write};
 
-use super::codec::{self, FORMAT, Said};
+use super::meaning::message;
+use super::said::{FORMAT, Said};
 
 pub(crate) fn vectors() -> Vectors {
     let vectors = Vectors::load().unwrap();
@@ -16,18 +18,11 @@ pub(crate) fn vectors() -> Vectors {
     vectors
 }
 
-fn header(vector: &Frame) -> Header {
-    Header {
-        network: vector.header.network,
-        sender: vector.header.sender,
-        destination: vector.header.destination,
-        counter: vector.header.counter,
-    }
-}
-
-/// Returns the vector's message as the second codec decodes it.
-pub(crate) fn said(vector: &Frame) -> Said {
-    Said::read(&vector.body).unwrap()
+/// Encodes a body by the crate.
+pub(crate) fn written(message: &Message) -> Vec<u8> {
+    let mut body = [0; MAX_BODY];
+    let len = message.encode(&mut body).unwrap();
+    body[..len].to_vec()
 }
 
 pub(crate) fn only_frame(wire: &[u8]) -> Vec<u8> {
@@ -58,47 +53,34 @@ fn is_same(a: &Value, b: &Value) -> bool {
 }
 
 #[test]
-fn the_vectors_follow_from_the_rules() {
+fn both_codecs_write_and_read_the_vectors() {
     for vector in vectors().frames {
         let (name, body) = (&vector.name, &vector.body);
-        let written = write::write(&FORMAT, &vector.message, &vector.fields);
-        assert_eq!(written.as_ref(), Ok(body), "{name}");
-        let layout = FORMAT.message(body[0]).unwrap();
-        let (fields, error) = walk::walk(&layout.fields, &body[1..]);
-        assert_eq!(error, None, "{name}");
-        let shown = serde_json::to_value(&fields).unwrap();
+        let header = Header {
+            network: vector.header.network,
+            sender: vector.header.sender,
+            destination: vector.header.destination,
+            counter: vector.header.counter,
+        };
+        // The second codec.
+        let by_the_tables = write::write(&FORMAT, &vector.message, &vector.fields);
+        assert_eq!(by_the_tables.as_ref(), Ok(body), "{name}");
+        let said = Said::read(body).unwrap();
+        let shown = serde_json::to_value(said.fields()).unwrap();
         assert!(is_same(&shown, &vector.fields), "{name}: {shown}");
-        assert_eq!(said(&vector).body(), *body, "{name}");
-        assert_eq!(codec::plain(header(&vector), body), vector.plain, "{name}");
-        assert_eq!(codec::wire(&vector.plain), vector.wire, "{name}");
-    }
-}
-
-#[test]
-fn the_crate_writes_the_vectors() {
-    for vector in vectors().frames {
-        let name = &vector.name;
-        let message = said(&vector).message();
-        let mut body = [0; MAX_BODY];
-        let len = message.encode(&mut body).unwrap();
-        assert_eq!(body[..len], vector.body, "{name}");
+        assert_eq!(unsigned(header, body), vector.plain, "{name}");
+        assert_eq!(stuffed(&vector.plain), vector.wire, "{name}");
+        // The crate.
+        let message = message(&said);
+        assert_eq!(written(&message), *body, "{name}");
         let mut frame = [0xAA; MAX_FRAME];
-        let len = frame::encode(header(&vector), &message, &mut frame);
+        let len = frame::encode(header, &message, &mut frame);
         assert_eq!(frame[..len], vector.wire, "{name}");
         assert!(frame[len..].iter().all(|&byte| byte == 0xAA), "{name}");
-    }
-}
-
-#[test]
-fn the_crate_reads_the_vectors() {
-    for vector in vectors().frames {
-        let name = &vector.name;
-        let message = Message::decode(&vector.body).unwrap();
-        assert_eq!(message, said(&vector).message(), "{name}");
+        assert_eq!(Message::decode(body).as_ref(), Ok(&message), "{name}");
         let plain = only_frame(&vector.wire);
         assert_eq!(plain, vector.plain, "{name}");
-        let read = frame::decode(&plain);
-        assert_eq!(read, Ok((header(&vector), message)), "{name}");
+        assert_eq!(frame::decode(&plain), Ok((header, message)), "{name}");
     }
 }
 

@@ -1,26 +1,26 @@
-//! Messages of each kind, and a relay to receive them.
+//! Messages of each kind, and missions in which a relay receives them.
 
-use host_tests::fixtures::{NETWORK, paper};
-use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame;
-use uav_relay::wire::frame::{Header, MAX_FRAME};
-use uav_relay::{
-    Band, Duration, Field, FieldPoint, Instant, Interference, MissionConfig, Port, Relay, Wiring,
-};
+use host_tests::fixtures::paper;
+use serde_json::json;
+use uav_relay::{Band, Field, FieldPoint, Interference, MissionConfig, Port, Wiring};
 
-use super::codec::{
-    Fenced, Greeting, Handed, Heard, Judged, Said, Seats, Shifted, Swept, plain, wire,
-};
-use super::offer::{Offer, offer};
-use super::receive::{drain, relay_of};
-use super::stream::unstuffed;
-use super::votes::{granted, id, proposed};
+use super::bench::Bench;
+use super::offer::upload;
+use super::said::Said;
+use super::votes::{FLIES, a_hello, granted, id, proposed};
+
+const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
+    FieldPoint { x_m, upsilon_per_w }
+}
+
+/// Field in which a chain of eight is feasible.
+pub(crate) const FIELD: Field = Field::new(&[at(-100.0, 1e8), at(500.0, 3e7), at(900.0, 2e8)]);
 
 /// Field with almost no interference.
-pub(crate) const WEAK: Field = Field::new(&[FieldPoint {
-    x_m: 0.0,
-    upsilon_per_w: 1e32,
-}]);
+pub(crate) const WEAK: Field = Field::new(&[at(0.0, 1e32)]);
+
+/// Field of the strongest and the weakest interference.
+pub(crate) const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
 /// Numbers of the first two passes of a leader's life.
 pub(crate) const FIRST: u16 = 64;
@@ -47,208 +47,108 @@ pub(crate) fn source() -> MissionConfig {
     mission(paper(8).interference)
 }
 
-/// Encodes a frame to relay `own` from the side of `port`.
-pub(crate) fn framed(own: u16, port: Port, said: &Said) -> Vec<u8> {
-    let header = Header {
-        network: NETWORK,
-        sender: if port == Port::Upstream {
-            own - 1
-        } else {
-            own + 1
-        },
-        destination: own,
-        counter: 0,
-    };
-    wire(&plain(header, &said.body()))
-}
-
-/// Returns the ports and messages that `relay` sends at `now`, without claims.
-pub(crate) fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
-    let mut out = sent_with_claims(relay, now);
-    out.retain(|(_, said)| !matches!(said, Said::Claim { .. }));
-    out
-}
-
-/// Returns the ports and messages that `relay` sends at `now`.
-pub(crate) fn sent_with_claims(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
-    let mut out = Vec::new();
-    let mut buffer = [0; MAX_FRAME];
-    relay.persist(|_| true);
-    while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
-        let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
-        assert!(frame::decode(&plain).is_ok());
-        let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
-        out.push((transmit.port, said));
-    }
-    out
-}
-
-/// Advances time until `relay` is idle, at most a second. Returns the messages sent.
-pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> {
-    let mut out = sent(relay, *now);
-    for _ in 0..1000 {
-        *now = *now + Duration::from_millis(1);
-        relay.handle_timeout(*now);
-        out.extend(sent(relay, *now));
-    }
-    out
-}
-
-/// Returns a collection with the profile of relay `index`.
-pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
-    Seats {
-        number,
-        mission,
-        after: 0,
-        seats: vec![(index, 30.0, 0.5)],
-    }
-}
-
-/// Returns the echo of a claim to the receiver's number.
-const fn an_echo() -> Said {
-    Said::Claim {
-        number: 1,
-        heard: 0,
-        flags: 2,
-    }
-}
-
-/// Returns two relays' measurements of a source that all estimate alike.
-pub(crate) fn heard(number: u16, mission: u16) -> Heard {
-    let mut sums = [0.0; 18];
-    [sums[0], sums[14], sums[15], sums[16], sums[17]] = [2.0, 0.5, 2.0, 64.0, 3.0];
-    Heard {
-        number,
-        mission,
-        told: 1,
-        kind: 4,
-        source: [62.5, 600.0, -250.0, 1e-6],
-        sums,
-        receiver: [1e-6, 32.0],
-        off: 0,
-    }
-}
-
-/// Returns a message of each tag for the pass `number`.
+/// Returns a message of each tag, in their order, for the pass `number`; its digest is `mission`.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
-    let x_m = 400.0;
-    let altitude_m = 20.0;
-    let power_w = 1.0;
-    let view = id(u32::from(number).max(1), 1);
-    let sweep = Swept {
-        number,
-        mission,
-        anchor: 1.0,
-        gap: 0,
-        growth: 0,
-        altitude_m,
-        power_w,
-        reaches: vec![x_m],
+    let pass = json!({ "number": number, "view": mission });
+    let of = |name: &str, more: serde_json::Value| {
+        let mut fields = pass.clone();
+        let more = more.as_object().unwrap().clone();
+        fields.as_object_mut().unwrap().extend(more);
+        Said::new(name, &fields)
     };
+    let sweep = |name: &str, extra: &str, number: f64| {
+        let mut more = json!({
+            "anchor": 1.0, "gap": 0, "growth": 0, "altitude_m": 20.0, "power_w": 1.0, "reach_m": [400.0],
+        });
+        if !extra.is_empty() {
+            more[extra] = number.into();
+        }
+        of(name, more)
+    };
+    let gather = |name: &str, relay: u16| {
+        let seat = json!({ "relay": relay, "altitude_m": 30.0, "power_w": 0.5 });
+        of(name, json!({ "after": 0, "seats": [seat] }))
+    };
+    // Two relays' measurements of a source that all estimate alike.
+    let heard = json!({
+        "belief_number": 1, "belief": 4, "source_power_w": 62.5, "source_x_m": 600.0, "source_y_m": -250.0,
+        "source_at_rx_w": 1e-6, "sum_ab": [2, 0, 0, 0, 0, 0, 0, 0, 0, 0], "sum_av": [0, 0, 0, 0], "sum_vv": 0.5,
+        "places": 2, "measurements": 64, "age_s": 3, "rx_power_w": 1e-6, "rx_measurements": 32, "left_out": 0,
+    });
+    let token = json!({
+        "x_m": 400.0, "altitude_m": 20.0, "power_w": 1.0, "turn": 2, "explore_m": 10.0, "columns": 0, "rows": 0,
+        "sir": 1.0,
+    });
+    let moved = json!({ "x_m": 600.0, "altitude_m": 20.0, "moved": true, "worst_sir": 1.0 });
+    let verdict = json!({ "own": false, "commit": 0, "slack_m": [1.0], "stand_m": null });
+    let fence = json!({
+        "association": 1, "line": mission, "echo": 0, "fence": 1, "x_m": 400.0, "target_m": 400.0, "y_m": 1.0,
+        "altitude_m": 1.0, "apart_m": 1.0, "flags": 3,
+    });
+    let view = id(u32::from(number).max(1), 1);
     vec![
-        Said::Sweep(sweep.clone()),
-        Said::Verdict(Judged {
-            number,
-            mission,
-            own: false,
-            commit: Some(0),
-            slacks: vec![1.0],
-            stand: None,
-        }),
-        Said::Busy { number },
-        Said::Heartbeat {
-            mission,
-            ask: 0,
-            answer: 0,
-        },
-        Said::Measured {
-            sweep: sweep.clone(),
-            upsilon_per_w: 1e8,
-        },
-        Said::Aside { sweep, y_m: -12.5 },
-        Said::Gather(seats(number, mission, 3)),
-        Said::Gathered(seats(number, mission, 5)),
-        Said::Token(Handed {
-            number,
-            mission,
-            x_m,
-            altitude_m,
-            power_w,
-            turn: 2,
-            explore_m: 10.0,
-            columns: 0,
-            rows: 0,
-            sir: 1.0,
-        }),
-        Said::Moved(Shifted {
-            number,
-            mission,
-            x_m: 600.0,
-            altitude_m,
-            any: true,
-            worst: 1.0,
-        }),
-        Said::Hello(Greeting {
-            mission,
-            neighbour: 4,
-            behind: 1,
-            newest: view,
-            holds: (mission, 0),
-            nonce: 0,
-            hears: 1,
-            flags: 16,
-        }),
-        Said::Proposal(proposed(view, (mission, 0), 3, 8)),
+        sweep("Sweep", "", 0.0),
+        of("Verdict", verdict),
+        Said::new("Busy", &json!({ "number": number })),
+        beat(mission, 0, 0),
+        sweep("Measured", "upsilon_per_w", 1e8),
+        sweep("Aside", "y_m", -12.5),
+        gather("Gather", 3),
+        gather("Gathered", 5),
+        of("Token", token),
+        of("Moved", moved),
+        a_hello(view, mission, 4, FLIES).with(json!({ "hears": 1 })),
+        proposed(view, (mission, 0), 3, 8),
         granted(view, (mission, 0), 5, 8),
-        Said::Fence(Fenced {
-            number: 1,
-            mission,
-            echo: 0,
-            fence: 1,
-            places: [x_m, x_m, 1.0, 1.0, 1.0],
-            flags: 3,
-        }),
-        Said::Offer(Offer {
-            base: mission,
-            ..offer()
-        }),
-        Said::Pulse {
-            number,
-            mission,
-            lease: 150,
-        },
-        Said::Pulsed {
-            number,
-            mission,
-            done: true,
-        },
-        Said::Sense(heard(number, mission)),
-        Said::Sensed(heard(number, mission)),
-        Said::Level {
-            mission,
-            power_w: 1e-9,
-        },
-        an_echo(),
+        Said::new("Fence", &fence),
+        upload(2, mission),
+        of("Pulse", json!({ "lease_ds": 150 })),
+        of("Pulsed", json!({ "done": true })),
+        of("Sense", heard.clone()),
+        of("Sensed", heard),
+        level(mission),
+        // The echo of a claim to the receiver's number.
+        claim(1, 0, 2),
     ]
 }
 
+/// Returns a heartbeat.
+pub(crate) fn beat(mission: u16, ask: u16, answer: u16) -> Said {
+    let fields = json!({ "mission": mission, "ask": ask, "answer": answer });
+    Said::new("Heartbeat", &fields)
+}
+
+/// Returns an interference level, as the ground reports it.
+pub(crate) fn level(mission: u16) -> Said {
+    Said::new("Level", &json!({ "mission": mission, "power_w": 1e-9 }))
+}
+
+/// Returns a claim by a node that has received claim `other`.
+pub(crate) fn claim(number: u32, other: u32, flags: u8) -> Said {
+    let fields = json!({ "claim": number, "other_claim": other, "flags": flags });
+    Said::new("Claim", &fields)
+}
+
 /// Returns relay 4 of 8 and the ports from and to which passes go.
-pub(crate) fn relay_4(config: MissionConfig) -> (Relay, Port, Port) {
-    let relay = relay_of(config, 4, Wiring::Pair);
-    match config.interference {
-        Interference::Source(_) | Interference::Unknown => {
-            (relay, Port::Upstream, Port::Downstream)
-        }
-        Interference::Field(_) => (relay, Port::Downstream, Port::Upstream),
+pub(crate) fn relay_4(config: MissionConfig) -> (Bench, Port, Port) {
+    let bench = Bench::of(config, 4, Wiring::Pair);
+    let (from, to) = ways(config.interference);
+    (bench, from, to)
+}
+
+/// Returns the ports from and to which passes go.
+pub(crate) fn ways(interference: Interference) -> (Port, Port) {
+    match interference {
+        Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),
+        Interference::Field(_) => (Port::Downstream, Port::Upstream),
     }
 }
 
-/// Makes `relay` hold its position by pass `number`.
-pub(crate) fn placed(relay: &mut Relay, (from, to): (Port, Port), now: &mut Instant, number: u16) {
-    let kinds = one_of_each(number, digest(relay.mission()));
-    for (port, said) in [(from, &kinds[0]), (to, &kinds[1])] {
-        relay.handle_bytes(*now, port, &framed(4, port, said));
-        drain(relay, *now);
-    }
-    assert!(relay.setpoint().is_some());
+/// Makes the relay hold its position by pass `number`.
+pub(crate) fn place(bench: &mut Bench, (from, to): (Port, Port), number: u16) {
+    let kinds = one_of_each(number, bench.mission);
+    bench.hears(from, &kinds[0]);
+    bench.hears(to, &kinds[1]);
+    bench.events();
+    assert!(bench.setpoint().is_some());
 }

@@ -5,7 +5,8 @@ use uav_relay::optimiser::ladder::Ladder;
 use uav_relay_decode::range::targets;
 
 use super::config;
-use super::strategies::ladders;
+use super::said::Said;
+use super::strategies::kinds;
 
 fn bits(targets: &[f32]) -> Vec<u32> {
     targets.iter().map(|target| target.to_bits()).collect()
@@ -22,11 +23,19 @@ fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     targets[8..].to_vec()
 }
 
+/// Returns anchor, gap code and growth code of a sweep.
+fn ladder_of(sweep: &Said) -> (f32, u8, u8) {
+    let code = |name| sweep.number(name) as u8;
+    let anchor = sweep.number("anchor") as f32;
+    (anchor.abs(), code("gap"), code("growth"))
+}
+
 proptest! {
     #![proptest_config(config(20_000))]
 
     #[test]
-    fn targets_follow_the_rules_to_the_bit((anchor, gap, growth) in ladders()) {
+    fn targets_follow_the_rules_to_the_bit(sweep in kinds(&["Sweep"])) {
+        let (anchor, gap, growth) = ladder_of(&sweep);
         let ladder = Ladder::from_parts(anchor, gap, growth).unwrap();
         let by_the_rules = targets(anchor, gap, growth);
         prop_assert_eq!(bits(&ladder.targets()), bits(&by_the_rules));

@@ -2,76 +2,79 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::ladder::Ladder;
+use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::auth::TAG;
-use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
-use uav_relay::wire::message::{MAX_BODY, Message, MessageError};
+use uav_relay::wire::frame::{self, FrameError, Header, MAX_FRAME};
+use uav_relay::wire::message::{Message, MessageError, Sweep};
+use uav_relay_decode::envelope::{before, sealed, stuffed, unsigned};
 
-use super::codec::{self, FORMAT, Said, plain, sealed, wire};
 use super::config;
-use super::golden::only_frame;
-use super::offered::offers;
-use super::strategies::{asides, headers, measured, messages, sweeps};
-use super::stream_strategies::bodies;
-use super::view_strategies::heard;
-
-/// Encodes a message, because bytes distinguish -0 from 0.
-fn body_of(message: &Message) -> Vec<u8> {
-    let mut body = [0; MAX_BODY];
-    let len = message.encode(&mut body).unwrap();
-    body[..len].to_vec()
-}
+use super::golden::{only_frame, written};
+use super::meaning::message;
+use super::said::{FORMAT, Said};
+use super::strategies::{bodies, headers, kinds, messages};
 
 proptest! {
     #![proptest_config(config(4000))]
 
+    /// Checks both codecs, and the overhead of a frame: header, CRC, a byte of stuffing and the only delimiter.
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
-        let message = said.message();
+        let message = message(&said);
+        prop_assert_eq!(written(&message), said.body(), "bytes distinguish -0 from 0");
         let mut frame = [0; MAX_FRAME];
         let len = frame::encode(head, &message, &mut frame);
-        let written = plain(head, &said.body());
-        prop_assert_eq!(&frame[..len], wire(&written));
-        prop_assert_eq!(Said::read(&body_of(&message)).unwrap().body(), said.body());
-        let (head_read, message_read) = frame::decode(&written).unwrap();
-        prop_assert_eq!(head_read, head);
-        prop_assert_eq!(body_of(&message_read), said.body());
-        prop_assert_eq!(message_read, message);
-        let decoded = uav_relay_decode::frame::read(&FORMAT, &frame[..len], len);
-        prop_assert_eq!((decoded.refusal, decoded.header), (None, Some(head)));
-        let fields = Said::of(decoded.name.unwrap(), &decoded.fields);
-        prop_assert_eq!(fields.body(), said.body());
-    }
-
-    /// Checks the overhead: header, CRC, a byte of stuffing and the delimiter.
-    #[test]
-    fn every_frame_takes_16_bytes_more_than_its_body_with_one_zero(said in messages(), head in headers()) {
-        let mut frame = [0; MAX_FRAME];
-        let len = frame::encode(head, &said.message(), &mut frame);
         prop_assert_eq!(len, said.body().len() + 16);
         prop_assert!(len + TAG <= MAX_FRAME);
-        prop_assert_eq!(frame[..len].iter().position(|&byte| byte == 0), Some(len - 1));
-        prop_assert_eq!(only_frame(&frame[..len]).len(), len - 2);
-    }
-
-    #[test]
-    fn an_offer_fills_a_frame_but_for_its_tag_and_the_longest_others_do_not(
-        offer in offers(),
-        heard in heard(),
-        sweep in prop_oneof![measured(sweeps(16)), asides(sweeps(16))],
-        head in headers(),
-    ) {
-        let mut frame = [0; MAX_FRAME];
-        prop_assert_eq!(frame::encode(head, &offer.message(), &mut frame), MAX_FRAME - TAG);
-        prop_assert_eq!(frame::encode(head, &heard.message(), &mut frame), 122);
-        prop_assert_eq!(frame::encode(head, &sweep.message(), &mut frame), 104);
+        let frame = &frame[..len];
+        prop_assert_eq!(frame.iter().position(|&byte| byte == 0), Some(len - 1));
+        let plain = unsigned(head, said.body());
+        prop_assert_eq!(frame, stuffed(&plain));
+        prop_assert_eq!(only_frame(frame), plain.clone());
+        let (head_read, message_read) = frame::decode(&plain).unwrap();
+        prop_assert_eq!(head_read, head);
+        prop_assert_eq!(written(&message_read), said.body());
+        prop_assert_eq!(message_read, message);
+        let decoded = uav_relay_decode::frame::read(&FORMAT, frame, len);
+        prop_assert_eq!((decoded.refusal, decoded.header), (None, Some(head)));
+        prop_assert_eq!((decoded.name, decoded.fields), (Some(said.name()), said.fields()));
     }
 
     #[test]
     fn a_buffer_one_byte_short_is_refused(said in messages()) {
+        let message = message(&said);
         let mut body = vec![0; said.body().len()];
-        prop_assert_eq!(said.message().encode(&mut body), Some(body.len()));
+        prop_assert_eq!(message.encode(&mut body), Some(body.len()));
         body.pop();
-        prop_assert_eq!(said.message().encode(&mut body), None);
+        prop_assert_eq!(message.encode(&mut body), None);
+    }
+
+    /// Checks the longest messages: an offer fills a frame except for its tag.
+    #[test]
+    fn the_longest_messages_have_the_documented_lengths(
+        offer in kinds(&["Offer"]),
+        sense in kinds(&["Sense", "Sensed"]),
+        head in headers(),
+    ) {
+        let mut frame = [0; MAX_FRAME];
+        prop_assert_eq!(frame::encode(head, &message(&offer), &mut frame), MAX_FRAME - TAG);
+        prop_assert_eq!(frame::encode(head, &message(&sense), &mut frame), 122);
+    }
+}
+
+/// Checks one body: decoded as its fields mean, or refused for the reason that the tables give.
+fn is_judged_by_the_tables(body: &[u8]) {
+    let read = Message::decode(body);
+    match Said::read(body) {
+        Ok(said) => {
+            assert_eq!(read.as_ref().map(written), Ok(body.to_vec()));
+            assert_eq!(read, Ok(message(&said)));
+        }
+        Err(error) => assert_eq!(read, Err(error), "{body:02x?}"),
     }
 }
 
@@ -79,20 +82,19 @@ proptest! {
     #![proptest_config(config(8000))]
 
     #[test]
-    fn any_body_is_read_or_refused_as_the_rules_say(body in bodies()) {
-        let read = Message::decode(&body);
-        match Said::read(&body) {
-            Ok(said) => {
-                prop_assert_eq!(said.body(), &*body, "one encoding a message");
-                prop_assert_eq!(read.as_ref().map(body_of), Ok(body.clone()));
-                prop_assert_eq!(read, Ok(said.message()));
-            }
-            Err(error) => prop_assert_eq!(read, Err(error)),
-        }
+    fn any_body_is_judged_by_the_tables(
+        body in bodies(),
+        noise in vec(any::<u8>(), 0..300),
+    ) {
+        is_judged_by_the_tables(&body);
+        is_judged_by_the_tables(&noise);
+        // A valid CRC among random ones has probability 2^-32; these draws have none.
+        let expected = if noise.len() < 14 { FrameError::Short } else { FrameError::Crc };
+        prop_assert_eq!(frame::decode(&noise), Err(expected));
     }
 
     #[test]
-    fn any_bytes_with_a_good_crc_are_read_or_refused_as_the_rules_say(
+    fn any_bytes_with_a_good_crc_are_judged_by_the_tables(
         bytes in vec(any::<u8>(), 0..240),
         version in prop_oneof![3 => Just(Some(0x10)), 1 => Just(None)],
         flags in prop_oneof![3 => Just(Some(0)), 1 => Just(Some(0x10)), 1 => Just(None)],
@@ -120,46 +122,32 @@ proptest! {
                 Some(body) => Said::read(&bytes[10..10 + body]).map_err(FrameError::Message),
             }
         };
-        let sealed = sealed(bytes.clone());
-        let read = frame::decode(&sealed);
+        let read = frame::decode(&sealed(bytes.clone()));
         match expected {
             Err(error) => prop_assert_eq!(read, Err(error)),
             Ok(said) => {
-                let (head, message) = read.unwrap();
-                prop_assert_eq!(message, said.message());
+                let (head, read) = read.unwrap();
+                prop_assert_eq!(read, message(&said));
                 bytes[3] &= 0x0F;
-                prop_assert_eq!(codec::header(head), &bytes[..10]);
+                prop_assert_eq!(before(head, 0, &[]), &bytes[..10]);
             }
         }
-    }
-
-    #[test]
-    fn any_bytes_at_all_are_refused(bytes in vec(any::<u8>(), 0..300)) {
-        // A valid CRC among random ones has probability 2^-32; these draws have none.
-        let expected = if bytes.len() < 14 { FrameError::Short } else { FrameError::Crc };
-        prop_assert_eq!(frame::decode(&bytes), Err(expected));
-        let said = Said::read(&bytes);
-        let read = said.as_ref().map(Said::message).map_err(|error| *error);
-        prop_assert_eq!(Message::decode(&bytes), read);
     }
 }
 
 #[test]
 fn the_draws_reach_messages_and_both_refusals() {
-    use proptest::strategy::ValueTree;
-    use proptest::test_runner::TestRunner;
-
     /// First tag without a message, for it and all later ones.
-    const NONE: usize = 20;
+    const NONE: usize = 21;
 
     let mut runner = TestRunner::new(config(1));
     // Counts for each tag: valid, wrongly encoded, out of range.
-    let mut seen = [[0; 3]; 21];
+    let mut seen = [[0; 3]; NONE + 1];
     for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();
         let tag = body.first().map_or(NONE, |&tag| usize::from(tag).min(NONE));
-        let what = match Said::read(&body) {
-            Ok(_) => 0,
+        let what = match Said::verdict(&body) {
+            Ok(()) => 0,
             Err(MessageError::Encoding) => 1,
             Err(_) => 2,
         };
@@ -170,5 +158,51 @@ fn the_draws_reach_messages_and_both_refusals() {
         assert!(encoding > 50, "{tag}");
         assert!(good > 50 || tag == NONE, "{tag}");
         assert!(value > 5 || [2, 3, 15, 16, NONE].contains(&tag), "{tag}");
+    }
+}
+
+#[test]
+fn node_numbers_that_do_not_fit_are_not_written() {
+    let message = Message::Busy { sweep: 1 };
+    for (number, fits) in [(4094, true), (4095, false), (4096, false), (65535, false)] {
+        for [sender, destination] in [[number, 2], [1, number]] {
+            let header = Header {
+                network: 7,
+                sender,
+                destination,
+                counter: 3,
+            };
+            let len = frame::encode(header, &message, &mut [0; MAX_FRAME]);
+            assert_eq!(len, if fits { 19 } else { 0 }, "{number}");
+        }
+    }
+}
+
+/// Checks that a chosen position on the line differs from a given one, and excludes measured values.
+#[test]
+fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
+    let sweep = |chosen, measured_per_w| Sweep {
+        number: 1,
+        mission: 2,
+        ladder: Ladder::single(1.5),
+        relay: Station {
+            at: CrossSection::on_line(20.0),
+            power_w: 1.0,
+        },
+        chosen,
+        measured_per_w,
+        reaches: PerTarget::new(),
+    };
+    for (chosen, measured, tag) in [
+        (false, None, 0),
+        (false, Some(1e9), 4),
+        (true, None, 5),
+        (true, Some(1e9), 5),
+    ] {
+        let body = written(&Message::Sweep(sweep(chosen, measured)));
+        assert_eq!(body[0], tag);
+        let measured = measured.filter(|_| !chosen);
+        let read = Message::decode(&body).unwrap();
+        assert_eq!(read, Message::Sweep(sweep(chosen, measured)));
     }
 }

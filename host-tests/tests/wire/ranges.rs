@@ -1,13 +1,17 @@
 //! Room for the relays of an offer, and the encoding of an operator's upload.
 
 use host_tests::fixtures::paper;
+use serde_json::json;
 use uav_relay::channel::AirGround;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::message::{Message, MessageError};
 use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile, Upload};
 
-use super::codec::Said;
-use super::offer::{BYTES, KEPT, Offer, offer};
+use uav_relay_decode::write;
+
+use super::meaning;
+use super::offer::{BYTES, KEPT, kept, mission_id, upload};
+use super::said::{FORMAT, Said};
 
 /// Returns true if a body is accepted; otherwise it must be out of range.
 fn taken(body: &[u8]) -> bool {
@@ -26,22 +30,21 @@ fn taken(body: &[u8]) -> bool {
 
 /// Checks separations from slightly below to slightly above the limit, in f32 steps.
 #[test]
-fn relays_are_offered_no_longer_a_chain_than_there_is_room_for() {
+fn an_offer_needs_room_for_its_relays() {
     let mut seen = [0; 2];
-    for relays in [2, 3, 8, 9, 100, 333, 1000] {
+    for relays in [2_u16, 3, 8, 9, 100, 333, 1000] {
         for distance_m in [1.0_f32, 35.7, 1000.0, 99_999.0] {
             let steps = f32::from(relays - 1);
             let widest = distance_m / steps - distance_m / 2_097_152.0;
             let mut min_separation_m = (0..40).fold(widest, |at, _| at.next_down());
             for _ in 0..80 {
-                let offer = Offer {
-                    relays,
-                    distance_m,
-                    min_separation_m,
-                    ..offer()
-                };
-                let fits = taken(&offer.body());
-                assert_eq!(fits, Said::read(&offer.body()).is_ok(), "{offer:?}");
+                let mut fields = json!(upload(2, 0x5A3C).fields());
+                fields["relays"] = relays.into();
+                fields["distance_m"] = distance_m.into();
+                fields["min_separation_m"] = min_separation_m.into();
+                let body = write::write(&FORMAT, "Offer", &fields).unwrap();
+                let fits = taken(&body);
+                assert_eq!(fits, Said::verdict(&body).is_ok(), "{fields}");
                 seen[usize::from(fits)] += 1;
                 min_separation_m = min_separation_m.next_up();
             }
@@ -82,7 +85,7 @@ fn other(channel: Channel) -> MissionConfig {
 }
 
 #[test]
-fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
+fn an_upload_is_encoded_and_decoded_with_every_number() {
     let base = Mission::try_new(paper(8)).unwrap();
     // With equal losses the weighted sum may be rounded, and is encoded between them.
     let equal = (0..=100).map(|step| (1.5, AirGround::Weighted(f64::from(step) / 100.0)));
@@ -102,46 +105,30 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
             given.channel.eta().clamp(low, high).to_bits()
         );
         assert_eq!(config, MissionConfig { channel, ..given });
-        let offer = Offer {
-            version: 7,
-            base: digest(&base),
-            relays: 8,
-            distance_m: 1100.0,
-            min_separation_m: 5.0,
-            tx_power_w: 70.0,
-            altitude_m: 30.0,
-            power_w: 2.0,
-            interferer_w: 60.0,
-            x_m: 700.0,
-            y_m: -300.0,
-            tolerance: 2e-4,
-            mu_los: channel.mu_los(),
-            mu_nlos: channel.mu_nlos(),
-            eta: channel.eta(),
-            least_m: 25.0,
-            most_m: 250.0,
-            left_m: -35.0,
-            right_m: 45.0,
-            noise_w: 1e-12,
-            sites: [0; 6],
-            answer: 77,
-        };
+        let offer = crate::offer::upload(7, digest(&base)).with(json!({
+            "distance_m": 1100.0, "min_separation_m": 5.0, "tx_power_w": 70.0, "altitude_m": 30.0, "power_w": 2.0,
+            "interferer_power_w": 60.0, "interferer_x_m": 700.0, "interferer_y_m": -300.0, "tolerance": 2e-4,
+            "mu_los": channel.mu_los(), "mu_nlos": channel.mu_nlos(), "eta": channel.eta(),
+            "altitude_min_m": 25.0, "altitude_max_m": 250.0, "lateral_min_m": -35.0, "lateral_max_m": 45.0,
+            "noise_w": 1e-12, "answer": 77,
+        }));
         let mut bytes = [0; KEPT];
         assert_eq!(upload.encode(&mut bytes), Some(KEPT));
-        assert_eq!(bytes[..], offer.kept());
+        assert_eq!(bytes[..], kept(&offer));
         assert_eq!(Upload::decode(&bytes), Some(upload));
         let answer = 77;
-        assert_eq!(offer.message(), Message::Offer { upload, answer });
+        assert_eq!(meaning::message(&offer), Message::Offer { upload, answer });
         let mission = Mission::try_new(config).unwrap();
-        assert_eq!(digest(&mission), offer.digest());
+        assert_eq!(digest(&mission), mission_id(&offer).0);
     }
 }
 
 #[test]
-fn what_is_kept_of_an_upload_is_an_offer_and_nothing_else() {
-    let body = offer().kept();
+fn only_the_stored_part_of_an_offer_is_an_upload() {
+    let offer = upload(2, 0x5A3C);
+    let body = kept(&offer);
     assert!(Upload::decode(&body).is_some());
-    assert_eq!(Upload::decode(&offer().body()), None, "as it is sent");
+    assert_eq!(Upload::decode(offer.body()), None, "as it is sent");
     for len in 0..KEPT {
         assert_eq!(Upload::decode(&body[..len]), None, "{len}");
     }

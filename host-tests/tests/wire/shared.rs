@@ -1,116 +1,92 @@
 //! Shared channel: reception range, and how two relays become neighbours.
 
-use uav_relay::wire::digest::digest;
-use uav_relay::{Duration, Instant, Port, Relay, Wiring};
+use uav_relay::{Port, Wiring};
 
-use super::codec::Said;
-use super::kinds::{FIRST, one_of_each, sent};
-use super::receive::{counted, relay};
-use super::votes::{ASKS, FORMS, FRESH, a_hello, between, hearing, id, long, soon};
+use super::bench::Bench;
+use super::kinds::{FIRST, one_of_each};
+use super::said::Said;
+use super::votes::{ASKS, FORMS, FRESH, a_hello, id, near};
+
+const AIR: Port = Port::Shared;
+
+/// Returns relay 6 of 12, and a sweep for it.
+fn sixth() -> (Bench, Said) {
+    let bench = Bench::new(6, 12, Wiring::Shared);
+    let sweep = one_of_each(FIRST, bench.mission)[0].clone();
+    (bench, sweep)
+}
+
+/// Returns the hello of a node that hears the nearest, has chosen `neighbour` and asks for nothing.
+fn chose(bench: &Bench, neighbour: u16) -> Said {
+    near(1, 1, &a_hello(0, bench.mission, neighbour, 0))
+}
 
 /// Checks hellos from up to four nodes away; other frames of strangers count as misaddressed.
 #[test]
 fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
-    let now = Instant::ZERO;
     for sender in 0..=14_u16 {
-        let mut near = relay_of_12(6);
-        let mission = digest(near.mission());
-        let hello = a_hello(0, mission, 0, ASKS);
-        near.handle_bytes(now, Port::Shared, &between(sender, 6, &hello));
+        let (bench, sweep) = sixth();
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
         let neighbour = if sender <= 6 { 5 } else { 7 };
-        // The relay receives the sender's frames, unless it is too far away.
+        // The relay receives the sender's frames, unless it is too far away. It is fresh, so it is alone.
         let mask = if heard {
             1 << (sender.abs_diff(6) - 1)
         } else {
             0
         };
-        // The relay is fresh, so it is alone.
-        let answer = |from| long(1, hearing(mask, a_hello(0, mission, from, FRESH)));
-        if heard {
-            assert_eq!(counted(near.stats()), ["received"], "{sender}");
-        } else {
-            assert_eq!(counted(near.stats()), ["misaddressed"], "{sender}");
-        }
-        let out = sent(&mut near, now);
-        let own = if sender == neighbour {
+        let answer = near(mask, 1, &a_hello(0, bench.mission, neighbour, FRESH));
+        let expected = Vec::from_iter(heard.then_some((AIR, answer)));
+        let mut after = bench.clone();
+        let out = after.hears_from(sender, AIR, &a_hello(0, bench.mission, 0, ASKS));
+        let counter = if heard { "received" } else { "misaddressed" };
+        assert_eq!(after.counted(), [counter], "{sender}");
+        if sender == neighbour {
             // The node reports no neighbour: the relay waits for its choice.
             assert_eq!(out.len(), 1);
             continue;
-        } else {
-            answer(neighbour)
-        };
-        let expected = heard.then_some((Port::Shared, own));
-        assert_eq!(out, expected.into_iter().collect::<Vec<_>>(), "{sender}");
-
-        let mut near = relay_of_12(6);
-        let sweep = &one_of_each(FIRST, mission)[0];
-        near.handle_bytes(now, Port::Shared, &between(sender, 6, sweep));
-        assert_eq!(counted(near.stats()), ["misaddressed"], "{sender}");
-        let expected = heard.then_some((Port::Shared, answer(neighbour)));
-        assert_eq!(
-            sent(&mut near, now),
-            expected.into_iter().collect::<Vec<_>>(),
-            "{sender}"
-        );
-        assert_eq!(near.setpoint(), None);
+        }
+        assert_eq!(out, expected, "{sender}");
+        let mut after = bench.clone();
+        let out = after.hears_from(sender, AIR, &sweep);
+        assert_eq!(after.counted(), ["misaddressed"], "{sender}");
+        assert_eq!(out, expected, "{sender}");
+        assert_eq!(after.setpoint(), None);
     }
-}
-
-fn relay_of_12(own: u16) -> Relay {
-    relay(own, 12, Wiring::Shared)
 }
 
 /// Checks a neighbour that reports no neighbour: messages wait until it chooses this relay again.
 #[test]
-fn a_neighbour_that_comes_back_with_a_newer_view_has_the_relay_call() {
-    let now = Instant::ZERO;
+fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
     for (newest, calls) in [(0, false), (id(5, 1), true)] {
-        let mut relay = relay_of_12(6);
-        let mission = digest(relay.mission());
-        let hello = |neighbour| hearing(1, a_hello(newest, mission, neighbour, 0));
-        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(0)));
-        assert!(soon(&mut relay, now).is_empty(), "{newest}");
-        let now = now + Duration::from_millis(1);
-        relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
+        let (mut bench, _) = sixth();
+        let mission = bench.mission;
+        let hello = |neighbour| near(1, 1, &a_hello(newest, mission, neighbour, 0));
+        assert_eq!(bench.hears(AIR, &hello(0)), [], "{newest}");
+        assert_eq!(bench.ticks(), [], "{newest}");
+        let mut out = bench.hears(AIR, &hello(6));
+        out.extend(bench.ticks());
         // The node now has a neighbour on its other side; node 5 has reported none, so this relay separates no link.
-        let flags = ASKS | FORMS | FRESH;
-        let call = long(1, a_hello(newest, mission, 5, flags));
-        let expected = calls.then_some((Port::Shared, call));
-        assert_eq!(
-            soon(&mut relay, now),
-            expected.into_iter().collect::<Vec<_>>()
-        );
+        let call = a_hello(newest, mission, 5, ASKS | FORMS | FRESH);
+        assert_eq!(out, Vec::from_iter(calls.then_some((AIR, call))));
     }
 }
 
 /// Checks that a pending pass is held while the neighbour has chosen another node. The pass is repeated afterwards.
 #[test]
 fn a_pass_waits_for_a_neighbour_that_takes_another() {
-    let now = Instant::ZERO;
-    let mut relay = relay_of_12(6);
-    let mission = digest(relay.mission());
-    let hello = |neighbour| hearing(1, a_hello(0, mission, neighbour, 0));
-    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(5)));
-    let sweep = &one_of_each(FIRST, mission)[0];
-    relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
-    assert_eq!(counted(relay.stats()), ["received"]);
-    assert_eq!(sent(&mut relay, now), []);
-    relay.handle_bytes(now, Port::Shared, &between(7, 6, &hello(6)));
-    let out = sent(&mut relay, now);
-    assert!(
-        matches!(
-            &out[..],
-            [(Port::Shared, Said::Sweep(sweep))] if sweep.number == FIRST
-        ),
-        "{out:?}"
-    );
+    let (mut bench, sweep) = sixth();
+    bench.hears(AIR, &chose(&bench.clone(), 5));
+    assert_eq!(bench.hears_from(5, AIR, &sweep), []);
+    assert_eq!(bench.counted(), ["received"]);
+    let out = bench.hears(AIR, &chose(&bench.clone(), 6));
+    assert_eq!(out.len(), 1);
+    assert!(out[0].0 == AIR && out[0].1.is("Sweep"), "{out:?}");
+    assert_eq!(out[0].1.number("number"), f64::from(FIRST));
 }
 
 /// Checks that a one-way link is ignored, and that losses do not break an established one.
 #[test]
-fn a_neighbour_that_does_not_hear_the_relay_is_not_linked_but_stays_so() {
-    let now = Instant::ZERO;
+fn a_one_way_link_is_ignored_unless_it_was_established() {
     for (linked, hears, waits) in [
         (false, 0, true),
         (false, 0b1110, true),
@@ -121,21 +97,15 @@ fn a_neighbour_that_does_not_hear_the_relay_is_not_linked_but_stays_so() {
         (true, 1, false),
         (true, 0b1111, false),
     ] {
-        let mut relay = relay_of_12(6);
-        let mission = digest(relay.mission());
-        let says = |neighbour, hears| {
-            let hello = hearing(hears, a_hello(0, mission, neighbour, 0));
-            between(7, 6, &hello)
-        };
+        let (mut bench, sweep) = sixth();
         if !linked {
-            relay.handle_bytes(now, Port::Shared, &says(5, 1));
+            bench.hears(AIR, &chose(&bench.clone(), 5));
         }
-        relay.handle_bytes(now, Port::Shared, &says(6, hears));
-        let sweep = &one_of_each(FIRST, mission)[0];
-        relay.handle_bytes(now, Port::Shared, &between(5, 6, sweep));
-        assert_eq!(counted(relay.stats()), ["received"]);
-        let out = sent(&mut relay, now);
-        let waiting = !out.iter().any(|(_, said)| matches!(said, Said::Sweep(_)));
+        let hello = near(hears, 1, &chose(&bench, 6));
+        let mut out = bench.hears(AIR, &hello);
+        out.extend(bench.hears_from(5, AIR, &sweep));
+        assert_eq!(bench.counted(), ["received"]);
+        let waiting = !out.iter().any(|(_, said)| said.is("Sweep"));
         assert_eq!(waiting, waits, "{linked}, {hears:b}: {out:?}");
     }
 }

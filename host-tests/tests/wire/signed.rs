@@ -1,76 +1,205 @@
-//! Peer with the key, by the rules of `FORMAT.md`: a neighbour or a ground station.
+//! Peers with the key, by the rules of `FORMAT.md`: neighbours or ground stations, and a relay that has met them.
+
+use std::ops::{Deref, DerefMut};
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
 use blake2::digest::{FixedOutput, Mac};
-use host_tests::fixtures::{NETWORK, paper};
+use host_tests::fixtures::{self, NETWORK, paper};
+use serde_json::json;
 use uav_relay::MAX_FRAME;
 use uav_relay::wire::auth::{Auth, Key, TAG};
 use uav_relay::wire::digest::digest;
-use uav_relay::{Duration, Identity, Instant, Mission, Port, Relay, Settings, Wiring};
-
-use super::codec::{Greeting, Said, header, sealed, wire};
-use super::stream::unstuffed;
-use super::votes::{ASKS, unnumbered};
 use uav_relay::wire::frame::Header;
+use uav_relay::{Duration, Event, Instant, Mission, Port, Relay, Settings, Upload, Wiring};
+use uav_relay_decode::envelope::{before, sealed, stuffed};
+
+use super::bench::{counted, events};
+use super::said::{Said, plain_of};
+use super::votes::{ASKS, hello};
+
+pub(crate) const NOW: Instant = Instant::ZERO;
 
 const KEY: [u8; 32] = *b"whoever reads this is not secret";
 
-/// Flags in byte 3: a tag follows, and the body is a handshake.
-const SIGNED: u8 = 0x10;
-const HELLO: u8 = 0x20;
+/// Flags of a frame: a tag follows, and the body is a handshake.
+const SIGNED: u16 = 1;
+const HELLO: u16 = 2;
 
-/// Returns relay `index` of eight in the paper's scenario, with the key.
-pub(crate) fn with_key(index: u16, wiring: Wiring) -> Relay {
-    let mission = Mission::try_new(paper(8)).unwrap();
-    let (identity, settings) = set(index, wiring);
-    Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
-}
-
-/// Returns the identity and settings of relay `index` with the key.
-pub(crate) fn set(index: u16, wiring: Wiring) -> (Identity, Settings) {
-    let identity = Identity {
-        network: NETWORK,
-        index,
-    };
-    let settings = Settings {
+/// Returns settings with the key.
+pub(crate) fn settings(wiring: Wiring) -> Settings {
+    Settings {
         wiring,
         auth: Some(Auth {
             key: Key::new(KEY),
             epoch: 9,
         }),
         ..Settings::default()
-    };
-    (identity, settings)
+    }
+}
+
+/// A relay with the key, and peers that it has met.
+#[derive(Clone, Debug)]
+pub(crate) struct Met {
+    pub(crate) relay: Relay,
+    peers: Vec<Peer>,
+    /// Digest of its mission as loaded.
+    pub(crate) base: u16,
+}
+
+impl Deref for Met {
+    type Target = Relay;
+
+    fn deref(&self) -> &Relay {
+        &self.relay
+    }
+}
+
+impl DerefMut for Met {
+    fn deref_mut(&mut self) -> &mut Relay {
+        &mut self.relay
+    }
+}
+
+impl Met {
+    /// Creates relay `own` of `mission`; it has met the nodes of `peers`, each at its port, and is idle.
+    pub(crate) fn new(
+        mission: Mission,
+        own: u16,
+        settings: Settings,
+        peers: &[(u16, Port)],
+    ) -> Self {
+        let mut met = Self {
+            relay: fixtures::relay(mission, own, settings),
+            peers: Vec::new(),
+            base: digest(&mission),
+        };
+        for &(node, port) in peers {
+            let peer = Peer::meets(&mut met.relay, own, node, port);
+            met.peers.push(peer);
+        }
+        met.sends(NOW);
+        met.events();
+        met
+    }
+
+    /// Creates relay 4 of eight in the paper's scenario, which has met both neighbours.
+    pub(crate) fn fourth() -> Self {
+        Self::fourth_with(settings(Wiring::Pair))
+    }
+
+    pub(crate) fn fourth_with(settings: Settings) -> Self {
+        let mission = Mission::try_new(paper(8)).unwrap();
+        let peers = [(3, Port::Upstream), (5, Port::Downstream)];
+        Self::new(mission, 4, settings, &peers)
+    }
+
+    /// Delivers a message of a peer; an offer answers the relay's current hello. Returns what the relay then sends.
+    pub(crate) fn hears(&mut self, peer: usize, said: &Said) -> Vec<(u16, Said)> {
+        if said.is("Offer") {
+            let answer = self.number(peer, NOW);
+            return self.hears_as_it_is(peer, NOW, &said.with(json!({ "answer": answer })));
+        }
+        self.hears_as_it_is(peer, NOW, said)
+    }
+
+    /// Delivers a message unchanged; returns what the relay then sends.
+    pub(crate) fn hears_as_it_is(
+        &mut self,
+        peer: usize,
+        now: Instant,
+        said: &Said,
+    ) -> Vec<(u16, Said)> {
+        self.deliver(peer, now, said);
+        self.sends(now)
+    }
+
+    fn deliver(&mut self, peer: usize, now: Instant, said: &Said) {
+        let peer = &mut self.peers[peer];
+        let frame = peer.frame(SIGNED, said.body());
+        self.relay.handle_bytes(now, peer.port, &frame);
+    }
+
+    /// Returns the number of the hello with which the relay would answer a request of a peer.
+    pub(crate) fn number(&self, peer: usize, now: Instant) -> u16 {
+        let mut asked = self.clone();
+        let node = asked.peers[peer].node;
+        let asks = hello(asked.base, 0, (asked.base, 0), ASKS);
+        asked.deliver(peer, now, &asks);
+        let later = now + Duration::from_millis(1);
+        let out = [now, later].map(|at| {
+            asked.relay.handle_timeout(at);
+            frames(&mut asked.relay, at)
+        });
+        let hello = out.into_iter().flatten().find_map(|(to, flags, body)| {
+            let said = Said::read(&body).ok()?;
+            ((to, flags) == (node, SIGNED) && said.is("Hello")).then_some(said)
+        });
+        hello.unwrap().number("offer_number") as u16
+    }
+
+    /// Returns the messages that the relay sends at `now`, without handshakes and hello numbers.
+    pub(crate) fn sends(&mut self, now: Instant) -> Vec<(u16, Said)> {
+        let unnumbered = |said: Said| {
+            if !said.is("Hello") {
+                return said;
+            }
+            assert_ne!(said.number("offer_number"), 0.0);
+            said.with(json!({ "offer_number": 0 }))
+        };
+        frames(&mut self.relay, now)
+            .into_iter()
+            .filter(|(_, flags, _)| *flags == SIGNED)
+            .map(|(to, _, body)| (to, unnumbered(Said::read(&body).unwrap())))
+            .collect()
+    }
+
+    /// Returns the messages that the relay sends a millisecond after `now`.
+    pub(crate) fn sends_after(&mut self, now: Instant) -> Vec<(u16, Said)> {
+        let later = now + Duration::from_millis(1);
+        self.relay.handle_timeout(later);
+        self.sends(later)
+    }
+
+    pub(crate) fn events(&mut self) -> Vec<Event> {
+        events(&mut self.relay)
+    }
+
+    pub(crate) fn counted(&self) -> Vec<&'static str> {
+        counted(self.relay.stats())
+    }
+
+    /// Returns digest and version of the uploaded mission that the relay holds.
+    pub(crate) fn held(&self) -> Option<(u16, u16)> {
+        let mission_id = self.relay.upload().map(Upload::id)?;
+        Some((mission_id.digest, mission_id.version))
+    }
 }
 
 /// Peer node with its session.
 #[derive(Clone, Debug)]
-pub(crate) struct Peer {
+struct Peer {
     node: u16,
     relay: u16,
     port: Port,
     /// Nonces of the peer and the relay.
     nonces: [u64; 2],
     counter: u32,
-    /// Digest of the mission loaded at the relay.
-    base: u16,
 }
 
 impl Peer {
     /// Creates a peer `node` and authenticates it with `relay`.
-    pub(crate) fn meets(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
+    fn meets(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
         let mut peer = Self {
             node,
             relay: own,
             port,
             nonces: [5 << 32 | 1, 0],
             counter: 0,
-            base: digest(relay.mission()),
         };
         // The peer asks, is answered, and confirms the answer.
         peer.handshake(relay, true);
-        let answer = frames(relay, Instant::ZERO)
+        let answer = frames(relay, NOW)
             .into_iter()
             .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HELLO));
         let (_, _, body) = answer.unwrap();
@@ -82,100 +211,41 @@ impl Peer {
     }
 
     fn handshake(&mut self, relay: &mut Relay, asks: bool) {
-        let mut body: Vec<u8> = self
-            .nonces
-            .iter()
-            .copied()
-            .flat_map(u64::to_le_bytes)
-            .collect();
+        let mut body = self.nonces.map(u64::to_le_bytes).concat();
         body.push(u8::from(asks));
         let frame = self.frame(SIGNED | HELLO, &body);
-        relay.handle_bytes(Instant::ZERO, self.port, &frame);
+        relay.handle_bytes(NOW, self.port, &frame);
     }
 
-    fn frame(&mut self, flags: u8, body: &[u8]) -> Vec<u8> {
-        let mut bytes = header(Header {
+    fn frame(&mut self, flags: u16, body: &[u8]) -> Vec<u8> {
+        let header = Header {
             network: NETWORK,
             sender: self.node,
             destination: self.relay,
             counter: self.counter,
-        });
+        };
         self.counter += 1;
-        bytes[3] |= flags;
-        bytes.extend(body);
+        let mut bytes = before(header, flags, body);
         let mut mac = Blake2sMac::<U8>::new_from_slice(&KEY).unwrap();
         for nonce in self.nonces {
             mac.update(&nonce.to_le_bytes());
         }
         mac.update(&bytes);
         bytes.extend(mac.finalize_fixed());
-        wire(&sealed(bytes))
-    }
-
-    /// Sends a message to the relay; an offer answers the relay's current hello.
-    pub(crate) fn says(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
-        let mut said = said.clone();
-        if let Said::Offer(offer) = &mut said {
-            offer.answer = self.clone().number(relay.clone(), now);
-        }
-        self.says_as_it_is(relay, now, &said);
-    }
-
-    /// Returns the number of the hello with which `relay` answers a request.
-    pub(crate) fn number(&mut self, mut relay: Relay, now: Instant) -> u16 {
-        let mission = self.base;
-        let asks = Said::Hello(Greeting {
-            mission,
-            neighbour: 0,
-            behind: 1,
-            newest: 0,
-            holds: (mission, 0),
-            nonce: 0,
-            hears: 0,
-            flags: ASKS,
-        });
-        self.says_as_it_is(&mut relay, now, &asks);
-        let later = now + Duration::from_millis(1);
-        let out = [now, later].map(|at| {
-            relay.handle_timeout(at);
-            frames(&mut relay, at)
-        });
-        let hello =
-            out.into_iter()
-                .flatten()
-                .find_map(|(to, flags, body)| match Said::read(&body) {
-                    Ok(Said::Hello(hello)) if (to, flags) == (self.node, SIGNED) => Some(hello),
-                    _ => None,
-                });
-        hello.unwrap().nonce
-    }
-
-    /// Sends a message unchanged.
-    pub(crate) fn says_as_it_is(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
-        let frame = self.frame(SIGNED, &said.body());
-        relay.handle_bytes(now, self.port, &frame);
+        stuffed(&sealed(bytes))
     }
 }
 
 /// Returns destination, flags and body of all frames that `relay` sends at `now`.
-fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u8, Vec<u8>)> {
+fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u16, Vec<u8>)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];
     relay.persist(|_| true);
     while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
-        let plain = unstuffed(&buffer[..transmit.len - 1]).unwrap();
-        let to = u16::from_le_bytes([plain[2], plain[3]]) & 0x0FFF;
+        let plain = plain_of(&buffer[..transmit.len]);
+        let second = u16::from_le_bytes([plain[2], plain[3]]);
         let body = plain[10..plain.len() - 4 - TAG].to_vec();
-        out.push((to, plain[3] & 0xF0, body));
+        out.push((second & 0x0FFF, second >> 12, body));
     }
     out
-}
-
-/// Returns the messages that `relay` sends at `now`, without handshakes and hello numbers.
-pub(crate) fn said(relay: &mut Relay, now: Instant) -> Vec<(u16, Said)> {
-    frames(relay, now)
-        .into_iter()
-        .filter(|(_, flags, _)| *flags == SIGNED)
-        .map(|(to, _, body)| (to, unnumbered(Said::read(&body).unwrap())))
-        .collect()
 }

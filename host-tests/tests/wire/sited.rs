@@ -1,23 +1,23 @@
 //! Uploads with sites: refusals, the sites in use, and separation of positions along different lines.
 
 use host_tests::fixtures::paper;
-use uav_relay::UploadError;
-use uav_relay::wire::digest::digest;
+use serde_json::json;
 use uav_relay::{
-    Duration, Event, Geodetic, Instant, LineError, Mission, Placement, Port, Relay, Settings,
-    Sites, Upload, Wiring,
+    Duration, Event, Geodetic, Geofence, GuardConfig, Instant, LineError, Mission, MissionConfig,
+    Placement, Settings, Sites, Upload, UploadError, Wiring,
 };
-use uav_relay::{Geofence, GuardConfig};
 
 use super::adopted::adopts;
-use super::codec::{Fenced, Said};
-use super::offer::Offer;
-use super::signed::{Peer, said, set};
-use super::uploads::{NOW, held, hello, mission_id, relay_4, upload};
-use super::votes::{FLIES, REFUSED, WHOLE, events};
+use super::bench::events;
+use super::kinds::one_of_each;
+use super::offer::{between, kept, mission_id, upload, with_sites};
+use super::said::Said;
+use super::signed::{Met, NOW, settings};
+use super::uploads::fourth;
+use super::votes::{FLIES, REFUSED, WHOLE, hello};
 
 /// Sites a kilometre apart, to the millimetre.
-pub(crate) const A_KILOMETRE: [i32; 6] = [
+const A_KILOMETRE: [i32; 6] = [
     474_000_000,
     85_400_000,
     420_000,
@@ -38,133 +38,92 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// Returns an upload with the sites of `A_KILOMETRE`.
-fn sited(version: u16, base: u16) -> Offer {
-    Offer {
-        sites: A_KILOMETRE,
-        ..upload(version, base)
-    }
-}
-
-/// Moves the receiver of an offer east by `east`, 1e-7 degrees.
-fn farther(offer: Offer, east: i32) -> Offer {
-    let mut sites = offer.sites;
+/// Returns an upload of version 2 with sites a kilometre apart, the receiver's `east` units farther east.
+fn farther(base: u16, east: i32) -> (Said, [i32; 6]) {
+    let mut sites = A_KILOMETRE;
     sites[4] += east;
-    Offer { sites, ..offer }
+    (with_sites(&upload(2, base), sites), sites)
 }
-
-const DISTANCE: Event = Event::UploadRefused {
-    why: LineError::Distance,
-};
-const SITES: Event = Event::UploadRefused {
-    why: LineError::Sites,
-};
 
 /// Checks refusals with and without a line on earth, so that a chain decides unanimously.
 #[test]
-fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_says_so() {
-    for by_autopilot in [false, true] {
-        let (identity, settings) = set(4, Wiring::Pair);
-        let mission = Mission::try_new(paper(8)).unwrap();
+fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
+    for sited in [false, true] {
         let settings = Settings {
-            sited: by_autopilot,
-            ..settings
+            sited,
+            ..settings(Wiring::Pair)
         };
-        let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
-        let mut peer = Peer::meets(&mut relay, 4, 5, Port::Downstream);
-        said(&mut relay, NOW);
-        events(&mut relay);
-        let base = digest(&mission);
-        let near = |east| farther(sited(2, base), east);
+        let mut met = Met::fourth_with(settings);
+        let near = |east| farther(met.base, east);
         // A unit is 7.5 mm: 4.5 cm are tolerated, 6 cm are not.
-        let mut none = sited(2, base);
-        none.sites = [474_000_000, 85_400_000, 0, 474_000_000, 85_400_900, 0];
-        let longer = Offer {
-            distance_m: 1100.0,
-            ..sited(2, base)
-        };
-        let mut refused = 0;
-        for (offer, why) in [
-            (near(8), DISTANCE),
-            (near(-8), DISTANCE),
-            (longer, DISTANCE),
-            (none, SITES),
-        ] {
-            refused += 1;
-            for told in [vec![why], vec![]] {
-                peer.says(&mut relay, NOW, &Said::Offer(offer));
-                assert_eq!(events(&mut relay), told, "{offer:?}");
+        let (longer, kilometre) = near(0);
+        let longer = longer.with(json!({ "distance_m": 1100.0 }));
+        let none = [474_000_000, 85_400_000, 0, 474_000_000, 85_400_900, 0];
+        let cases = [
+            (near(8), LineError::Distance),
+            (near(-8), LineError::Distance),
+            ((longer, kilometre), LineError::Distance),
+            (
+                (with_sites(&upload(2, met.base), none), none),
+                LineError::Sites,
+            ),
+        ];
+        let good = [near(6), near(-6)];
+        for (refused, ((offer, six), why)) in (1..).zip(cases) {
+            for told in [vec![Event::UploadRefused { why }], vec![]] {
+                let out = met.hears(1, &offer);
+                assert_eq!(met.events(), told, "{offer:?}");
                 // The relay answers with a hello that names the refused mission.
-                let says = said(&mut relay, NOW);
-                let [(_, Said::Hello(hello))] = says.as_slice() else {
-                    panic!("{says:?}")
-                };
-                assert_eq!(hello.holds, mission_id(&offer));
-                assert_eq!(hello.flags & (FLIES | WHOLE | REFUSED), REFUSED);
-                assert_eq!(held(&relay), None);
+                assert_eq!(out.len(), 1, "{out:?}");
+                let said = &out[0].1;
+                let holds = ["holds", "holds_version"].map(|name| said.number(name) as u16);
+                assert_eq!((holds[0], holds[1]), mission_id(&offer));
+                assert!(said.has(REFUSED) && !said.has(FLIES) && !said.has(WHOLE));
+                assert_eq!(met.held(), None);
             }
-            assert_eq!(relay.stats().mission, 2 * refused);
-            let upload = Upload::decode(&offer.kept()).unwrap();
-            let Event::UploadRefused { why } = why else {
-                unreachable!()
-            };
+            assert_eq!(met.stats().mission, 2 * refused);
+            let upload = Upload::decode(&kept(&offer)).unwrap();
             let line = Err(UploadError::Line(why));
-            assert_eq!(relay.clone().handle_upload(NOW, &upload), line);
-            let mut begins = Relay::new(mission, identity, settings, 1, NOW).unwrap();
-            assert_eq!(begins.resume(&upload), line);
+            assert_eq!(met.relay.clone().handle_upload(NOW, &upload), line);
+            assert_eq!(fourth(settings).resume(&upload), line);
             // The ground station does not create such an upload either.
-            let plain = Upload::decode(
-                &Offer {
-                    sites: [0; 6],
-                    ..offer
-                }
-                .kept(),
-            )
-            .unwrap();
-            assert_eq!(plain.with_sites(sites(offer.sites)).map(|_| ()), line);
+            let plain = Upload::decode(&kept(&with_sites(&offer, [0; 6]))).unwrap();
+            assert_eq!(plain.with_sites(sites(six)).map(|_| ()), line);
         }
-        for good in [near(6), near(-6)] {
-            let mut after = relay.clone();
-            peer.clone().says(&mut after, NOW, &Said::Offer(good));
-            assert_eq!(events(&mut after), [Event::Uploaded]);
-            assert_eq!(held(&after), Some(mission_id(&good)));
+        for (good, _) in good {
+            let mut after = met.clone();
+            after.hears(1, &good);
+            assert_eq!(after.events(), [Event::Uploaded]);
+            assert_eq!(after.held(), Some(mission_id(&good)));
         }
     }
 }
 
 #[test]
 fn the_sites_are_those_of_the_mission_that_is_flown() {
-    let (mut relay, mut peers, base) = relay_4();
-    let first = sited(2, base);
-    assert_ne!(
-        mission_id(&first),
-        mission_id(&upload(2, base)),
-        "it is another mission"
-    );
-    peers[0].says(&mut relay, NOW, &Said::Offer(first));
-    assert_eq!(
-        (relay.sites(), held(&relay)),
-        (None, Some(mission_id(&first)))
-    );
-    adopts(&mut relay, &mut peers, &first);
-    assert_eq!(relay.sites(), Some(sites(A_KILOMETRE)));
+    let mut met = Met::fourth();
+    let base = met.base;
+    let (first, _) = farther(base, 0);
+    let of = mission_id(&first);
+    assert_ne!(of, mission_id(&upload(2, base)), "it is another mission");
+    met.hears(0, &first);
+    assert_eq!((met.sites(), met.held()), (None, Some(of)));
+    adopts(&mut met, &first);
+    assert_eq!(met.sites(), Some(sites(A_KILOMETRE)));
     // A newer mission that is held is not flown.
-    peers[0].says(&mut relay, NOW, &Said::Offer(upload(3, base)));
-    assert_eq!(relay.sites(), Some(sites(A_KILOMETRE)));
+    met.hears(0, &upload(3, base));
+    assert_eq!(met.sites(), Some(sites(A_KILOMETRE)));
     // The stored mission applies after a reboot.
-    let (identity, settings) = set(4, Wiring::Pair);
-    let mission = Mission::try_new(paper(8)).unwrap();
-    for (kept, expected) in [(first, Some(sites(A_KILOMETRE))), (upload(3, base), None)] {
-        let mut again = Relay::new(mission, identity, settings, 1, NOW).unwrap();
-        let upload = Upload::decode(&kept.kept()).unwrap();
+    for (stored, expected) in [(first, Some(sites(A_KILOMETRE))), (upload(3, base), None)] {
+        let mut again = fourth(settings(Wiring::Pair));
+        let upload = Upload::decode(&kept(&stored)).unwrap();
         assert_eq!(again.resume(&upload), Ok(()));
         assert_eq!(again.sites(), expected);
     }
 }
 
-/// Returns relay 4 with a guard, its neighbours, and the digest of its mission.
-fn guarded() -> (Relay, [Peer; 2], u16) {
-    let (identity, settings) = set(4, Wiring::Pair);
+/// Returns relay 4 with a guard.
+fn guarded() -> Met {
     let mission = Mission::try_new(paper(8)).unwrap();
     // The geofence has room for all offers here.
     let mut guard = GuardConfig::of(&mission, mission.config().common);
@@ -175,73 +134,62 @@ fn guarded() -> (Relay, [Peer; 2], u16) {
         most_altitude_m: 1e3,
         ..guard.fence
     };
-    let settings = Settings {
+    let mut met = Met::fourth_with(Settings {
         guard: Some(guard),
-        ..settings
-    };
-    let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
-    let mut peers = [(3, Port::Upstream), (5, Port::Downstream)]
-        .map(|(node, port)| Peer::meets(&mut relay, 4, node, port));
-    let base = digest(&mission);
-    for peer in &mut peers {
-        peer.says(&mut relay, NOW, &hello(base, 4, (base, 0), 0));
+        ..settings(Wiring::Pair)
+    });
+    for peer in [0, 1] {
+        met.hears(peer, &hello(met.base, 4, (met.base, 0), 0));
     }
-    said(&mut relay, NOW);
-    events(&mut relay);
-    (relay, peers, base)
+    met.events();
+    met
 }
 
 #[test]
 fn a_fence_along_another_line_is_stale_and_has_no_effect() {
-    let (mut relay, mut peers, base) = guarded();
-    let fence = |mission| {
-        Said::Fence(Fenced {
-            number: 700,
-            mission,
-            echo: 0,
-            fence: 0,
-            places: [300.0, 310.0, 0.0, 20.0, 0.0],
-            flags: 0,
-        })
-    };
-    let first = sited(2, base);
-    let line = first.between(base);
+    let mut met = guarded();
+    let base = met.base;
+    let (first, _) = farther(base, 0);
+    let line = between(&first, base);
     assert_ne!(line, base);
-    let stale = |relay: &Relay, peers: &[Peer; 2], mission| {
-        let (mut after, before) = (relay.clone(), *relay.stats());
-        peers[0].clone().says(&mut after, NOW, &fence(mission));
-        let stats = after.stats();
-        assert_eq!(events(&mut after.clone()), []);
+    let stale = |met: &Met, line: u16| {
+        let fence = one_of_each(1, line)[13].with(json!({
+            "association": 700, "fence": 0, "x_m": 300.0, "target_m": 310.0, "y_m": 0.0,
+            "altitude_m": 20.0, "apart_m": 0.0, "flags": 0,
+        }));
+        let mut after = met.clone();
+        after.hears(0, &fence);
+        assert_eq!(after.events(), []);
+        let (before, stats) = (met.stats(), after.stats());
         (stats.stale - before.stale, stats.mission - before.mission)
     };
-    assert_eq!(stale(&relay, &peers, base), (0, 0));
-    assert_eq!(stale(&relay, &peers, line), (1, 0));
-    adopts(&mut relay, &mut peers, &first);
-    events(&mut relay);
-    assert_eq!(stale(&relay, &peers, base), (1, 0));
-    assert_eq!(stale(&relay, &peers, line), (0, 0));
+    assert_eq!(stale(&met, base), (0, 0));
+    assert_eq!(stale(&met, line), (1, 0));
+    adopts(&mut met, &first);
+    met.events();
+    assert_eq!(stale(&met, base), (1, 0));
+    assert_eq!(stale(&met, line), (0, 0));
     // A mission without sites uses the loaded line.
-    let (mut relay, mut peers, base) = guarded();
-    adopts(&mut relay, &mut peers, &upload(2, base));
-    events(&mut relay);
-    assert_eq!(stale(&relay, &peers, base), (0, 0));
-    assert_eq!(stale(&relay, &peers, line), (1, 0));
+    let mut met = guarded();
+    adopts(&mut met, &upload(2, base));
+    met.events();
+    assert_eq!(stale(&met, base), (0, 0));
+    assert_eq!(stale(&met, line), (1, 0));
 }
 
 /// Checks a single relay, which has a position and a guard's setpoint until the line changes.
 #[test]
-fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has_agreed() {
+fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let config = paper(1);
     let mission = Mission::try_new(config).unwrap();
-    let (identity, settings) = set(1, Wiring::Pair);
     let guard = GuardConfig::of(&mission, config.common);
     let settings = Settings {
         guard: Some(guard),
-        ..settings
+        ..settings(Wiring::Pair)
     };
-    let mut relay = Relay::new(mission, identity, settings, 1, NOW).unwrap();
+    let mut relay = host_tests::fixtures::relay(mission, 1, settings);
     let mut now = NOW;
-    let mut until = |relay: &mut Relay, end: Instant, x_m: f32| {
+    let mut until = |relay: &mut uav_relay::Relay, end: Instant, x_m: f32| {
         while now < end {
             now = now + Duration::from_millis(100);
             relay.handle_position(now, now, Placement::on_line(x_m, 20.0));
@@ -256,32 +204,23 @@ fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has
     let place = relay.setpoint().unwrap();
     assert!((place.x_m - 349.8).abs() < 0.1);
     // 2 km, along another line.
-    let longer = Upload::new(
-        &mission,
-        1,
-        uav_relay::MissionConfig {
-            distance_m: 2000.0,
-            ..config
-        },
-    );
+    let config = MissionConfig {
+        distance_m: 2000.0,
+        ..config
+    };
     let mut to = A_KILOMETRE;
     to[4] += to[4] - to[1];
-    let longer = longer.unwrap().with_sites(sites(to)).unwrap();
+    let longer = Upload::new(&mission, 1, config).unwrap();
+    let longer = longer.with_sites(sites(to)).unwrap();
     relay.handle_upload(at, &longer).unwrap();
     let adopted = until(&mut relay, Instant::from_millis(3_000), 1_700.0);
     assert_eq!(relay.sites(), Some(sites(to)));
     assert!(events(&mut relay).contains(&Event::SetpointChanged));
     let agreed = relay.final_setpoint().unwrap();
     assert_eq!(relay.setpoint(), None, "it may still be braking");
-    until(
-        &mut relay,
-        adopted + guard.lag + Duration::from_millis(500),
-        1_700.0,
-    );
-    assert_eq!(
-        relay.setpoint(),
-        Some(agreed),
-        "beyond the old box, it is found there and sent on"
-    );
+    let stopped = adopted + guard.lag + Duration::from_millis(500);
+    until(&mut relay, stopped, 1_700.0);
+    // Beyond the old box, it is found there and sent on.
+    assert_eq!(relay.setpoint(), Some(agreed));
     assert_eq!(relay.final_setpoint(), Some(agreed));
 }

@@ -1,17 +1,16 @@
-//! Random messages, nearly valid bodies, headers and streams.
-//!
-//! Nested strategies are boxed: by value their trees overflow the stack of a test's thread.
+//! Random messages by the workspace's generator, headers, nearly valid bodies, and pieces of a stream.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
+use proptest::sample::Index;
 use uav_relay::wire::frame::Header;
-use uav_relay_decode::range::targets;
+use uav_relay_decode::draw::Draw;
+use uav_relay_decode::envelope::{sealed, stuffed};
+use uav_relay_decode::write::write_fields;
 
-use super::codec::{Handed, Judged, Said, Seats, Shifted, Swept};
-use super::offered::offers;
-use super::view_strategies::{formings, heard, pulses};
+use super::said::{FORMAT, Said, wire};
 
-pub(crate) const MAX_NODE: u16 = 4094;
+const MAX_NODE: u16 = 4094;
 
 pub(crate) fn headers() -> impl Strategy<Value = Header> {
     (any::<u16>(), 0..=MAX_NODE, 0..=MAX_NODE, any::<u32>()).prop_map(
@@ -24,272 +23,121 @@ pub(crate) fn headers() -> impl Strategy<Value = Header> {
     )
 }
 
-pub(crate) fn metres(least: f32) -> impl Strategy<Value = f32> {
-    prop_oneof![
-        4 => least.max(-1e6)..=1e6_f32,
-        2 => least..=2e9_f32,
-        1 => Just(least),
-        1 => Just(2e9_f32),
-        1 => Just(0.0),
-        1 => Just(-0.0),
-        1 => Just(f32::from_bits(1)),
-    ]
-}
-
-/// Draws anchor, gap code and growth code of a valid ladder.
-pub(crate) fn ladders() -> BoxedStrategy<(f32, u8, u8)> {
-    let ordinary = (-20.0..20.0_f32).prop_map(f32::exp2);
-    let any_normal = (0x0080_0000..0x7F80_0000_u32).prop_map(f32::from_bits);
-    let anchors = prop_oneof![3 => ordinary, 1 => any_normal];
-    let growths = prop_oneof![1 => Just(0), 3 => 0..32_u8, 1 => any::<u8>()];
-    (anchors, any::<u8>(), growths)
-        .prop_map(|(anchor, gap, growth)| (anchor, gap, if gap == 0 { 0 } else { growth }))
-        .prop_filter("a ladder within the f32s", |&(anchor, gap, growth)| {
-            let targets = targets(anchor, gap, growth);
-            targets[0] >= f32::MIN_POSITIVE && targets[targets.len() - 1].is_finite()
+/// Draws valid messages of the kinds `names`. The draws shrink: behind the drawn bytes there are zeros.
+pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<Said> {
+    (proptest::sample::select(names), vec(any::<u8>(), 0..400))
+        .prop_map(|(name, bytes)| {
+            let mut messages = (0_u8..).zip(&FORMAT.messages);
+            let (tag, layout) = messages.find(|(_, layout)| layout.name == name).unwrap();
+            let mut bytes = bytes.into_iter();
+            let mut source = || bytes.next().unwrap_or(0);
+            let mut body = vec![tag];
+            write_fields(&Draw::new(&mut source).valid(layout), &mut body);
+            Said::read(&body).unwrap_or_else(|error| panic!("{error}: {name} {body:02x?}"))
         })
         .boxed()
 }
 
-pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
-    let ladders = prop_oneof![
-        4 => ladders(),
-        1 => (0.1..10.0_f32).prop_map(|anchor| (anchor, 0, 0)),
-    ]
-    .prop_filter("room for the reaches", move |&(_, gap, _)| {
-        gap > 0 || least <= 1
-    });
-    let altitudes = prop_oneof![0.1..=1e5_f32, Just(0.1), Just(1e5)];
-    let powers = prop_oneof![1e-6..=1e6_f32, Just(1e-6), Just(1e6)];
-    // One pass in four is a plain one.
-    let signs = prop_oneof![3 => Just(1.0_f32), 1 => Just(-1.0)];
-    let numbers = (any::<u16>(), any::<u16>());
-    (
-        numbers,
-        (ladders, signs),
-        altitudes,
-        powers,
-        vec(metres(0.0), least..=16),
-    )
-        .prop_map(
-            |(
-                (number, mission),
-                ((anchor, gap, growth), sign),
-                altitude_m,
-                power_w,
-                mut reaches,
-            )| {
-                if gap == 0 {
-                    reaches.truncate(1);
-                }
-                Said::Sweep(Swept {
-                    number,
-                    mission,
-                    anchor: sign * anchor,
-                    gap,
-                    growth,
-                    altitude_m,
-                    power_w,
-                    reaches,
-                })
-            },
-        )
-        .boxed()
-}
-
-pub(crate) fn altitudes() -> impl Strategy<Value = f32> {
-    prop_oneof![4 => 15.0..400.0_f32, 1 => 0.1..=1e5_f32, 1 => Just(0.1), 1 => Just(1e5)]
-}
-
-pub(crate) fn powers() -> impl Strategy<Value = f32> {
-    prop_oneof![4 => 0.1..10.0_f32, 1 => 1e-6..=1e6_f32, 1 => Just(1e-6), 1 => Just(1e6)]
-}
-
-/// Draws from 0 to `most` over all magnitudes.
-pub(crate) fn up_to(most: f32) -> BoxedStrategy<f32> {
-    let any_size = (-40.0..=most.log2())
-        .prop_map(f32::exp2)
-        .prop_map(move |number| number.min(most));
-    prop_oneof![
-        2 => 0.0..=most,
-        4 => any_size,
-        1 => Just(0.0),
-        1 => Just(-0.0),
-        1 => Just(f32::from_bits(1)),
-        1 => Just(most),
-    ]
-    .boxed()
-}
-
-fn sirs() -> impl Strategy<Value = f32> {
-    prop_oneof![4 => 0.0..10.0_f32, 1 => up_to(f32::MAX)]
-}
-
-/// Adds a measured Upsilon to the sweeps of `plain`.
-pub(crate) fn measured(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
-    let upsilons = prop_oneof![
-        4 => (-29.0..106.0_f32).prop_map(f32::exp2),
-        1 => Just(1e-9),
-        1 => Just(1e32),
-    ];
-    (plain, upsilons)
-        .prop_map(|(said, upsilon_per_w)| match said {
-            Said::Sweep(sweep) => Said::Measured {
-                sweep,
-                upsilon_per_w,
-            },
-            other => other,
-        })
-        .boxed()
-}
-
-/// Adds a lateral offset to the sweeps of `plain`.
-pub(crate) fn asides(plain: BoxedStrategy<Said>) -> BoxedStrategy<Said> {
-    (plain, beside())
-        .prop_map(|(said, y_m)| match said {
-            Said::Sweep(sweep) => Said::Aside { sweep, y_m },
-            other => other,
-        })
-        .boxed()
-}
-
-/// Draws a lateral offset on either side.
-fn beside() -> impl Strategy<Value = f32> {
-    prop_oneof![
-        4 => -100.0..=100.0_f32,
-        1 => up_to(1e5),
-        1 => up_to(1e5).prop_map(|y_m| -y_m),
-    ]
-}
-
-/// Draws valid profiles of relays.
-fn rosters() -> BoxedStrategy<Seats> {
-    let held = prop_oneof![1 => Just(0.0), 2 => altitudes()];
-    let numbers = (any::<u16>(), any::<u16>());
-    let afters = prop_oneof![4 => Just(0), 1 => 0..1000_u16];
-    (numbers, afters, vec((1..9_u16, held, powers()), 0..=8))
-        .prop_map(|((number, mission), after, mut seats)| {
-            let mut last = after;
-            for seat in &mut seats {
-                last += seat.0;
-                seat.0 = last;
-            }
-            seats.retain(|seat| seat.0 <= 1000);
-            Seats {
-                number,
-                mission,
-                after,
-                seats,
-            }
-        })
-        .boxed()
-}
-
-/// Draws a position along x.
-pub(crate) fn along() -> impl Strategy<Value = f32> {
-    prop_oneof![4 => 0.0..=1000.0_f32, 1 => up_to(1e6)]
-}
-
-/// Draws a turn's byte, range, columns and rows.
-fn turns() -> BoxedStrategy<(u8, f32, u8, u8)> {
-    prop_oneof![
-        1 => Just((0, 0.0, 0, 0)),
-        1 => Just((1, 0.0, 0, 0)),
-        2 => up_to(1e5).prop_map(|explore_m| (2, explore_m, 0, 0)),
-        2 => (up_to(1e5), 2..12_u8, 2..12_u8).prop_map(|(most, columns, rows)| (2, most, columns, rows)),
-        1 => (up_to(1e5), 2..=u8::MAX, 2..=u8::MAX)
-            .prop_map(|(most, columns, rows)| (2, most, columns, rows)),
-    ]
-    .boxed()
-}
-
-fn tokens() -> BoxedStrategy<Said> {
-    let numbers = (any::<u16>(), any::<u16>());
-    (numbers, along(), altitudes(), powers(), turns(), sirs())
-        .prop_map(
-            |(
-                (number, mission),
-                x_m,
-                altitude_m,
-                power_w,
-                (turn, explore_m, columns, rows),
-                sir,
-            )| {
-                Said::Token(Handed {
-                    number,
-                    mission,
-                    x_m,
-                    altitude_m,
-                    power_w,
-                    turn,
-                    explore_m,
-                    columns,
-                    rows,
-                    sir,
-                })
-            },
-        )
-        .boxed()
-}
-
-fn moves() -> BoxedStrategy<Said> {
-    let numbers = (any::<u16>(), any::<u16>());
-    (numbers, along(), altitudes(), any::<bool>(), sirs())
-        .prop_map(|((number, mission), x_m, altitude_m, any, worst)| {
-            Said::Moved(Shifted {
-                number,
-                mission,
-                x_m,
-                altitude_m,
-                any,
-                worst,
-            })
-        })
-        .boxed()
-}
-
-fn questions() -> impl Strategy<Value = u16> {
-    prop_oneof![2 => Just(0), 3 => 0..9_u16, 1 => any::<u16>()]
-}
-
+/// Draws valid messages of all kinds.
 pub(crate) fn messages() -> BoxedStrategy<Said> {
-    let verdicts = (
-        any::<u16>(),
-        any::<u16>(),
-        any::<bool>(),
-        proptest::option::of(0..16_u8),
-        vec(metres(-2e9), 0..=16),
-        proptest::option::of(along()),
-    )
-        .prop_map(|(number, mission, own, commit, slacks, stand)| {
-            Said::Verdict(Judged {
-                number,
-                mission,
-                own,
-                commit,
-                slacks,
-                stand,
-            })
-        });
+    let names = FORMAT.messages.iter().map(|layout| layout.name.as_str());
+    kinds(names.collect::<Vec<_>>().leak())
+}
+
+/// Draws a valid, nearly valid or invalid body.
+pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
+    let valid = || messages().prop_map(|said| said.body().to_vec());
+    let changed = || (valid(), any::<Index>());
+    let replaced = (changed(), any::<u8>()).prop_map(|((mut body, at), byte)| {
+        let at = at.index(body.len());
+        body[at] = byte;
+        body
+    });
+    let recounted = (changed(), 0..20_u8).prop_map(|((mut body, at), count)| {
+        let at = at.index(body.len());
+        body[at] = count;
+        body
+    });
+    let strange = proptest::sample::select(&[
+        0.0,
+        -0.0,
+        -1.0,
+        3e9,
+        1e-40,
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+    ]);
+    let renumbered = (changed(), strange).prop_map(|((mut body, at), number)| {
+        let at = at.index(body.len());
+        if let Some(place) = body.get_mut(at..at + 4) {
+            place.copy_from_slice(&f32::to_le_bytes(number));
+        }
+        body
+    });
+    let cut = changed().prop_map(|(mut body, at)| {
+        body.truncate(at.index(body.len()));
+        body
+    });
+    let longer = (valid(), vec(any::<u8>(), 1..4)).prop_map(|(body, more)| [body, more].concat());
+    // A byte as a varint with padding: the tag, a count, or another byte.
+    let padded = (changed(), 0..9_usize).prop_map(|((mut body, at), more)| {
+        let at = at.index(body.len());
+        let rest = body.split_off(at);
+        let padding = vec![0x80; more];
+        [&body[..], &[rest[0] | 0x80], &padding, &[0], &rest[1..]].concat()
+    });
+    let tagged = (0..=21_u8, vec(any::<u8>(), 0..=120)).prop_map(|(tag, mut body)| {
+        body.insert(0, tag);
+        body
+    });
     prop_oneof![
-        3 => sweeps(0),
-        3 => verdicts,
-        1 => any::<u16>().prop_map(|number| Said::Busy { number }),
-        1 => (any::<[u32; 2]>(), 0..4_u8).prop_map(|([number, heard], flags)| Said::Claim { number, heard, flags }),
-        1 => (any::<u16>(), prop_oneof![Just(1e-30), 1e-12..1e-3_f32, Just(1e6)])
-            .prop_map(|(mission, power_w)| Said::Level { mission, power_w }),
-        1 => (any::<u16>(), questions(), questions())
-            .prop_map(|(mission, ask, answer)| Said::Heartbeat { mission, ask, answer }),
-        2 => measured(sweeps(0)),
-        2 => asides(sweeps(0)),
-        2 => rosters().prop_map(Said::Gather),
-        2 => rosters().prop_map(Said::Gathered),
-        2 => tokens(),
-        2 => moves(),
-        3 => formings(),
-        2 => pulses(),
-        2 => offers(),
-        3 => heard(),
+        2 => valid(),
+        3 => replaced,
+        2 => renumbered,
+        2 => recounted,
+        1 => cut,
+        1 => longer,
+        1 => padded,
+        2 => tagged,
+        1 => vec(any::<u8>(), 0..=120),
+    ]
+    .boxed()
+}
+
+/// Draws pieces of a stream: valid, damaged and oversized frames, noise, delimiters.
+pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStrategy<Vec<u8>> {
+    let heads = heads.boxed();
+    let good = (heads.clone(), messages()).prop_map(|(head, said)| wire(head, said.body()));
+    let good = good.boxed();
+    let sealed_body = (heads, bodies()).prop_map(|(head, body)| wire(head, &body));
+    let sealed_noise = vec(any::<u8>(), 0..=124).prop_map(|bytes| stuffed(&sealed(bytes)));
+    let changed = || (good.clone(), any::<Index>());
+    let damaged = (changed(), 0..8_u8).prop_map(|((mut frame, at), bit)| {
+        let at = at.index(frame.len());
+        frame[at] ^= 1 << bit;
+        frame
+    });
+    let cut = (changed(), any::<bool>()).prop_map(|((mut frame, at), ended)| {
+        frame.truncate(at.index(frame.len()));
+        if ended {
+            frame.push(0);
+        }
+        frame
+    });
+    let oversized = vec(1..=u8::MAX, 100..700).prop_map(|mut bytes| {
+        bytes.push(0);
+        bytes
+    });
+    prop_oneof![
+        4 => good.clone(),
+        2 => sealed_body,
+        1 => sealed_noise,
+        2 => damaged,
+        1 => cut,
+        1 => vec(any::<u8>(), 0..300),
+        1 => oversized,
+        1 => vec(Just(0), 1..4),
     ]
     .boxed()
 }

@@ -4,14 +4,13 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::MAX_DECODED;
-use uav_relay::{Instant, Port, Relay, Wiring};
+use uav_relay::{Port, Wiring};
+use uav_relay_decode::envelope::{self, stuffed};
 
-use super::codec::wire;
+use super::bench::Bench;
 use super::config;
 use super::golden::vectors;
-use super::receive::relay;
-use super::strategies::headers;
-use super::stream_strategies::pieces;
+use super::strategies::{headers, pieces};
 
 type Outcome = Result<Vec<u8>, DeframeError>;
 
@@ -28,19 +27,8 @@ fn deframed(stream: &[u8]) -> Vec<Outcome> {
 }
 
 /// Returns the result by the rules. `stuffed` are the bytes between two delimiters, at least one.
-pub(crate) fn unstuffed(mut stuffed: &[u8]) -> Outcome {
-    let mut plain = Vec::new();
-    let mut whole = true;
-    while let Some((&code, rest)) = stuffed.split_first() {
-        let run = usize::from(code) - 1;
-        whole = run <= rest.len();
-        let (run, rest) = rest.split_at(run.min(rest.len()));
-        plain.extend(run);
-        if code < 255 && !rest.is_empty() {
-            plain.push(0);
-        }
-        stuffed = rest;
-    }
+pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
+    let (plain, whole) = envelope::unstuffed(stuffed);
     if plain.len() > MAX_DECODED {
         Err(DeframeError::Oversized)
     } else if whole {
@@ -64,17 +52,17 @@ fn by_the_rules(stream: &[u8]) -> Vec<Outcome> {
 
 /// Returns a relay's state after the stream, cut at the given lengths in turn.
 fn state_after(stream: &[u8], cuts: &[usize]) -> String {
-    let mut relay: Relay = relay(2, 8, Wiring::Pair);
-    let mut rest = stream;
+    let mut bench = Bench::new(2, 8, Wiring::Pair);
+    let (start, mut rest) = (bench.now, stream);
     for &cut in cuts.iter().cycle() {
         let (now, later) = rest.split_at(cut.min(rest.len()));
-        relay.handle_bytes(Instant::ZERO, Port::Upstream, now);
+        bench.handle_bytes(start, Port::Upstream, now);
         rest = later;
         if rest.is_empty() {
             break;
         }
     }
-    format!("{relay:?}")
+    format!("{bench:?}")
 }
 
 /// Returns every golden frame with noise, cut, oversized and empty frames in between.
@@ -144,7 +132,7 @@ fn the_longest_frame_fits_and_one_byte_more_does_not() {
             } else {
                 Err(DeframeError::Oversized)
             };
-            assert_eq!(deframed(&wire(&plain)), [expected], "{zeros} zeros");
+            assert_eq!(deframed(&stuffed(&plain)), [expected], "{zeros} zeros");
         }
     }
 }
@@ -177,13 +165,21 @@ fn empty_frames_are_ignored() {
     assert_eq!(deframed(&[1, 0]), [Ok(vec![])]);
 }
 
-proptest! {
-    #![proptest_config(config(3000))]
+/// Draws pieces of frames, or any bytes. One of those in 64 is a delimiter, half are small: short runs and frequent zeros.
+fn streams() -> impl Strategy<Value = Vec<u8>> {
+    let byte = any::<[u8; 2]>().prop_map(|draw| match draw {
+        [_, 0..4] => 0,
+        [byte, 4..128] => byte % 8,
+        [byte, _] => byte,
+    });
+    prop_oneof![
+        vec(pieces(headers()), 0..12).prop_map(|pieces| pieces.concat()),
+        vec(byte, 0..1000),
+    ]
+}
 
-    #[test]
-    fn what_cobs_encodes_is_decoded(plain in vec(prop_oneof![Just(0), any::<u8>()], 0..=MAX_DECODED)) {
-        prop_assert_eq!(deframed(&wire(&plain)), [Ok(plain)]);
-    }
+proptest! {
+    #![proptest_config(config(6000))]
 
     #[test]
     fn what_cobs_decodes_is_decoded_the_same(stuffed in vec(1..=u8::MAX, 1..=MAX_DECODED)) {
@@ -196,20 +192,7 @@ proptest! {
     }
 
     #[test]
-    fn any_stream_gives_what_the_rules_say(pieces in vec(pieces(headers()), 0..12)) {
-        let stream = pieces.concat();
-        prop_assert_eq!(deframed(&stream), by_the_rules(&stream));
-    }
-
-    #[test]
-    fn any_bytes_give_what_the_rules_say(draws in vec(any::<u16>(), 0..1000)) {
-        // One byte in 64 is a delimiter, half are small: short runs and frequent zeros.
-        let bytes = draws.into_iter().map(|draw| match draw.to_le_bytes() {
-            [_, 0..4] => 0,
-            [byte, 4..128] => byte % 8,
-            [byte, _] => byte,
-        });
-        let stream: Vec<u8> = bytes.collect();
+    fn any_stream_gives_what_the_rules_say(stream in streams()) {
         prop_assert_eq!(deframed(&stream), by_the_rules(&stream));
     }
 }
@@ -218,12 +201,8 @@ proptest! {
     #![proptest_config(config(300))]
 
     #[test]
-    fn every_way_of_cutting_gives_the_same(
-        pieces in vec(pieces(headers()), 0..12),
-        cuts in vec(0..60_usize, 1..8),
-    ) {
+    fn every_way_of_cutting_gives_the_same(stream in streams(), cuts in vec(0..60_usize, 1..8)) {
         prop_assume!(cuts.iter().any(|&cut| cut > 0));
-        let stream = pieces.concat();
         prop_assert_eq!(state_after(&stream, &cuts), state_after(&stream, &[stream.len() + 1]));
     }
 }

@@ -1,92 +1,75 @@
 //! Relay in a view: accepted digests, stale messages, and forwarded requests.
 
-use uav_relay::wire::digest::digest;
-use uav_relay::{Duration, Event, Instant, Port, Relay, Wiring};
+use serde_json::json;
+use uav_relay::{Event, Instant, Port, Wiring};
 
-use super::codec::{Proposed, Said, SizedView};
-use super::kinds::{FIRST, framed, one_of_each, sent};
-use super::receive::{counted, relay};
-use super::votes::{
-    ASKS, FORMS, FRESH, a_hello, events, granted, hearing, id, long, mark, proposed, soon,
-};
+use super::bench::Bench;
+use super::kinds::{FIRST, beat, one_of_each};
+use super::said::Said;
+use super::votes::*;
 
-/// Returns an idle relay `own` that has accepted `view` of all eight relays, and its mission's digest.
-fn in_view(own: u16, view: u32) -> (Relay, u16) {
-    let mut relay = relay(own, 8, Wiring::Pair);
-    let mission = digest(relay.mission());
-    let proposal = Said::Proposal(proposed(view, (mission, 0), own - 1, 8));
-    let decision = granted(view, (mission, 0), own + 1, 8);
-    for (port, said) in [(Port::Upstream, &proposal), (Port::Downstream, &decision)] {
-        relay.handle_bytes(Instant::ZERO, port, &framed(own, port, said));
-        sent(&mut relay, Instant::ZERO);
-    }
-    events(&mut relay);
-    assert_eq!(relay.view().bits(), view);
-    (relay, mission)
+const UP: Port = Port::Upstream;
+const DOWN: Port = Port::Downstream;
+
+/// Returns relay 4, idle, which has accepted `view` of all eight relays, and the digest of its passes.
+fn in_view(view: u32) -> (Bench, u16) {
+    let mut bench = Bench::new(4, 8, Wiring::Pair);
+    let of = (bench.mission, 0);
+    bench.hears(UP, &proposed(view, of, 3, 8));
+    bench.hears(DOWN, &granted(view, of, 5, 8));
+    bench.events();
+    assert_eq!(bench.view().bits(), view);
+    let own = bench.mission.wrapping_add(mark(view));
+    (bench, own)
 }
 
-/// Returns relay `own` of 8 in `view`, idle after the agreement on positions in it.
-fn agreed_in_view(own: u16, view: u32) -> (Relay, u16) {
-    let (mut relay, mission) = in_view(own, view);
-    let digest = mission.wrapping_add(mark(view));
-    for (kind, port) in [(0, Port::Upstream), (1, Port::Downstream)] {
-        let said = &one_of_each(FIRST, digest)[kind];
-        relay.handle_bytes(Instant::ZERO, port, &framed(own, port, said));
-        while relay
-            .poll_timeout()
-            .is_some_and(|due| due < Instant::from_millis(5))
-        {
-            relay.handle_timeout(Instant::from_millis(5));
+/// Returns relay 4 in `view`, idle after the agreement on positions in it, 5 ms after its start.
+fn agreed_in_view(view: u32) -> (Bench, u16) {
+    let (mut bench, own) = in_view(view);
+    let at = Instant::from_millis(5);
+    for (kind, port) in [(0, UP), (1, DOWN)] {
+        bench.hears(port, &one_of_each(FIRST, own)[kind]);
+        while bench.poll_timeout().is_some_and(|due| due < at) {
+            bench.handle_timeout(at);
         }
-        sent(&mut relay, Instant::from_millis(5));
     }
-    assert!(events(&mut relay).contains(&Event::Converged));
-    (relay, mission)
+    bench.now = at;
+    bench.sends();
+    assert!(bench.events().contains(&Event::Converged));
+    (bench, own)
 }
 
 /// Checks that another digest means another view or mission, which a hello tells apart.
 #[test]
-fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission() {
-    let now = Instant::ZERO;
+fn passes_have_the_digest_of_their_view() {
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
-        let (relay, mission) = in_view(4, view);
-        let own = mission.wrapping_add(mark(view));
+        let (bench, own) = in_view(view);
+        let (agreed, _) = agreed_in_view(view);
         let hello = |neighbour: u16| {
             let behind = if neighbour == 3 { 5 } else { 4 };
-            long(behind, hearing(1, a_hello(view, mission, neighbour, ASKS)))
+            near(1, behind, &a_hello(view, bench.mission, neighbour, ASKS))
         };
         for off in [0, 1, 64, 0xFFC0, 65, 0xFFBF, 0x4000] {
             let known = off == 0;
-            let expected = if known {
-                &["received"][..]
-            } else {
-                &["received", "view"]
-            };
             // Answers, and completions of a renewal, come from the other side.
-            for (kind, port, neighbour) in [
-                (0, Port::Upstream, 3),
-                (15, Port::Upstream, 3),
-                (1, Port::Downstream, 5),
-                (16, Port::Downstream, 5),
-            ] {
+            for (kind, port, neighbour) in [(0, UP, 3), (15, UP, 3), (1, DOWN, 5), (16, DOWN, 5)] {
                 // Renewals are for relays that have agreed on their positions.
                 let mut after = if known && kind == 15 {
-                    agreed_in_view(4, view).0
+                    agreed.clone()
                 } else {
-                    relay.clone()
+                    bench.clone()
                 };
-                let said = &one_of_each(FIRST, own.wrapping_add(off))[kind];
-                after.handle_bytes(now, port, &framed(4, port, said));
-                let stale = known && neighbour == 5;
-                let mut expected = expected.to_vec();
-                expected.extend(stale.then_some("stale"));
-                assert_eq!(counted(after.stats()), expected, "{view:x}, {off}, {kind}");
-                let out = soon(&mut after, now);
+                let kinds = one_of_each(FIRST, own.wrapping_add(off));
+                let mut out = after.hears(port, &kinds[kind]);
+                out.extend(after.ticks());
+                let expected = match (known, neighbour) {
+                    (true, 5) => &["received", "stale"][..],
+                    (true, _) => &["received"],
+                    (false, _) => &["received", "view"],
+                };
+                assert_eq!(after.counted(), expected, "{view:x}, {off}, {kind}");
                 if known {
-                    let hellos = out
-                        .iter()
-                        .filter(|(_, said)| matches!(said, Said::Hello(_)));
-                    assert_eq!(hellos.count(), 0, "{out:?}");
+                    assert!(!out.iter().any(|(_, said)| said.is("Hello")), "{out:?}");
                 } else {
                     assert_eq!(out, [(port, hello(neighbour))], "{view:x}, {off}, {kind}");
                 }
@@ -98,79 +81,63 @@ fn passes_bear_the_digest_of_their_view_and_what_forms_views_that_of_the_mission
 /// Checks passes of another view from a neighbour with equal mission: the relay requests a new view.
 #[test]
 fn a_pass_of_another_view_has_the_relay_ask_for_one() {
-    let now = Instant::ZERO;
-    let view = id(2, 1);
-    let (mut relay, mission) = in_view(4, view);
-    let own = mission.wrapping_add(mark(view));
-    for (port, from) in [(Port::Upstream, 4), (Port::Downstream, 4)] {
-        let hello = a_hello(0, mission, from, 0);
-        relay.handle_bytes(now, port, &framed(4, port, &hello));
+    let (mut bench, own) = in_view(id(2, 1));
+    for port in [UP, DOWN] {
+        bench.hears(port, &a_hello(0, bench.mission, 4, 0));
     }
-    sent(&mut relay, now);
     for (kind, port, calls) in [
-        (0, Port::Upstream, true),
-        (8, Port::Upstream, true),
-        (15, Port::Upstream, true),
-        (1, Port::Downstream, false),
-        (16, Port::Downstream, false),
+        (0, UP, true),
+        (8, UP, true),
+        (15, UP, true),
+        (1, DOWN, false),
+        (16, DOWN, false),
     ] {
-        let mut after = relay.clone();
+        let mut after = bench.clone();
         let said = &one_of_each(FIRST, own.wrapping_add(1))[kind];
-        after.handle_bytes(now, port, &framed(4, port, said));
-        let called = soon(&mut after, now).iter().any(|(port, said)| {
-            *port == Port::Upstream
-                && matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0)
-        });
-        assert_eq!(called, calls, "{said:?}");
+        let mut out = after.hears(port, said);
+        out.extend(after.ticks());
+        assert_eq!(asks_for_a_view(&out), calls, "{said:?}");
     }
 }
 
-#[test]
-fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
-    let view = id(7, 1);
-    let (mut relay, mission) = in_view(4, view);
-    for (mission, expected) in [(mission, 0), (mission.wrapping_add(mark(view)), 1)] {
-        let beat = Said::Heartbeat {
-            mission,
-            ask: 0,
-            answer: 0,
-        };
-        relay.handle_bytes(
-            Instant::ZERO,
-            Port::Upstream,
-            &framed(4, Port::Upstream, &beat),
-        );
-        assert_eq!(relay.stats().mission, expected);
-    }
+fn asks_for_a_view(out: &[(Port, Said)]) -> bool {
+    let asks = |said: &Said| said.is("Hello") && said.has(FORMS);
+    out.iter().any(|(port, said)| *port == UP && asks(said))
 }
 
 #[test]
-fn a_late_proposal_of_an_old_view_changes_nothing_and_a_leader_that_insists_hears_of_the_newest() {
-    let (mut relay, mission) = in_view(4, id(5, 2));
-    let mut now = Instant::ZERO;
-    let of = (mission, 0);
+fn heartbeats_have_the_digest_of_the_mission_in_every_view() {
+    let (mut bench, own) = in_view(id(7, 1));
+    for (mission, expected) in [(bench.mission, 0), (own, 1)] {
+        bench.hears(UP, &beat(mission, 0, 0));
+        assert_eq!(bench.stats().mission, expected);
+    }
+}
+
+/// Checks late proposals, and a leader that insists on an old view: it is told of the newest.
+#[test]
+fn a_late_proposal_of_an_old_view_changes_nothing() {
+    let (mut bench, _) = in_view(id(5, 2));
+    let of = (bench.mission, 0);
     // View 5 from another place than before.
     for (nth, view, place) in [(1, id(5, 2), 2), (2, id(5, 1), 3), (3, id(3, 9), 3)] {
-        let proposal = Said::Proposal(proposed(view, of, place, 8));
-        relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
-        assert_eq!(soon(&mut relay, now), []);
-        now = now + Duration::from_millis(1);
-        assert_eq!((relay.stats().stale, relay.view().bits()), (nth, id(5, 2)));
-        assert_eq!((relay.index(), relay.mission().relays()), (4, 8));
-        assert_eq!(events(&mut relay), []);
+        assert_eq!(bench.hears(UP, &proposed(view, of, place, 8)), []);
+        assert_eq!(bench.ticks(), []);
+        assert_eq!((bench.stats().stale, bench.view().bits()), (nth, id(5, 2)));
+        assert_eq!((bench.index(), bench.mission().relays()), (4, 8));
+        assert_eq!(bench.events(), []);
     }
-    let proposal = Said::Proposal(proposed(id(4, 1), of, 3, 8));
-    relay.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, &proposal));
-    let hello = long(5, hearing(1, a_hello(id(6, 4), mission, 3, ASKS | FORMS)));
-    assert_eq!(soon(&mut relay, now), [(Port::Upstream, hello)]);
-    assert_eq!((relay.stats().stale, relay.view().bits()), (4, id(5, 2)));
+    let mut out = bench.hears(UP, &proposed(id(4, 1), of, 3, 8));
+    out.extend(bench.ticks());
+    let hello = near(1, 5, &a_hello(id(6, 4), bench.mission, 3, ASKS | FORMS));
+    assert_eq!(out, [(UP, hello)]);
+    assert_eq!((bench.stats().stale, bench.view().bits()), (4, id(5, 2)));
 }
 
 #[test]
-fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() {
-    let now = Instant::ZERO;
+fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
     let view = id(3, 2);
-    let (relay, mission) = in_view(4, view);
+    let (bench, _) = in_view(view);
     for (newest, fresh, calls) in [
         (view, false, true),
         (id(3, 3), false, true),
@@ -180,128 +147,81 @@ fn a_hello_that_calls_goes_on_toward_the_leader_unless_it_is_of_an_older_view() 
         (0, false, false),
         (0, true, true),
     ] {
-        let mut after = relay.clone();
+        let mut after = bench.clone();
         let flags = FORMS | if fresh { FRESH } else { 0 };
-        let hello = a_hello(newest, mission, 4, flags);
-        after.handle_bytes(now, Port::Downstream, &framed(4, Port::Downstream, &hello));
+        let mut out = after.hears(DOWN, &a_hello(newest, bench.mission, 4, flags));
+        out.extend(after.ticks());
         let known = newest.max(view);
-        let on = long(5, hearing(1, a_hello(known, mission, 3, ASKS | FORMS)));
-        let expected = calls.then_some((Port::Upstream, on));
-        assert_eq!(
-            soon(&mut after, now),
-            expected.into_iter().collect::<Vec<_>>(),
-            "{newest:x} {fresh}"
-        );
+        let on = near(1, 5, &a_hello(known, bench.mission, 3, ASKS | FORMS));
+        let expected = Vec::from_iter(calls.then_some((UP, on)));
+        assert_eq!(out, expected, "{newest:x} {fresh}");
     }
 }
 
 /// Checks that an accepted view counts only after a pass or renewal in it: all have then accepted it.
 #[test]
-fn a_view_counts_once_something_that_was_begun_in_it_has_come() {
-    let now = Instant::ZERO;
+fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
     let view = id(3, 2);
-    let (relay, mission) = in_view(4, view);
-    let own = mission.wrapping_add(mark(view));
-    let accepted = SizedView {
-        id: view,
-        relays: 8,
-    };
-    for begun in [None, Some(0), Some(15)] {
-        let mut after = relay.clone();
+    let (bench, own) = in_view(view);
+    let of = (bench.mission, 0);
+    let on = proposed(id(4, 1), of, 4, 8);
+    let accepted = json!({ "proposal": view, "view": view, "relays": 8 });
+    let accepted = on.with(json!({ "successor": accepted }));
+    let counts = on.with(json!({ "agreed_view": view, "votes": 1, "proposer": false }));
+    for (begun, expected) in [
+        (None, accepted),
+        (Some(0), counts.clone()),
+        (Some(15), counts),
+    ] {
+        let mut after = bench.clone();
         if let Some(kind) = begun {
-            let said = &one_of_each(FIRST, own)[kind];
-            after.handle_bytes(now, Port::Upstream, &framed(4, Port::Upstream, said));
-            sent(&mut after, now);
+            after.hears(UP, &one_of_each(FIRST, own)[kind]);
         }
-        let told = proposed(id(4, 1), (mission, 0), 3, 8);
-        let proposal = framed(4, Port::Upstream, &Said::Proposal(told));
-        after.handle_bytes(now, Port::Upstream, &proposal);
-        let expected = if begun.is_some() {
-            Proposed {
-                agreed: accepted,
-                votes: 1,
-                proposer: false,
-                ..proposed(id(4, 1), (mission, 0), 4, 8)
-            }
-        } else {
-            Proposed {
-                successor: Some((view, accepted)),
-                ..proposed(id(4, 1), (mission, 0), 4, 8)
-            }
-        };
-        let on = (Port::Downstream, Said::Proposal(expected));
-        assert_eq!(sent(&mut after, now), [on], "{begun:?}");
+        let out = after.hears(UP, &proposed(id(4, 1), of, 3, 8));
+        assert_eq!(out, [(DOWN, expected)], "{begun:?}");
     }
 }
 
 /// Checks lease renewals: the next one grants the lease, and its expiry causes a view request.
 #[test]
-fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
-    let view = id(3, 2);
-    let (mut relay, mission) = agreed_in_view(4, view);
-    let own = mission.wrapping_add(mark(view));
-    let pulse = |number| Said::Pulse {
-        number,
-        mission: own,
-        lease: 160,
-    };
-    let pulsed = |number, done| Said::Pulsed {
-        number,
-        mission: own,
-        done,
-    };
+fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
+    let (mut bench, own) = agreed_in_view(id(3, 2));
+    let kinds = one_of_each(FIRST, own);
+    let pulse = |number: u16| kinds[15].with(json!({ "number": number, "lease_ds": 160 }));
+    let pulsed =
+        |number: u16, done: bool| kinds[16].with(json!({ "number": number, "done": done }));
     let at = Instant::from_millis;
-    let hear = |relay: &mut Relay, ms, port, said: &Said| {
-        relay.handle_bytes(at(ms), port, &framed(4, port, said));
-        sent(relay, at(ms))
+    let mut hears = |ms, port, said: &Said, expected: &[(Port, Said)]| {
+        bench.now = at(ms);
+        assert_eq!(bench.hears(port, said), expected, "{ms} ms: {said:?}");
+        (bench.lease(), bench.stats().stale, bench.stats().repeated)
     };
-    let (up, down) = (Port::Upstream, Port::Downstream);
-    assert_eq!(hear(&mut relay, 10, up, &pulse(9)), [(down, pulse(9))]);
-    assert_eq!(
-        hear(&mut relay, 15, up, &pulse(9)),
-        [(up, pulsed(9, false))]
-    );
-    assert_eq!(hear(&mut relay, 20, down, &pulsed(9, false)), []);
-    assert_eq!(relay.stats().repeated, 1);
-    assert_eq!(
-        hear(&mut relay, 30, down, &pulsed(9, true)),
-        [(up, pulsed(9, true))]
-    );
-    assert_eq!(hear(&mut relay, 35, up, &pulse(9)), [(up, pulsed(9, true))]);
-    assert_eq!(
-        relay.lease(),
-        None,
-        "the others may not have taken part yet"
-    );
+    hears(10, UP, &pulse(9), &[(DOWN, pulse(9))]);
+    hears(15, UP, &pulse(9), &[(UP, pulsed(9, false))]);
+    let (_, _, repeated) = hears(20, DOWN, &pulsed(9, false), &[]);
+    assert_eq!(repeated, 1);
+    hears(30, DOWN, &pulsed(9, true), &[(UP, pulsed(9, true))]);
+    let (lease, stale, _) = hears(35, UP, &pulse(9), &[(UP, pulsed(9, true))]);
+    assert_eq!(lease, None, "the others may not have taken part yet");
     // Other messages are stale.
-    for (port, said) in [
-        (up, pulse(8)),
-        (down, pulsed(9, true)),
-        (down, pulsed(8, true)),
+    for (nth, port, said) in [
+        (1, UP, pulse(8)),
+        (2, DOWN, pulsed(9, true)),
+        (3, DOWN, pulsed(8, true)),
     ] {
-        let before = relay.stats().stale;
-        assert_eq!(hear(&mut relay, 40, port, &said), []);
-        assert_eq!(relay.stats().stale, before + 1, "{said:?}");
+        assert_eq!(hears(40, port, &said, &[]).1, stale + nth, "{said:?}");
     }
-    assert_eq!(hear(&mut relay, 50, up, &pulse(10)), [(down, pulse(10))]);
-    assert_eq!(
-        relay.lease(),
-        Some(at(10 + 16_000)),
-        "from when it was handed on"
-    );
+    let (lease, ..) = hears(50, UP, &pulse(10), &[(DOWN, pulse(10))]);
+    assert_eq!(lease, Some(at(10 + 16_000)), "from when it was forwarded");
     // A renewal out of sequence grants no lease.
-    assert_eq!(hear(&mut relay, 60, up, &pulse(50)), [(down, pulse(50))]);
-    assert_eq!(relay.lease(), Some(at(16_010)));
-    let mut now = at(60);
-    while relay.lease().is_some() {
-        now = relay.poll_timeout().unwrap();
-        relay.handle_timeout(now);
-        sent(&mut relay, now);
+    let (lease, ..) = hears(60, UP, &pulse(50), &[(DOWN, pulse(50))]);
+    assert_eq!(lease, Some(at(16_010)));
+    let mut out = Vec::new();
+    while bench.lease().is_some() {
+        out = bench.wakes();
     }
-    assert_eq!(now, at(16_010));
-    assert!(events(&mut relay).contains(&Event::LeaseLapsed));
-    let calls = soon(&mut relay, now).iter().any(|(port, said)| {
-        *port == up && matches!(said, Said::Hello(hello) if hello.flags & FORMS != 0)
-    });
-    assert!(calls, "it asks for a view");
+    assert_eq!(bench.now, at(16_010));
+    assert!(bench.events().contains(&Event::LeaseLapsed));
+    out.extend(bench.ticks());
+    assert!(asks_for_a_view(&out), "{out:?}");
 }

@@ -1,11 +1,8 @@
-//! Constructors of hellos, proposals and decisions, and a relay's responses.
+//! Constructors of hellos, proposals and decisions.
 
-use host_tests::fixtures::NETWORK;
-use uav_relay::wire::frame::Header;
-use uav_relay::{Duration, Event, Instant, Port, Relay};
+use serde_json::json;
 
-use super::codec::{Call, Decided, Greeting, Proposed, Said, SizedView, plain, wire};
-use super::kinds::sent;
+use super::said::Said;
 
 pub(crate) const ASKS: u8 = 1;
 pub(crate) const FORMS: u8 = 2;
@@ -14,17 +11,6 @@ pub(crate) const READY: u8 = 8;
 pub(crate) const FLIES: u8 = 16;
 pub(crate) const WHOLE: u8 = 32;
 pub(crate) const REFUSED: u8 = 64;
-
-/// Encodes a frame of node `sender` to node `destination`, on network 7.
-pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
-    let header = Header {
-        network: NETWORK,
-        sender,
-        destination,
-        counter: 0,
-    };
-    wire(&plain(header, &said.body()))
-}
 
 /// Returns the identifier of view `number` proposed by `node`.
 pub(crate) const fn id(number: u32, node: u16) -> u32 {
@@ -42,95 +28,49 @@ pub(crate) fn mark(view: u32) -> u16 {
 pub(crate) const RELIED: u16 = 150;
 
 /// Returns the proposal of `view` forwarded at `place`, with votes of all booted relays up to there.
-pub(crate) fn proposed(view: u32, of: (u16, u16), place: u16, relays: u16) -> Proposed {
-    Proposed {
-        call: Call { of, view, place },
-        agreed: SizedView { id: 0, relays },
-        votes: place,
-        lease_left: RELIED,
-        rest: 0,
-        proposer: true,
-        successor: None,
-    }
+pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, relays: u16) -> Said {
+    let fields = json!({
+        "mission": mission, "version": version, "proposed_view": view, "place": place,
+        "agreed_view": 0, "agreed_relays": relays, "votes": place.min(relays), "lease_left_ds": RELIED,
+        "rest_ds": 0, "proposer": true, "successor": null,
+    });
+    Said::new("Proposal", &fields)
 }
 
 /// Returns the decision for the proposed view of `relays`, whose positions may be used at once.
 pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Said {
-    Said::Decision(Decided {
-        call: Call { of, view, place },
-        base: SizedView { id: 0, relays },
-        view: Some(SizedView { id: view, relays }),
-        there: relays,
-        lease_left: 0,
-    })
+    let accepted = json!({ "view": view, "relays": relays });
+    let changes = json!({ "base_relays": relays, "accepted": accepted });
+    refused(view, of, place, relays).with(changes)
 }
 
 /// Returns the decision that `there` of eight relays are too few.
-pub(crate) fn refused(view: u32, of: (u16, u16), place: u16, there: u16) -> Said {
-    Said::Decision(Decided {
-        call: Call { of, view, place },
-        base: SizedView { id: 0, relays: 8 },
-        view: None,
-        there,
-        lease_left: 0,
-    })
+pub(crate) fn refused(view: u32, (mission, version): (u16, u16), place: u16, there: u16) -> Said {
+    let fields = json!({
+        "mission": mission, "version": version, "proposed_view": view, "place": place,
+        "base_view": 0, "base_relays": 8, "accepted": null, "there": there, "lease_left_ds": 0,
+    });
+    Said::new("Decision", &fields)
+}
+
+/// Returns the hello of a node that receives no others, knows only view 0 and holds the mission `holds` (digest, version).
+pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
+    let (digest, version) = holds;
+    let fields = json!({
+        "mission": mission, "neighbour": neighbour, "behind": 1, "newest_view": 0, "holds": digest,
+        "holds_version": version, "offer_number": 0, "hears": 0, "flags": flags,
+    });
+    Said::new("Hello", &fields)
 }
 
 /// Returns the hello of a node that receives no others and holds and flies the loaded mission.
 pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> Said {
-    Said::Hello(Greeting {
-        mission,
-        neighbour,
-        behind: 1,
-        newest,
-        holds: (mission, 0),
-        nonce: 0,
-        hears: 0,
-        flags: flags | FLIES,
-    })
+    let hello = hello(mission, neighbour, (mission, 0), flags | FLIES);
+    hello.with(json!({ "newest_view": newest }))
 }
 
-/// Sets the nodes that a hello's sender receives, bit 0 for the nearest.
-pub(crate) fn hearing(hears: u8, said: Said) -> Said {
-    match said {
-        Said::Hello(greeting) => Said::Hello(Greeting { hears, ..greeting }),
-        other => other,
-    }
-}
-
-/// Changes a hello to one with `behind` connected relays, the sender included.
-pub(crate) fn long(behind: u16, said: Said) -> Said {
-    match said {
-        Said::Hello(greeting) => Said::Hello(Greeting { behind, ..greeting }),
-        other => other,
-    }
-}
-
-/// Removes a hello's number, which is never 0 at a relay with a key.
-pub(crate) fn unnumbered(mut said: Said) -> Said {
-    if let Said::Hello(greeting) = &mut said {
-        assert_ne!(greeting.nonce, 0);
-        greeting.nonce = 0;
-    }
-    said
-}
-
-/// Returns the messages that `relay` sends at `now` or a millisecond later.
-pub(crate) fn soon(relay: &mut Relay, now: Instant) -> Vec<(Port, Said)> {
-    let mut out = sent(relay, now);
-    let later = now + Duration::from_millis(1);
-    relay.handle_timeout(later);
-    out.extend(sent(relay, later));
-    out
-}
-
-pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
-    std::iter::from_fn(|| relay.poll_event()).collect()
-}
-
-pub(crate) fn only(relay: &mut Relay, now: Instant) -> (Port, Said) {
-    let mut out = sent(relay, now);
-    let said = out.pop().unwrap();
-    assert!(out.is_empty(), "{out:?}");
-    said
+/// Sets the nodes that a hello's sender receives, bit 0 for the nearest, and the number of connected relays behind it, itself
+/// included.
+pub(crate) fn near(hears: u8, behind: u16, hello: &Said) -> Said {
+    hello.with(json!({ "hears": hears, "behind": behind }))
 }

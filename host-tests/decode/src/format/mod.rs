@@ -42,6 +42,19 @@ pub enum Kind {
     Group(Vec<Field>),
 }
 
+impl Kind {
+    /// Returns the bytes of a number; 0 for kinds of variable size.
+    pub const fn size(&self) -> usize {
+        match self {
+            Self::U8 | Self::Bool | Self::Flags(_) | Self::Words(_) => 1,
+            Self::U16 | Self::Digest => 2,
+            Self::U32 | Self::I32 | Self::F32 | Self::View => 4,
+            Self::U64 | Self::F64 => 8,
+            Self::Array(..) | Self::Option(_) | Self::List(..) | Self::Group(_) => 0,
+        }
+    }
+}
+
 /// A field: a row of a table.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Field {

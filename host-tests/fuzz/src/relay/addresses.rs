@@ -1,8 +1,8 @@
 //! Senders and ports of frames to a relay.
 
+use uav_relay::wire::frame::Header;
 use uav_relay::{Port, Wiring};
 
-use super::super::message::Header;
 use super::super::watch::NETWORK;
 
 /// Returns the header and the port of a frame from the neighbour at `side` of relay `index`.
@@ -16,6 +16,7 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
         network: NETWORK,
         sender,
         destination: index,
+        counter: 0,
     };
     match wiring {
         Wiring::Pair => (header, port),

@@ -1,0 +1,53 @@
+//! Frame around a body: header, CRC and COBS, written without the crate's codec.
+
+use uav_relay::CRC_32C;
+use uav_relay::wire::frame::Header;
+
+/// Returns a frame before the tag and the CRC. Bits of an address above its 12 go on the wire as they are; `flags` is the top
+/// nibble of the second word.
+pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
+    let first = 0x1000 | header.sender;
+    let mut plain = first.to_le_bytes().to_vec();
+    plain.extend((flags << 12 | header.destination).to_le_bytes());
+    plain.extend(header.network.to_le_bytes());
+    plain.extend(header.counter.to_le_bytes());
+    plain.extend(body);
+    plain
+}
+
+/// Appends the CRC.
+pub fn sealed(mut plain: Vec<u8>) -> Vec<u8> {
+    plain.extend(CRC_32C.checksum(&plain).to_le_bytes());
+    plain
+}
+
+/// Returns a frame without a tag, before COBS.
+pub fn unsigned(header: Header, body: &[u8]) -> Vec<u8> {
+    sealed(before(header, 0, body))
+}
+
+/// Encodes `plain` by a published COBS encoder and appends the delimiter.
+pub fn stuffed(plain: &[u8]) -> Vec<u8> {
+    let mut out = cobs::encode_vec(plain);
+    out.push(0);
+    out
+}
+
+/// Decodes `stuffed`, without its delimiter, by the definition of COBS; returns the bytes, and true if the last run is complete.
+///
+/// A published decoder would not do, because a truncated stream is checked up to the cut, too.
+pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
+    let mut plain = Vec::with_capacity(stuffed.len());
+    let (mut rest, mut whole) = (stuffed, true);
+    while let Some((&code, after)) = rest.split_first() {
+        let run = usize::from(code).saturating_sub(1);
+        whole = run <= after.len();
+        let (run, after) = after.split_at_checked(run).unwrap_or((after, &[]));
+        plain.extend_from_slice(run);
+        if code < 255 && !after.is_empty() {
+            plain.push(0);
+        }
+        rest = after;
+    }
+    (plain, whole)
+}

@@ -1,0 +1,183 @@
+//! One relay without a key, the frames of its neighbours, and all that it sends.
+
+use std::iter;
+use std::ops::{Deref, DerefMut};
+
+use host_tests::fixtures::{self, NETWORK, paper};
+use uav_relay::wire::digest::digest;
+use uav_relay::wire::frame::{self, Header, MAX_FRAME};
+use uav_relay::{
+    Duration, Event, Instant, Mission, MissionConfig, Port, Relay, Settings, Stats, Wiring,
+};
+
+use super::said::{Said, plain_of, wire};
+
+/// A relay at the current time.
+#[derive(Clone, Debug)]
+pub(crate) struct Bench {
+    relay: Relay,
+    /// Number of its node.
+    pub(crate) own: u16,
+    /// Digest of its mission as loaded.
+    pub(crate) mission: u16,
+    pub(crate) now: Instant,
+}
+
+impl Deref for Bench {
+    type Target = Relay;
+
+    fn deref(&self) -> &Relay {
+        &self.relay
+    }
+}
+
+impl DerefMut for Bench {
+    fn deref_mut(&mut self) -> &mut Relay {
+        &mut self.relay
+    }
+}
+
+impl Bench {
+    /// Creates relay `own` of `relays` in the paper's scenario.
+    pub(crate) fn new(own: u16, relays: u16, wiring: Wiring) -> Self {
+        Self::of(paper(relays), own, wiring)
+    }
+
+    pub(crate) fn of(mission: MissionConfig, own: u16, wiring: Wiring) -> Self {
+        let settings = Settings {
+            wiring,
+            ..Settings::default()
+        };
+        Self::with(mission, own, settings)
+    }
+
+    pub(crate) fn with(mission: MissionConfig, own: u16, settings: Settings) -> Self {
+        let mission = Mission::try_new(mission).unwrap();
+        Self {
+            relay: fixtures::relay(mission, own, settings),
+            own,
+            mission: digest(&mission),
+            now: Instant::ZERO,
+        }
+    }
+
+    /// Delivers a message of the neighbour at `port`; returns what the relay then sends.
+    pub(crate) fn hears(&mut self, port: Port, said: &Said) -> Vec<(Port, Said)> {
+        let sender = match port {
+            Port::Upstream => self.own - 1,
+            _ => self.own + 1,
+        };
+        self.hears_from(sender, port, said)
+    }
+
+    /// Delivers a message of node `sender`; returns what the relay then sends.
+    pub(crate) fn hears_from(&mut self, sender: u16, port: Port, said: &Said) -> Vec<(Port, Said)> {
+        let bytes = between(sender, self.own, said);
+        self.relay.handle_bytes(self.now, port, &bytes);
+        self.sends()
+    }
+
+    /// Returns the ports and messages that the relay sends now, without claims.
+    pub(crate) fn sends(&mut self) -> Vec<(Port, Said)> {
+        let mut out = self.sends_with_claims();
+        out.retain(|(_, said)| !said.is("Claim"));
+        out
+    }
+
+    /// Returns the ports and messages that the relay sends now. Each must be valid, and the next timeout in the future.
+    pub(crate) fn sends_with_claims(&mut self) -> Vec<(Port, Said)> {
+        let mut out = Vec::new();
+        let mut buffer = [0; MAX_FRAME];
+        self.relay.persist(|_| true);
+        while let Some(transmit) = self.relay.poll_transmit(self.now, &mut buffer) {
+            let plain = plain_of(&buffer[..transmit.len]);
+            let read = frame::decode(&plain);
+            let (header, _) = read.unwrap_or_else(|error| panic!("{error}: {plain:02x?}"));
+            assert_eq!(header.network, NETWORK);
+            let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
+            out.push((transmit.port, said));
+        }
+        let next = self.relay.poll_timeout();
+        assert!(next.is_none_or(|next| next > self.now));
+        out
+    }
+
+    /// Advances the time by a millisecond; returns what the relay then sends.
+    pub(crate) fn ticks(&mut self) -> Vec<(Port, Said)> {
+        self.now = self.now + Duration::from_millis(1);
+        self.relay.handle_timeout(self.now);
+        self.sends()
+    }
+
+    /// Advances the time to the next timeout; returns what the relay then sends.
+    pub(crate) fn wakes(&mut self) -> Vec<(Port, Said)> {
+        self.now = self.relay.poll_timeout().unwrap();
+        self.relay.handle_timeout(self.now);
+        self.sends()
+    }
+
+    /// Advances time for a second; returns all that the relay sends.
+    pub(crate) fn settles(&mut self) -> Vec<(Port, Said)> {
+        let mut out = self.sends();
+        out.extend((0..1000).flat_map(|_| self.ticks()));
+        out
+    }
+
+    pub(crate) fn events(&mut self) -> Vec<Event> {
+        events(&mut self.relay)
+    }
+
+    /// Returns the names of the reception counters above zero.
+    pub(crate) fn counted(&self) -> Vec<&'static str> {
+        counted(self.relay.stats())
+    }
+}
+
+pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
+    iter::from_fn(|| relay.poll_event()).collect()
+}
+
+/// Encodes a frame of node `sender` to node `destination`.
+pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
+    let header = Header {
+        network: NETWORK,
+        sender,
+        destination,
+        counter: 0,
+    };
+    wire(header, said.body())
+}
+
+/// Returns the counters of which each received frame increments one.
+pub(crate) fn of_frames(stats: &Stats) -> [(&'static str, u32); 9] {
+    [
+        ("crc", stats.crc),
+        ("foreign", stats.foreign),
+        ("malformed", stats.malformed),
+        ("misaddressed", stats.misaddressed),
+        ("overheard", stats.overheard),
+        ("oversized", stats.oversized),
+        ("received", stats.received),
+        ("truncated", stats.truncated),
+        ("version", stats.version),
+    ]
+}
+
+/// Returns the names of the reception counters above zero.
+pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
+    let of_messages = [
+        ("misdirected", stats.misdirected),
+        ("mission", stats.mission),
+        ("repeated", stats.repeated),
+        ("stale", stats.stale),
+        // Messages at a relay without a key.
+        ("unsigned", stats.unsigned),
+        ("view", stats.view),
+    ];
+    let all = of_frames(stats).into_iter().chain(of_messages);
+    let mut names: Vec<&str> = all
+        .filter_map(|(name, count)| (count > 0).then_some(name))
+        .collect();
+    names.sort_unstable();
+    names
+}

@@ -1,0 +1,384 @@
+//! Meaning of the fields: the crate's message with the values that a body has by the tables, independent of the crate's decoder.
+
+use uav_relay::guard::Fence;
+use uav_relay::optimiser::PerTarget;
+use uav_relay::optimiser::ladder::Ladder;
+use uav_relay::optimiser::pass::Verdict;
+use uav_relay::place::{CrossSection, Station};
+use uav_relay::sensing::belief::{Belief, Spread, Told};
+use uav_relay::wire::digest::MissionId;
+use uav_relay::wire::message::{
+    AdjustStep, Answer, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal,
+    Pulse, Pulsed, Roster, Successor, Sweep, Token,
+};
+use uav_relay::{
+    Band, Interference, Interferer, Local, Placement, Profile, Sites, Upload, View, ViewId,
+};
+use uav_relay_decode::value::{Fields, Value};
+
+use super::offer;
+use super::said::{Said, list, number};
+
+/// Fields of a message or of a group, in the types of the crate.
+struct Of<'a>(&'a Fields<'static>);
+
+impl Of<'_> {
+    fn byte(&self, name: &str) -> u8 {
+        number(self.0, name) as u8
+    }
+
+    fn word(&self, name: &str) -> u16 {
+        number(self.0, name) as u16
+    }
+
+    fn long(&self, name: &str) -> u32 {
+        number(self.0, name) as u32
+    }
+
+    fn real(&self, name: &str) -> f32 {
+        number(self.0, name) as f32
+    }
+
+    fn flag(&self, name: &str, bit: u8) -> bool {
+        self.byte(name) >> bit & 1 == 1
+    }
+
+    fn targets(&self, name: &str) -> PerTarget {
+        PerTarget::from_slice(&list(self.0, name)).unwrap()
+    }
+
+    /// Returns true if an Option has a value.
+    fn has(&self, name: &str) -> bool {
+        self.0.get(name) != Some(&Value::None)
+    }
+
+    fn group(&self, name: &str) -> Option<Of<'_>> {
+        match self.0.get(name).unwrap() {
+            Value::Group(fields) => Some(Of(fields)),
+            _ => None,
+        }
+    }
+
+    fn id(&self, name: &str) -> ViewId {
+        ViewId::from_bits(self.long(name))
+    }
+
+    fn view(&self, view: &str, relays: &str) -> View {
+        View {
+            id: self.id(view),
+            relays: self.word(relays),
+        }
+    }
+
+    fn mission_id(&self, digest: &str, version: &str) -> MissionId {
+        MissionId {
+            version: self.word(version),
+            digest: self.word(digest),
+        }
+    }
+
+    fn place(&self) -> Placement {
+        Placement::on_line(self.real("x_m"), self.real("altitude_m"))
+    }
+}
+
+/// Returns the crate's message.
+pub(crate) fn message(said: &Said) -> Message {
+    let fields = said.fields();
+    let of = Of(&fields);
+    match said.name() {
+        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
+        "Verdict" => Message::Verdict(Answer {
+            number: of.word("number"),
+            mission: of.word("view"),
+            verdict: Verdict {
+                commit: of.has("commit").then(|| of.byte("commit")),
+                slacks: of.targets("slack_m"),
+            },
+            stand: of.has("stand_m").then(|| of.real("stand_m")),
+            own: of.flag("own", 0),
+        }),
+        "Busy" => Message::Busy {
+            sweep: of.word("number"),
+        },
+        "Heartbeat" => Message::Heartbeat {
+            mission: of.word("mission"),
+            ask: of.word("ask"),
+            answer: of.word("answer"),
+        },
+        "Gather" => Message::Gather(roster(&of)),
+        "Gathered" => Message::Gathered(roster(&of)),
+        "Token" => Message::Token(Token {
+            number: of.word("number"),
+            mission: of.word("view"),
+            place: of.place(),
+            power_w: of.real("power_w"),
+            turn: match (of.byte("turn"), of.byte("columns")) {
+                (0, _) => AdjustStep::Look,
+                (1, _) => AdjustStep::Stop,
+                (_, columns) => AdjustStep::Move {
+                    explore_m: of.real("explore_m"),
+                    local: match of.byte("rows") {
+                        0 => Local::Fine,
+                        rows => Local::Grid { columns, rows },
+                    },
+                },
+            },
+            sir: of.real("sir"),
+        }),
+        "Moved" => Message::Moved(Moved {
+            number: of.word("number"),
+            mission: of.word("view"),
+            place: of.place(),
+            any: of.flag("moved", 0),
+            worst: of.real("worst_sir"),
+        }),
+        "Hello" => Message::Hello(hello(&of)),
+        "Proposal" | "Decision" => vote(said.name(), &of),
+        "Fence" => Message::Fence {
+            mission: of.word("line"),
+            fence: Fence {
+                association: of.word("association"),
+                echo: of.word("echo"),
+                number: of.word("fence"),
+                x_m: of.real("x_m"),
+                target_m: of.real("target_m"),
+                across: CrossSection {
+                    y_m: of.real("y_m"),
+                    altitude_m: of.real("altitude_m"),
+                },
+                apart_m: of.real("apart_m"),
+                flags: of.byte("flags"),
+            },
+        },
+        "Offer" => Message::Offer {
+            upload: upload(said, &of),
+            answer: of.word("answer"),
+        },
+        "Pulse" => Message::Pulse(Pulse {
+            number: of.word("number"),
+            mission: of.word("view"),
+            lease: of.word("lease_ds"),
+        }),
+        "Pulsed" => Message::Pulsed(Pulsed {
+            number: of.word("number"),
+            mission: of.word("view"),
+            done: of.flag("done", 0),
+        }),
+        "Sense" | "Sensed" => sense(said, &of),
+        "Level" => Message::Level {
+            mission: of.word("mission"),
+            power_w: of.real("power_w"),
+        },
+        "Claim" => Message::Claim(Claim {
+            number: of.long("claim"),
+            heard: of.long("other_claim"),
+            passive: of.flag("flags", 0),
+            echo: of.flag("flags", 1),
+        }),
+        other => panic!("{other}"),
+    }
+}
+
+fn sweep(name: &str, of: &Of<'_>) -> Sweep {
+    let anchor = of.real("anchor");
+    let ladder = Ladder::from_parts(anchor.abs(), of.byte("gap"), of.byte("growth")).unwrap();
+    let chosen = name == "Aside";
+    Sweep {
+        number: of.word("number"),
+        mission: of.word("view"),
+        // The anchor is negative in a plain pass.
+        ladder: ladder.plainly(anchor < 0.0),
+        relay: Station {
+            at: CrossSection {
+                y_m: if chosen { of.real("y_m") } else { 0.0 },
+                altitude_m: of.real("altitude_m"),
+            },
+            power_w: of.real("power_w"),
+        },
+        chosen,
+        measured_per_w: (name == "Measured").then(|| of.real("upsilon_per_w")),
+        reaches: of.targets("reach_m"),
+    }
+}
+
+fn roster(of: &Of<'_>) -> Roster {
+    let Some(Value::List(seats)) = of.0.get("seats") else {
+        panic!("no seats");
+    };
+    let seat = |seat: &Value<'static>| match seat {
+        Value::Group(fields) => OwnSeat {
+            index: Of(fields).word("relay"),
+            held_m: Of(fields).real("altitude_m"),
+            power_w: Of(fields).real("power_w"),
+        },
+        other => panic!("{other:?}"),
+    };
+    Roster {
+        number: of.word("number"),
+        mission: of.word("view"),
+        after: of.word("after"),
+        seats: seats.iter().map(seat).collect(),
+    }
+}
+
+fn hello(of: &Of<'_>) -> Hello {
+    Hello {
+        mission: of.word("mission"),
+        newest: of.id("newest_view"),
+        neighbour: of.word("neighbour"),
+        behind: of.word("behind"),
+        hears: of.byte("hears"),
+        holds: of.mission_id("holds", "holds_version"),
+        nonce: of.word("offer_number"),
+        ask: of.flag("flags", 0),
+        form: of.flag("flags", 1),
+        fresh: of.flag("flags", 2),
+        ready: of.flag("flags", 3),
+        flies: of.flag("flags", 4),
+        whole: of.flag("flags", 5),
+        refused: of.flag("flags", 6),
+    }
+}
+
+fn vote(name: &str, of: &Of<'_>) -> Message {
+    let mission_id = of.mission_id("mission", "version");
+    let (view, place) = (of.id("proposed_view"), of.word("place"));
+    if name == "Decision" {
+        let accepted = of.group("accepted");
+        return Message::Decision(Decision {
+            mission_id,
+            proposal: view,
+            place,
+            there: of.word("there"),
+            base: of.view("base_view", "base_relays"),
+            view: accepted.map(|of| of.view("view", "relays")),
+            lease_left: of.word("lease_left_ds"),
+        });
+    }
+    let successor = of.group("successor");
+    Message::Proposal(Proposal {
+        mission_id,
+        view,
+        place,
+        poll: Poll {
+            agreed: of.view("agreed_view", "agreed_relays"),
+            votes: of.word("votes"),
+            proposer: of.flag("proposer", 0),
+            lease_left: of.word("lease_left_ds"),
+            rest: of.word("rest_ds"),
+            successor: successor.map(|of| Successor {
+                proposal: of.id("proposal"),
+                view: of.view("view", "relays"),
+            }),
+        },
+    })
+}
+
+/// Decodes the upload by the crate, because only the crate can construct it, and checks each number.
+fn upload(said: &Said, of: &Of<'_>) -> Upload {
+    let upload = Upload::decode(&offer::kept(said)).unwrap();
+    let config = upload.config();
+    let band = |least, most| Band {
+        least_m: of.real(least),
+        most_m: of.real(most),
+    };
+    assert_eq!(
+        (upload.version(), upload.base(), config.relays),
+        (of.word("version"), of.word("base"), of.word("relays"))
+    );
+    let common = Profile {
+        altitude_m: of.real("altitude_m"),
+        power_w: of.real("power_w"),
+    };
+    assert_eq!(config.common, common);
+    let numbers = [
+        ("distance_m", config.distance_m),
+        ("min_separation_m", config.min_separation_m),
+        ("tx_power_w", config.tx_power_w),
+        ("tolerance", config.tolerance),
+        ("noise_w", config.noise_w),
+    ];
+    for (name, number) in numbers {
+        assert_eq!(number, of.real(name), "{name}");
+    }
+    let interferer = Interferer {
+        power_w: of.real("interferer_power_w"),
+        x_m: of.real("interferer_x_m"),
+        y_m: of.real("interferer_y_m"),
+    };
+    let interference = if interferer.power_w == 0.0 {
+        Interference::Unknown
+    } else {
+        Interference::Source(interferer)
+    };
+    assert_eq!(config.interference, interference);
+    let channel = config.channel;
+    let factors = [channel.mu_los(), channel.mu_nlos(), channel.eta()];
+    assert_eq!(
+        factors,
+        ["mu_los", "mu_nlos", "eta"].map(|name| number(of.0, name))
+    );
+    assert_eq!(config.band, band("altitude_min_m", "altitude_max_m"));
+    assert_eq!(config.lateral, band("lateral_min_m", "lateral_max_m"));
+    let sites = upload.sites().map_or([0; 6], |Sites { tx, rx }| {
+        let six = [tx, rx].map(|at| [at.lat_e7, at.lon_e7, at.amsl_mm]);
+        six.as_flattened().try_into().unwrap()
+    });
+    assert_eq!(sites, offer::SITES.map(|name| number(of.0, name) as i32));
+    assert_eq!(
+        (upload.id().digest, upload.id().version),
+        offer::mission_id(said)
+    );
+    upload
+}
+
+/// Decodes measurements by the crate, because only relays can add sums, and checks each number.
+fn sense(said: &Said, of: &Of<'_>) -> Message {
+    let message = Message::decode(said.body()).unwrap();
+    let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {
+        panic!("{message:?}");
+    };
+    let belief = match of.byte("belief") {
+        0 => Belief::Mission,
+        1 => Belief::Unknown(Spread::Even),
+        2 => Belief::Unknown(Spread::TowardTx),
+        3 => Belief::Unknown(Spread::TowardRx),
+        _ => Belief::Source {
+            source: Interferer {
+                power_w: of.real("source_power_w"),
+                x_m: of.real("source_x_m"),
+                y_m: of.real("source_y_m"),
+            },
+            receiver_w: of.real("source_at_rx_w"),
+        },
+    };
+    let ends = ["sum_vv", "places", "measurements", "age_s"].map(|name| of.real(name));
+    let lists = ["sum_ab", "sum_av"].map(|name| list(of.0, name));
+    let numbers: Vec<f32> = lists.concat().into_iter().chain(ends).collect();
+    let Heard {
+        number,
+        mission,
+        told,
+        sums,
+        receiver,
+        off,
+    } = heard;
+    assert_eq!(*number, of.word("number"));
+    assert_eq!(*mission, of.word("view"));
+    let number = of.word("belief_number");
+    assert_eq!(*told, Told { number, belief });
+    // Only this shows that the sums are in order.
+    assert_eq!(
+        format!("{sums:?}"),
+        format!("Sums {{ numbers: {numbers:?} }}")
+    );
+    let level = [receiver.power_w, receiver.count];
+    assert_eq!(
+        level,
+        ["rx_power_w", "rx_measurements"].map(|name| of.real(name))
+    );
+    assert_eq!(*off, of.word("left_out"));
+    assert_eq!(matches!(message, Message::Sense(_)), said.is("Sense"));
+    message
+}
