@@ -25,7 +25,7 @@ proptest! {
 }
 
 #[test]
-fn numbers_reach_both_ends_of_their_range_and_beyond_the_bytes_there_are_zeros() {
+fn numbers_reach_both_ends_and_zeros_follow_the_bytes() {
     let (low, high) = (0.1_f32, 1e5_f32);
     assert_eq!(Input::new(&[0, 0]).scaled(low, high), low);
     assert_eq!(Input::new(&[255, 255]).scaled(low, high), high);

@@ -66,7 +66,7 @@ fn checked(signing: &mut Signing, now: Instant, bytes: &[u8]) -> Result<(), Flaw
 }
 
 #[test]
-fn pymavlink_takes_what_is_signed_here_once_and_with_its_own_key_alone() {
+fn pymavlink_accepts_our_signatures_once_and_with_its_key() {
     let mut ours = signing(KEY);
     let (mut input, mut stamps) = (String::new(), Vec::new());
     for (step, (_, _, bytes)) in (0..).zip(framed()) {
@@ -108,7 +108,7 @@ fn pymavlink_takes_what_is_signed_here_once_and_with_its_own_key_alone() {
 }
 
 #[test]
-fn what_pymavlink_signs_is_taken_once_and_with_its_own_key_alone() {
+fn pymavlinks_signatures_are_accepted_once_and_with_our_key() {
     let input: String = written().iter().map(|(line, _)| line.as_str()).collect();
     let stamp = STAMP.to_string();
     let frames = python::output(peer(), &["write", &hex(&KEY), &stamp, "9"], &input);
@@ -146,7 +146,7 @@ fn what_pymavlink_signs_is_taken_once_and_with_its_own_key_alone() {
 }
 
 #[test]
-fn a_stamp_is_judged_by_its_sender_and_link_and_the_first_by_the_time() {
+fn a_stamp_must_rise_for_each_sender_and_link() {
     let mut ours = signing(KEY);
     let frame = |from, link, stamp| signed(KEY, from, link, stamp);
     let behind = STAMP - MINUTE;

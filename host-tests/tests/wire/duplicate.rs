@@ -52,7 +52,7 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
 
 /// Checks claims. One that does not name the relay's own may be from before its start: it is only answered.
 #[test]
-fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
+fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     for (wiring, port) in PORTS {
         let (mut bench, _, own) = relay_4(wiring, port);
         bench.now = NOW + Duration::from_millis(200);
