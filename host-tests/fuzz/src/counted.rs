@@ -19,8 +19,9 @@ pub const fn intact(stats: &Stats, key: bool) -> u32 {
         + stats.replayed
 }
 
-/// Returns every counter, in the order of [`Stats`].
-pub const fn all(stats: &Stats) -> [u32; 23] {
+/// Returns every counter with its name, in the order of [`Stats`].
+pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
+    // Without a rest, so that the compiler asks for a new counter here.
     let Stats {
         sent,
         repeats,
@@ -47,28 +48,33 @@ pub const fn all(stats: &Stats) -> [u32; 23] {
         samples_refused,
     } = *stats;
     [
-        sent,
-        repeats,
-        sweeps,
-        received,
-        repeated,
-        overheard,
-        oversized,
-        truncated,
-        crc,
-        version,
-        handshakes,
-        unsigned,
-        forged,
-        replayed,
-        malformed,
-        foreign,
-        misaddressed,
-        misdirected,
-        mission,
-        view,
-        views,
-        stale,
-        samples_refused,
+        ("sent", sent),
+        ("repeats", repeats),
+        ("sweeps", sweeps),
+        ("received", received),
+        ("repeated", repeated),
+        ("overheard", overheard),
+        ("oversized", oversized),
+        ("truncated", truncated),
+        ("crc", crc),
+        ("version", version),
+        ("handshakes", handshakes),
+        ("unsigned", unsigned),
+        ("forged", forged),
+        ("replayed", replayed),
+        ("malformed", malformed),
+        ("foreign", foreign),
+        ("misaddressed", misaddressed),
+        ("misdirected", misdirected),
+        ("mission", mission),
+        ("view", view),
+        ("views", views),
+        ("stale", stale),
+        ("samples_refused", samples_refused),
     ]
+}
+
+/// Returns every counter, in the order of [`Stats`].
+pub fn all(stats: &Stats) -> [u32; 23] {
+    named(stats).map(|(_, count)| count)
 }

@@ -9,6 +9,7 @@ use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::{
     Duration, Event, Instant, Mission, MissionConfig, Port, Relay, Settings, Stats, Wiring,
 };
+use uav_relay_fuzz::counted::named;
 
 use super::said::{Said, plain_of, wire};
 
@@ -148,35 +149,44 @@ pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     wire(header, said.body())
 }
 
+/// Counters of which each received frame increments one.
+pub(crate) const OF_FRAMES: [&str; 9] = [
+    "received",
+    "overheard",
+    "oversized",
+    "truncated",
+    "crc",
+    "version",
+    "malformed",
+    "foreign",
+    "misaddressed",
+];
+
+/// Counters of received messages; those without a tag count only at a relay without a key.
+const OF_MESSAGES: [&str; 6] = [
+    "repeated",
+    "unsigned",
+    "misdirected",
+    "mission",
+    "view",
+    "stale",
+];
+
 /// Returns the counters of which each received frame increments one.
-pub(crate) fn of_frames(stats: &Stats) -> [(&'static str, u32); 9] {
-    [
-        ("crc", stats.crc),
-        ("foreign", stats.foreign),
-        ("malformed", stats.malformed),
-        ("misaddressed", stats.misaddressed),
-        ("overheard", stats.overheard),
-        ("oversized", stats.oversized),
-        ("received", stats.received),
-        ("truncated", stats.truncated),
-        ("version", stats.version),
-    ]
+pub(crate) fn of_frames(stats: &Stats) -> Vec<(&'static str, u32)> {
+    let mut all = named(stats).to_vec();
+    all.retain(|(name, _)| OF_FRAMES.contains(name));
+    all
 }
 
 /// Returns the names of the reception counters above zero.
 pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
-    let of_messages = [
-        ("misdirected", stats.misdirected),
-        ("mission", stats.mission),
-        ("repeated", stats.repeated),
-        ("stale", stats.stale),
-        // Messages at a relay without a key.
-        ("unsigned", stats.unsigned),
-        ("view", stats.view),
-    ];
-    let all = of_frames(stats).into_iter().chain(of_messages);
-    let mut names: Vec<&str> = all
-        .filter_map(|(name, count)| (count > 0).then_some(name))
+    let mut names: Vec<&str> = named(stats)
+        .into_iter()
+        .filter(|(name, count)| {
+            *count > 0 && (OF_FRAMES.contains(name) || OF_MESSAGES.contains(name))
+        })
+        .map(|(name, _)| name)
         .collect();
     names.sort_unstable();
     names
