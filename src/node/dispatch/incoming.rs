@@ -171,6 +171,10 @@ impl Node {
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
         let effects = match message {
+            // The relays that it leaves out may link at any moment; it is retransmitted.
+            Message::Proposal(proposal) if layers.is_premature(now, side, proposal) => {
+                Effects::STALE
+            }
             Message::Proposal(_) | Message::Decision(_) => layers.view.handle(&context, message),
             Message::Busy { sweep } if layers.view.on_busy(&context, *sweep) => Effects::NONE,
             // No pass continues during a view change.

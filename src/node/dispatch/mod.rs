@@ -32,7 +32,7 @@ use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
-use crate::wire::message::Claim;
+use crate::wire::message::{Claim, Proposal};
 
 mod hellos;
 mod incoming;
@@ -324,6 +324,12 @@ impl Layers {
             end: self.neighbours.at(onward).has_no_peer(),
             held: self.lease.held(now),
         }
+    }
+
+    /// Returns true if a proposal from `side` leaves relays out that may link at any moment: its sender was linked a moment ago.
+    pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
+        let place = self.view.counted().map_or(0, |(place, _)| place);
+        self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
     /// Schedules outstanding messages again: the next relay can be reached again.

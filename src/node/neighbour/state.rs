@@ -14,7 +14,8 @@
 //!
 //! *Better* is a nearer node that is heard by the node beyond it. A farther node is better if it leads to more relays than the
 //! neighbour, or to all relays that the last view had beyond the neighbour: then the link on the neighbour's other side is
-//! missing, and the neighbour is left out. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
+//! missing, and the neighbour is left out. One that the neighbour has replaced is selected again at once: it needs no further
+//! proof. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
 //! neither part of the chain could go on. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
 //!
 //! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, the selected one among
@@ -22,6 +23,7 @@
 //! for that time; of several nodes the nearest one counts. Links that were lost repeatedly are held down (see
 //! [`damping`](super::damping)). On wires, only questions are sent to a lost neighbour until it answers. A node that returns
 //! causes a request for a new view `probe_after` later, because the node on its other side may be about to select it, too.
+//! During this grace period, proposals from the returned node that would leave relays out are dropped, and retransmitted later.
 
 use super::damping::Damping;
 use super::hearing::Hellos;
@@ -60,6 +62,8 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Selected node at the time the links were given up; 0 for none.
     given_up: u16,
+    /// Farther node that the selected one has replaced; 0 for none.
+    replaced: u16,
     /// Start of the last search.
     searches_since: Instant,
     /// Distance to the selected node, in places.
@@ -103,6 +107,7 @@ impl Neighbour {
         liveness: Liveness::NONE,
         damping: Damping::new(Instant::ZERO),
         given_up: 0,
+        replaced: 0,
         searches_since: Instant::ZERO,
         distance: 0,
         both_ways: Hearing::new(Instant::ZERO),
@@ -391,7 +396,9 @@ impl Neighbour {
                 } else {
                     none
                 };
-                candidate.is_better() && self.damping.passes(distance, more, now, settings)
+                let is_known = node == self.replaced && !candidate.nearer;
+                candidate.is_better()
+                    && (is_known || self.damping.passes(distance, more, now, settings))
             }
         };
         if !takes {
@@ -402,6 +409,7 @@ impl Neighbour {
         }
         self.signs = Signs::NONE;
         self.given_up = 0;
+        self.replaced = if candidate.nearer { self.node } else { 0 };
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
