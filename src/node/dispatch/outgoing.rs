@@ -27,11 +27,11 @@ impl Node {
             return Some(message);
         }
         let mission = self.member.digest;
-        if let Some((side, to, ask, answer)) = self.layers.neighbours.take_heartbeat(now) {
+        if let Some((side, to, request, reply)) = self.layers.neighbours.poll_heartbeat(now) {
             let beat = Message::Heartbeat {
                 mission,
-                ask,
-                answer,
+                request,
+                reply,
             };
             return Some((side, to, beat));
         }
@@ -47,8 +47,15 @@ impl Node {
             }
         }
         let (side, to, fence) = self.steering.poll_transmit()?;
-        let mission = self.layers.update.line(&self.member);
-        Some((side, to, Message::Fence { mission, fence }))
+        let mission = self.layers.update.line_digest(&self.member);
+        Some((
+            side,
+            to,
+            Message::Fence {
+                line_digest: mission,
+                fence,
+            },
+        ))
     }
 
     /// Returns the next message of a view change, a lease renewal or a round.
@@ -65,42 +72,42 @@ impl Node {
         let layers = &mut self.layers;
         // A proposal waits while there is no next relay.
         if let Some((to, _)) = next
-            && let Some(message) = layers.view.take_onward(&context, to)
+            && let Some(message) = layers.view.poll_onward(&context, to)
         {
             let holds = layers.neighbours.at(onward).holds;
-            if layers.update.offer_to(holds).is_some() {
-                layers.update.offer(onward);
-                layers.update.begin_offers(onward);
+            if layers.update.offer_for(holds).is_some() {
+                layers.update.schedule_offer(onward);
+                layers.update.reset_offers(onward);
                 return self.next_offer(now, onward);
             }
             return Some((onward, to, message));
         }
         if let Some((to, _)) = before
-            && let Some(message) = layers.view.take_back()
+            && let Some(message) = layers.view.poll_back()
         {
             return Some((back, to, message));
         }
         let agreed = |peer: Option<(u16, bool)>| peer.is_some_and(|(_, agreed)| agreed);
-        if layers.view.awaited().is_none() {
+        if layers.view.outstanding().is_none() {
             if agreed(next)
-                && let Some(message) = layers.lease.take_onward(&context)
+                && let Some(message) = layers.lease.poll_onward(&context)
                 && let Some((to, _)) = next
             {
                 return Some((onward, to, message));
             }
             if agreed(before)
-                && let Some(message) = layers.lease.take_back(&context)
+                && let Some(message) = layers.lease.poll_back(&context)
                 && let Some((to, _)) = before
             {
                 return Some((back, to, message));
             }
         }
-        if let Some(message) = layers.round.take_onward(&context, agreed(next))
+        if let Some(message) = layers.round.poll_onward(&context, agreed(next))
             && let Some((to, _)) = next
         {
             return Some((onward, to, message));
         }
-        let message = layers.round.take_back(&context, agreed(before))?;
+        let message = layers.round.poll_back(&context, agreed(before))?;
         let (to, _) = before?;
         Some((back, to, message))
     }
@@ -109,7 +116,7 @@ impl Node {
 impl Node {
     /// Returns the agreed position, or without a quorum the one by `Settings::without_quorum`.
     fn wanted(&self) -> Option<Placement> {
-        let agreed = self.layers.round.setpoint()?;
+        let agreed = self.layers.round.agreed_place()?;
         Some(if self.layers.view.has_no_quorum() {
             self.member.settings.without_quorum.place(agreed)
         } else {
@@ -123,14 +130,14 @@ impl Node {
         }
     }
 
-    pub(crate) fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
-        self.steering.position(at, place);
+    pub(crate) fn handle_position(&mut self, now: Instant, measured_at: Instant, place: Placement) {
+        self.steering.handle_position(measured_at, place);
         self.steer(now);
     }
 
     /// Takes the control state of the drone: true while it flies to the setpoints. Returns true if the guard did not know it.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
-        let is_news = self.steering.control(now, flown);
+        let is_news = self.steering.handle_control(now, flown);
         if is_news {
             self.steer(now);
         }
@@ -150,8 +157,8 @@ impl Node {
         self.steer(now);
     }
 
-    pub(crate) const fn final_setpoint(&self) -> Option<Placement> {
-        self.layers.round.setpoint()
+    pub(crate) const fn agreed_place(&self) -> Option<Placement> {
+        self.layers.round.agreed_place()
     }
 
     /// Returns the current setpoint; `None` while the relay is passive.
@@ -186,14 +193,14 @@ impl Node {
         if solved && !self.is_solving(now) {
             self.solved(now);
         }
-        self.search_anew(now);
+        self.drop_links_if_expired(now);
         for side in [Side::Upstream, Side::Downstream] {
             if self.layers.neighbours.at(side).is_due(now) {
                 self.silence(now, side);
             }
         }
         if self.awaits_first() && self.is_solving(now) {
-            if self.layers.view.asking.is_due(now) {
+            if self.layers.view.request.is_due(now) {
                 self.await_first(now);
             }
         } else {
@@ -219,7 +226,7 @@ impl Node {
             self.layers.lease.next_timeout(),
             self.layers.round.next_timeout(),
             self.steering.next_timeout(),
-            self.adrift.next_timeout(),
+            self.no_quorum_timer.next_timeout(),
             self.layers.update.next_timeout(),
         ]
         .into_iter()
@@ -231,7 +238,7 @@ impl Node {
         let (solving, searches) = (self.is_solving(now), self.searches());
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
-        if solving && neighbour.excuse(now, settings) {
+        if solving && neighbour.excuse_silence(now, settings) {
             return;
         }
         let node = neighbour.node();
@@ -247,7 +254,7 @@ impl Node {
             self.raise_about(About::Lost, side, node);
         }
         if ends {
-            self.layers.view.asking.hasten(now);
+            self.layers.view.request.repeat_now(now);
         }
         self.review(now);
     }
@@ -255,10 +262,10 @@ impl Node {
     /// Requests a new view if the neighbours differ from those of the last decision.
     pub(super) fn review(&mut self, now: Instant) {
         if self.layers.neighbours.have_changed(now) {
-            self.layers.view.asking.ask(now);
+            self.layers.view.request.start(now);
         }
         if self.layers.neighbours.at(self.onward()).has_no_peer()
-            && self.layers.view.awaited().is_some()
+            && self.layers.view.outstanding().is_some()
         {
             // The next relay of the outstanding proposal is lost, so this relay is the last one and decides.
             let context = self.layers.context(now, &self.member);
@@ -278,7 +285,7 @@ impl Node {
     fn solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);
-            neighbour.excuse(now, &self.member.settings);
+            neighbour.excuse_silence(now, &self.member.settings);
         }
         if self.awaits_first() {
             self.await_first(now);
@@ -287,7 +294,7 @@ impl Node {
 
     /// Returns true if neither a pass has been received nor a view requested since the start.
     fn awaits_first(&self) -> bool {
-        self.layers.round.is_fresh() && !self.layers.view.asking.asks()
+        self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }
 
     /// Starts the timer for the first pass; when it expires, the relay requests a view.
@@ -296,6 +303,6 @@ impl Node {
         let there_and_back = settings.hop_time.times(2 * u32::from(all));
         let usual = now + settings.probe_after + there_and_back;
         let slow = now + first_pass(settings, all);
-        self.layers.view.asking.await_first(usual.max(slow));
+        self.layers.view.request.await_first(usual.max(slow));
     }
 }
