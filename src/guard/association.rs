@@ -23,7 +23,7 @@ const SEEN_REMINDERS: u8 = 15;
 
 /// Association that this relay has left, until the neighbour starts a new one.
 #[derive(Clone, Copy, Debug)]
-struct Parting {
+struct LeaveNotice {
     own: u16,
     heard: u16,
     due: bool,
@@ -48,19 +48,19 @@ pub(super) struct Association {
     pub(super) due: bool,
     /// True if the neighbour forwarded a request to open the chain; and the last such request sent to it.
     pub(super) opens: bool,
-    told_open: bool,
+    open_sent: bool,
     /// Reminders until the neighbour's halt request expires, 0 for none.
-    halt_left: u8,
+    halt_reminders_left: u8,
     /// True while a halt request is sent to the neighbour.
-    told_halt: bool,
+    halt_sent: bool,
     /// Number of the association that the neighbour has left, 0 for none. The neighbour is absent, that is not flown.
     absent: u16,
     /// Pending notice of the association that this relay has left.
-    parting: Option<Parting>,
+    leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, in any association, m; NaN before the first.
     seen_m: f32,
     /// Reminders until that x expires.
-    seen_left: u8,
+    seen_reminders_left: u8,
 }
 
 impl Association {
@@ -73,13 +73,13 @@ impl Association {
             strays: 0,
             due: true,
             opens: false,
-            told_open: false,
-            halt_left: 0,
-            told_halt: false,
+            open_sent: false,
+            halt_reminders_left: 0,
+            halt_sent: false,
             absent: 0,
-            parting: None,
+            leave_notice: None,
             seen_m: f32::NAN,
-            seen_left: 0,
+            seen_reminders_left: 0,
         }
     }
 
@@ -90,14 +90,14 @@ impl Association {
 
     /// Stores the x of a neighbour's message.
     pub(super) const fn record_x(&mut self, x_m: f32) {
-        (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
+        (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
     /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m. NaN if unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
-            _ if self.seen_left == 0 => f32::NAN,
+            _ if self.seen_reminders_left == 0 => f32::NAN,
             Side::Upstream => x_m - self.seen_m,
             Side::Downstream => self.seen_m - x_m,
         }
@@ -105,7 +105,7 @@ impl Association {
 
     /// Returns the neighbour's last x, m; NaN if it is unknown or expired.
     pub(super) const fn seen_m(&self) -> f32 {
-        if self.seen_left == 0 {
+        if self.seen_reminders_left == 0 {
             f32::NAN
         } else {
             self.seen_m
@@ -145,14 +145,14 @@ impl Association {
 
     /// Returns the next association after this relay has left this one. It has a notice if the neighbour relies on this one.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
-        let left = Parting {
+        let left = LeaveNotice {
             own: self.own,
             heard: self.heard,
             due: true,
         };
         Self {
-            parting: if self.heard == 0 {
-                self.parting
+            leave_notice: if self.heard == 0 {
+                self.leave_notice
             } else {
                 Some(left)
             },
@@ -163,7 +163,7 @@ impl Association {
     /// Returns the next association; a pending notice of an earlier one is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
-            parting: self.parting,
+            leave_notice: self.leave_notice,
             ..Self::new(self.node, jitter)
         }
     }
@@ -171,15 +171,15 @@ impl Association {
     /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. The notice is repeated
     /// until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
-        if let Some(parting) = &mut self.parting {
-            let left = fence.association == parting.heard;
+        if let Some(leave_notice) = &mut self.leave_notice {
+            let left = fence.association == leave_notice.heard;
             let is_new = fence.echo == 0 || fence.echo == self.own;
             if left && fence.has_flag(Fence::LEFT) || !left && is_new {
-                self.parting = None;
+                self.leave_notice = None;
             } else {
                 // The neighbour still relies on that association, or on an earlier one.
-                parting.heard = fence.association;
-                parting.due = true;
+                leave_notice.heard = fence.association;
+                leave_notice.due = true;
             }
             if left || !is_new {
                 return true;
@@ -190,18 +190,18 @@ impl Association {
 
     /// Schedules a pending notice again; returns true if there is one.
     pub(super) const fn remind(&mut self) -> bool {
-        if let Some(parting) = &mut self.parting {
-            parting.due = true;
+        if let Some(leave_notice) = &mut self.leave_notice {
+            leave_notice.due = true;
         }
-        self.parting.is_some()
+        self.leave_notice.is_some()
     }
 
     /// Returns the notice that this relay has left its association, if it is due.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
-        let parting = self.parting.as_mut()?;
-        core::mem::take(&mut parting.due).then(|| Fence {
+        let leave_notice = self.leave_notice.as_mut()?;
+        core::mem::take(&mut leave_notice.due).then(|| Fence {
             flags: Fence::LEFT,
-            ..Fence::without_place(parting.own, parting.heard)
+            ..Fence::without_place(leave_notice.own, leave_notice.heard)
         })
     }
 
@@ -224,9 +224,9 @@ impl Association {
             across: own.cross_section(),
             apart_m: 0.0,
             flags: u8::from(own.still) * Fence::ARRIVED
-                + u8::from(self.told_open) * Fence::REQUESTS_OPENING
+                + u8::from(self.open_sent) * Fence::REQUESTS_OPENING
                 + u8::from(self.opens) * Fence::OPENING_RECEIVED
-                + u8::from(self.told_halt) * Fence::HALTS,
+                + u8::from(self.halt_sent) * Fence::HALTS,
         }
     }
 
@@ -234,56 +234,56 @@ impl Association {
     /// request of this relay.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.opens = fence.has_flag(Fence::REQUESTS_OPENING);
-        self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.told_open;
+        self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
     /// Forwards a request to open the chain, or its end.
     pub(super) const fn forward_open(&mut self, opens: bool) {
-        self.due |= self.told_open != opens;
-        self.told_open = opens;
+        self.due |= self.open_sent != opens;
+        self.open_sent = opens;
     }
 
     /// Takes the halt request from any message of the neighbour. A request is only withdrawn by a relay that is in order on its
     /// other side (`is_placed`), because a rebooted one does not know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
-            self.halt_left = HALT_REMINDERS;
+            self.halt_reminders_left = HALT_REMINDERS;
         } else if is_placed {
-            self.halt_left = 0;
+            self.halt_reminders_left = 0;
         }
     }
 
     pub(super) const fn has_halt_request(&self) -> bool {
-        self.halt_left > 0
+        self.halt_reminders_left > 0
     }
 
     /// Forwards a halt request, or its end.
     pub(super) const fn forward_halt(&mut self, halts: bool) {
-        self.due |= self.told_halt != halts;
-        self.told_halt = halts;
+        self.due |= self.halt_sent != halts;
+        self.halt_sent = halts;
     }
 
     pub(super) const fn sends_halt(&self) -> bool {
-        self.told_halt
+        self.halt_sent
     }
 
     /// Counts a reminder. A received halt request or position expires unless it is repeated within some reminders.
     pub(super) const fn count_reminder(&mut self) {
-        self.halt_left = self.halt_left.saturating_sub(1);
-        self.seen_left = self.seen_left.saturating_sub(1);
+        self.halt_reminders_left = self.halt_reminders_left.saturating_sub(1);
+        self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
     /// Returns the message of a relay without an association: one that is not flown or has just started.
     ///
     /// It contains the relay's position, and a halt request to forward.
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
-        let is_due = self.due && self.node != 0 && self.parting.is_none();
+        let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
         self.due = false;
         Some(Fence {
             x_m: place.x_m,
             across: place.cross_section(),
-            flags: Fence::LEFT | Fence::UNPLACED | (u8::from(self.told_halt) * Fence::HALTS),
+            flags: Fence::LEFT | Fence::UNPLACED | (u8::from(self.halt_sent) * Fence::HALTS),
             ..Fence::without_place(self.own, 0)
         })
     }

@@ -122,7 +122,7 @@ impl ReachableInterval {
 }
 
 /// Reminders, one per second, after which a setpoint short of the agreed position is reported.
-const MOST_STANDS: u8 = 5;
+const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
@@ -207,7 +207,7 @@ impl Own {
             Side::Downstream => target.x_m - setpoint.x_m,
         };
         let wants = ahead_m > self.config.rounding() || !clear && !self.has_agreed_cross_section();
-        self.stands >= MOST_STANDS && wants
+        self.stands >= MAX_REMINDERS_STILL && wants
     }
 
     /// Returns true if the relay, while not flown, was reported away from the position that it has sent.

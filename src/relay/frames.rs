@@ -105,16 +105,16 @@ fn receive_signed(
     match checked {
         Checked::Fresh { first } => {
             node.on_key_match(side, sender);
-            node.meet(side, sender, first);
+            node.on_authentic(side, sender, first);
             decode(node, now, side, frame);
         }
         Checked::Handshake { first } => {
             node.on_key_match(side, sender);
-            node.meet(side, sender, first);
+            node.on_authentic(side, sender, first);
         }
-        Checked::Unproven => node.called(side, sender),
+        Checked::Unproven => node.on_handshake(side, sender),
         // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.
-        Checked::Forged if frame.handshake => node.is_forged(side, sender),
+        Checked::Forged if frame.handshake => node.on_forged(side, sender),
         Checked::WentBack => node.on_epoch_went_back(side, sender),
         Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
     }

@@ -175,7 +175,7 @@ impl Node {
             if hello.refused {
                 self.on_refused(side, hello.latest_mission);
             } else {
-                self.compare(side, from, hello.latest_mission);
+                self.compare_missions(side, from, hello.latest_mission);
             }
             self.layers.neighbours.at_mut(side).holds = Some(hello.latest_mission);
             if self.searches() {
@@ -183,7 +183,7 @@ impl Node {
                 // A few lost frames do not end a link; the neighbour's silence has its own timer.
                 let linked = self.layers.neighbours.at(side).is_mutual();
                 let mutual = hello.neighbour == own && (two_way || linked);
-                self.told(now, side, mutual);
+                self.on_mutual(now, side, mutual);
             }
             let waits = self.layers.view.outstanding().is_some();
             // A neighbour with a newer mission joins no view without it, so a view is requested when this relay has that mission.
@@ -201,9 +201,9 @@ impl Node {
                 }
             }
         } else if self.searches() {
-            self.consider(now, side, from, hello);
+            self.consider_candidate(now, side, from, hello);
         }
-        self.review(now);
+        self.review_neighbours(now);
     }
 
     /// Records whether node `from` receives this relay, and reports the node if it repeatedly does not.
@@ -220,7 +220,7 @@ impl Node {
     }
 
     /// Considers node `from` at `side` as the new neighbour there; one-way links are ignored.
-    fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
+    fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.beyond(side);
         let (layers, settings) = (&mut self.layers, &self.member.settings);
@@ -256,12 +256,12 @@ impl Node {
                 self.raise_about(About::Back, side, from);
             }
             self.schedule_hello(side, from, true);
-            self.told(now, side, pairs);
+            self.on_mutual(now, side, pairs);
         }
     }
 
     /// Handles the neighbour's report whether it uses this relay as its neighbour (`mutual`).
-    pub(super) fn told(&mut self, now: Instant, side: Side, mutual: bool) {
+    pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;
         }

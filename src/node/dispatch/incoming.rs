@@ -1,18 +1,16 @@
 //! Received messages: which are accepted, on which side their sender is, and which layer handles each.
 
 use super::Node;
-use crate::event::{About, Event};
-use crate::mission::{Heading, Mission};
-use crate::node::context::{Effects, ProposalOutcome};
-use crate::node::duplicate::{Duplicated, Sender};
+use crate::event::About;
+use crate::node::context::Effects;
+use crate::node::duplicate::Duplicated;
 use crate::node::mission_update::accepts_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
-use crate::settings::{Method, Wiring};
+use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::bump;
-use crate::time::{Duration, Instant};
-use crate::wire::digest::MissionId;
-use crate::wire::message::{Claim, Message};
+use crate::time::Instant;
+use crate::wire::message::Message;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
@@ -68,7 +66,7 @@ impl Node {
         }
         if self.searches() {
             // Such a message is sent only to a neighbour, so the sender uses this relay as one.
-            self.told(now, side, true);
+            self.on_mutual(now, side, true);
         }
         if !self.is_of_this_view(now, side, from, message) {
             return true;
@@ -211,7 +209,7 @@ impl Node {
 
 impl Node {
     /// Handles an authentic frame of node `from` at `side`; after the `first` one, messages are sent again.
-    pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {
+    pub(crate) fn on_authentic(&mut self, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
         }
@@ -228,7 +226,7 @@ impl Node {
     }
 
     /// Handles a handshake of node `from` at `side` that does not prove that this relay is received.
-    pub(crate) fn called(&mut self, side: Side, from: u16) {
+    pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {
             self.record_reception(side, from, false);
@@ -236,7 +234,7 @@ impl Node {
     }
 
     /// Handles a handshake under the number of node `from` at `side` with a wrong tag.
-    pub(crate) fn is_forged(&mut self, side: Side, from: u16) {
+    pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self
             .layers
@@ -319,232 +317,6 @@ impl Node {
                 .should_report(now, Duplicated::Neighbour, &settings)
         {
             self.raise_about(About::Index, side, from);
-        }
-    }
-}
-
-impl Node {
-    /// Handles the decision on a proposal: on acceptance, starts the new view with its mission.
-    pub(super) fn decided(&mut self, now: Instant, decided: ProposalOutcome) {
-        let Some(proposed) = self.layers.view.proposed() else {
-            return;
-        };
-        let (place, id) = (proposed.place, proposed.mission_id);
-        let leads = place == 1;
-        let (relays, usable_in) = match decided {
-            ProposalOutcome::Granted { relays, usable_in } => (relays, usable_in),
-            ProposalOutcome::Superseded => {
-                if leads {
-                    self.layers.view.request.start(now);
-                }
-                return;
-            }
-            ProposalOutcome::NoQuorum => {
-                if !core::mem::replace(&mut self.telemetry.no_quorum_reported, true) {
-                    self.raise(Event::NoQuorum);
-                }
-                return self.layers.neighbours.refuse();
-            }
-        };
-        let mission = self.layers.update.mission_of(&self.member, id);
-        let mission = mission.and_then(|mission| mission.with_relays(relays).ok());
-        let Some(mission) = mission else {
-            return self.layers.view.request.start(now);
-        };
-        let before = self.member.mission.relays();
-        self.member.index = match mission.heading() {
-            Heading::TowardRx => place,
-            Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
-        };
-        self.member.view = proposed.view;
-        self.fly(now, mission, id);
-        self.layers.view.observe_view(proposed.view);
-        let (back, onward) = (self.back(), self.onward());
-        self.layers.neighbours.at_mut(back).agree_with_proposer();
-        self.layers.neighbours.at_mut(onward).agree(place == relays);
-        let works = self.member.settings.method == Method::Joint;
-        let rest = now + Duration::from_millis(100).times(u32::from(usable_in));
-        let views = (proposed.view, proposed.base.id);
-        self.layers
-            .lease
-            .accept_view(now, views, rest, relays < before);
-        if leads {
-            self.layers.lease.confirm_view();
-        }
-        self.layers.round.renew(rest, leads, works);
-        bump(&mut self.telemetry.stats.views);
-        self.telemetry.lapse_reported = false;
-        self.telemetry.no_quorum_reported = false;
-        self.raise(Event::ViewAccepted);
-        if id != self.layers.update.latest() {
-            // A newer mission has arrived in the meantime.
-            self.layers.view.request.start(now);
-        }
-    }
-
-    /// Sets the mission of the new view, which has the identifier `id`.
-    fn fly(&mut self, now: Instant, mission: Mission, id: MissionId) {
-        if id == self.member.active {
-            // The number of relays may have changed.
-            self.member.mission = mission;
-            return;
-        }
-        self.adopt(mission, id, Some(now));
-        self.raise(Event::Adopted);
-    }
-
-    /// Replaces the active mission by the stored one, `mission`, at time `now`, or after a start if `None`.
-    ///
-    /// With other sites all positions are void: there is no setpoint until the next agreement, and the guard starts again.
-    pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
-        self.member.mission = mission;
-        self.member.interference = *mission.interference();
-        self.member.active = id;
-        if UPLOAD {
-            if self.layers.update.use_sites() {
-                self.layers.round.discard_agreed_place();
-                self.steering.switch_line(now);
-            }
-            let fence = self.layers.update.geofence(&self.member);
-            self.steering.set_geofence(fence);
-        }
-        let common = mission.config().common;
-        let profile = self.member.settings.profile.unwrap_or(common);
-        self.layers.round.load(profile);
-    }
-}
-
-impl Node {
-    pub(crate) fn on_duplicate_index(&mut self, now: Instant, sender: Sender) {
-        let settings = self.member.settings;
-        let shown = match sender {
-            Sender::Itself => false,
-            // Without signatures the frame may be this relay's own, which only a claim can tell.
-            Sender::Unknown => settings.auth.is_some(),
-            Sender::Rival(rival) => rival.is_current,
-        };
-        if shown
-            && self
-                .duplicate
-                .should_report(now, Duplicated::Own, &settings)
-        {
-            let node = self.member.node;
-            self.raise_about(About::Index, Side::Upstream, node);
-            if let Sender::Rival(rival) = sender
-                && rival.newer_epoch
-            {
-                // The other node may be this relay itself, before its epoch went back.
-                self.raise_about(About::Epoch, Side::Upstream, node);
-            }
-        }
-        let placed = self.setpoint().is_some();
-        // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
-        let lease = &self.layers.lease;
-        let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
-        let has_lease = placed && leased;
-        if self
-            .duplicate
-            .handle_frame(now, sender, has_lease, &settings)
-        {
-            self.layers.round.discard_agreed_place();
-            if placed {
-                self.raise(Event::SetpointChanged);
-            }
-        }
-    }
-
-    /// Repeats a claim to its sender, or compares an echo; returns false if signed frames replace claims.
-    pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
-        if self.member.settings.auth.is_some() {
-            return false;
-        }
-        if claim.echo {
-            let sender = self.duplicate.rival(claim);
-            if sender != Sender::Itself {
-                self.on_duplicate_index(now, sender);
-            }
-        } else if !self.is_passive() {
-            let claim = Claim {
-                echo: true,
-                ..claim
-            };
-            self.echo = Some((side, from, claim));
-        }
-        true
-    }
-
-    pub(super) fn next_claim(&mut self) -> Option<(Side, u16, Message)> {
-        if let Some((side, to, claim)) = self.echo.take() {
-            return Some((side, to, Message::Claim(claim)));
-        }
-        let (side, to) = self.poll_claim()?;
-        let claim = Claim {
-            number: self.duplicate.number(),
-            other_number: self.duplicate.other_number(),
-            passive: self.is_passive(),
-            echo: false,
-        };
-        Some((side, to, Message::Claim(claim)))
-    }
-
-    /// Returns the destination of a due claim, and marks it as sent.
-    ///
-    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
-    pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
-        if !self.duplicate.poll_claim() {
-            return None;
-        }
-        let side = self.claim_side;
-        self.claim_side = side.other();
-        let nodes = [side, side.other()].map(|side| (side, self.layers.neighbours.at(side).node()));
-        let neighbour = nodes.into_iter().find(|(_, node)| *node != 0);
-        neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
-    }
-
-    /// Returns the claim number if all sessions must be started again with it.
-    pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
-        self.duplicate.poll_sessions()
-    }
-
-    pub(crate) const fn claim_number(&self) -> u32 {
-        self.duplicate.number()
-    }
-
-    /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
-    ///
-    /// Another relay with this number then detects this one even if the chain sends nothing else.
-    pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
-        let once = match message {
-            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
-            Message::Pulsed(pulsed) => pulsed.done,
-            _ => false,
-        };
-        once && self.member.settings.wiring == Wiring::Shared
-    }
-
-    pub(crate) fn rival(&self, claim: Claim) -> Sender {
-        self.duplicate.rival(claim)
-    }
-
-    /// Returns true while this relay is passive, because another one has its number.
-    pub(crate) const fn is_passive(&self) -> bool {
-        self.duplicate.is_passive()
-    }
-
-    /// Handles the report that the other relay with this number has been removed.
-    pub(crate) fn clear_duplicate(&mut self, now: Instant) {
-        if self.duplicate.clear(now, &self.member.settings) {
-            self.become_active(now);
-        }
-    }
-
-    /// Becomes active as after a restart: view, lease and proposal may be those of the other node by now.
-    pub(super) fn become_active(&mut self, now: Instant) {
-        self.layers.neighbours.leave();
-        self.layers.lease.end();
-        if !self.layers.round.is_fresh() {
-            self.layers.round.suspend();
-            self.layers.view.leave(now);
         }
     }
 }

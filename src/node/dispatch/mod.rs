@@ -5,8 +5,12 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `incoming` | received messages: checks, choice of the layer, decisions on views, results of handshakes, claims to this node's number |
-//! | `outgoing` | next message, expired timers, and setpoint |
+//! | `incoming` | received messages: checks, side of the sender, choice of the layer; results of handshakes |
+//! | `outgoing` | next message, in order of urgency |
+//! | `timers` | expired timers of all layers |
+//! | `setpoint` | setpoint, and reports of the drone |
+//! | `adoption` | adoption of a decided view and its mission |
+//! | `claims` | claims to this node's number |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
 //!
@@ -34,10 +38,14 @@ use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 use crate::wire::message::Claim;
 
+mod adoption;
+mod claims;
 mod hellos;
 mod incoming;
 mod offers;
 mod outgoing;
+mod setpoint;
+mod timers;
 
 #[cfg(feature = "upload")]
 #[cfg(test)]
@@ -175,8 +183,8 @@ impl Node {
                 self.schedule_hello(back, to, true);
             }
             Some(LayerEvent::ProposalDecided(decided)) => {
-                self.decided(now, decided);
-                self.drift(now);
+                self.adopt_view(now, decided);
+                self.update_no_quorum_timer(now);
             }
             Some(LayerEvent::Converged) => {
                 self.raise(Event::Converged);
@@ -188,7 +196,7 @@ impl Node {
         }
         let sensed = effects.sensed;
         if cfg!(feature = "sensing") && sensed.new_estimate {
-            self.believe();
+            self.apply_estimate();
         }
         if sensed.unclear {
             self.raise(Event::InterfererUnclear);
@@ -199,7 +207,7 @@ impl Node {
     }
 
     /// Bases the active mission on the new interference estimate.
-    fn believe(&mut self) {
+    fn apply_estimate(&mut self) {
         let told = self.layers.round.sensing().estimate();
         let Member {
             mission,
@@ -369,7 +377,7 @@ impl NoQuorumTimer {
 
 impl Node {
     /// Starts the timer if this part of the chain has no quorum, and stops it otherwise.
-    pub(super) fn drift(&mut self, now: Instant) {
+    pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.no_quorum_timer = NoQuorumTimer::NONE;
         } else if self.no_quorum_timer.at.is_none() {

@@ -32,7 +32,7 @@ impl Node {
                 offer_number,
             } => {
                 if self.is_asked(now, *offer_number) {
-                    self.hold(now, upload);
+                    self.store_upload(now, upload);
                 }
                 self.layers.update.answer_ground(side, true, None);
             }
@@ -80,7 +80,7 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is the number of a recent hello; otherwise it counts the offer as stale.
+    /// Returns true if `offer_number` is that of a recent hello; otherwise counts the offer as stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -115,7 +115,7 @@ impl Node {
         if neighbour.node() == from {
             neighbour.holds = neighbour.holds.max(Some(id));
         }
-        self.hold(now, upload);
+        self.store_upload(now, upload);
         let refused = self.layers.update.refused_mission(self.member.active);
         if self.layers.update.latest() >= id || refused == Some(id) {
             self.schedule_hello(side, from, false);
@@ -123,9 +123,9 @@ impl Node {
     }
 
     /// Stores `upload` if it is newer. One without a valid line on earth, or beyond the geofence, is counted and reported once.
-    fn hold(&mut self, now: Instant, upload: &Upload) {
+    fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
-            Offered::Held => self.held(now),
+            Offered::Held => self.on_stored(now),
             Offered::Refused { why, is_new } => {
                 bump(&mut self.telemetry.stats.mission);
                 if is_new {
@@ -137,7 +137,7 @@ impl Node {
     }
 
     /// Reports a newer mission, offers it to the neighbours, and requests a view.
-    fn held(&mut self, now: Instant) {
+    fn on_stored(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
         // The leader needs the mission to propose it, and the other relays before the proposal reaches them.
         for side in [Side::Upstream, Side::Downstream] {
@@ -153,7 +153,7 @@ impl Node {
         upload: &Upload,
     ) -> Result<(), UploadError> {
         self.layers.update.accept_upload(&self.member, upload)?;
-        self.held(now);
+        self.on_stored(now);
         Ok(())
     }
 
@@ -186,7 +186,7 @@ impl Node {
     }
 
     /// Schedules a hello or an offer to the neighbour `from` at `side`, by the mission that it `holds`.
-    pub(super) fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
+    pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
         }

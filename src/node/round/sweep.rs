@@ -101,7 +101,7 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the known verdict: sets the agreed position if a target is committed, else continues the search.
+    /// Handles the known verdict: agrees on the position of a committed target, else continues the search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;

@@ -117,7 +117,7 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest of the sender's mission, view or line; `None` for [`Message::Busy`] and [`Message::Claim`].
+    /// Returns the digest of the sender's mission, view or line; `None` for a message without one.
     pub const fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
