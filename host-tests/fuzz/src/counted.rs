@@ -24,7 +24,7 @@ pub const fn all(stats: &Stats) -> [u32; 23] {
     let Stats {
         sent,
         repeats,
-        sweeps,
+        passes_begun: sweeps,
         received,
         repeated,
         overheard,
@@ -44,7 +44,7 @@ pub const fn all(stats: &Stats) -> [u32; 23] {
         view,
         views,
         stale,
-        samples_refused,
+        samples_rejected,
     } = *stats;
     [
         sent,
@@ -69,6 +69,6 @@ pub const fn all(stats: &Stats) -> [u32; 23] {
         view,
         views,
         stale,
-        samples_refused,
+        samples_rejected,
     ]
 }

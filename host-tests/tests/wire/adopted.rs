@@ -48,7 +48,7 @@ fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
     assert_eq!((relay.version(), relay.view().number()), (2, 1));
     assert_eq!(digest(relay.mission()), newer.digest());
     let told = events(&mut relay);
-    assert_eq!(told, [Event::Reformed, Event::Uploaded, Event::Adopted]);
+    assert_eq!(told, [Event::ViewAccepted, Event::Uploaded, Event::Adopted]);
     assert_eq!(relay.stats().rejected(), 0);
     let mark = mark(relay.view().bits());
     let own = newer.digest().wrapping_add(mark);
@@ -74,8 +74,8 @@ fn a_view_that_is_granted_flies_the_mission_of_its_proposal() {
         let mut after = relay.clone();
         let beat = Said::Heartbeat {
             mission,
-            ask: 0,
-            answer: 0,
+            request: 0,
+            reply: 0,
         };
         peers[0].clone().says(&mut after, NOW, &beat);
         assert_eq!(after.stats().mission, expected);
@@ -112,9 +112,9 @@ fn a_count_of_the_mission_flown_is_taken_though_a_newer_one_is_held_and_of_an_ol
                 mission: base,
                 neighbour: 3,
                 behind: 5,
-                newest: id(2, 1),
-                holds: (next.digest(), 3),
-                nonce: 0,
+                latest_view: id(2, 1),
+                latest_mission: (next.digest(), 3),
+                offer_number: 0,
                 hears: 1,
                 flags: ASKS | FORMS,
             };
@@ -137,7 +137,7 @@ fn in_a_field_nothing_is_held() {
     // The mission and the base happen to have the same digest.
     let number = peer.clone().number(relay.clone(), NOW);
     let offer = Offer {
-        answer: number,
+        offer_number: number,
         ..upload(1, digest(&mission))
     };
     peer.says_as_it_is(&mut relay, NOW, &Said::Offer(offer));
@@ -203,7 +203,10 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
         (first ^ 0x4000, 0, false),
     ] {
         let mut after_it = relay.clone();
-        let offer = Said::Offer(Offer { answer, ..newer });
+        let offer = Said::Offer(Offer {
+            offer_number: answer,
+            ..newer
+        });
         peers[0]
             .clone()
             .says_as_it_is(&mut after_it, after(ms), &offer);
@@ -224,7 +227,7 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
         said(&mut later, after(ms));
         let mut after_it = later.clone();
         let offer = Said::Offer(Offer {
-            answer: first,
+            offer_number: first,
             ..newer
         });
         peers[1]
@@ -239,10 +242,13 @@ fn an_offer_that_does_not_answer_a_hello_of_late_is_stale() {
         panic!("a hello");
     };
     let nonce = 0xABCD;
-    let asks = Said::Hello(Greeting { nonce, ..greeting });
+    let asks = Said::Hello(Greeting {
+        offer_number: nonce,
+        ..greeting
+    });
     peers[1].clone().says(&mut told, NOW, &asks);
     let answers = Offer {
-        answer: nonce,
+        offer_number: nonce,
         ..newer
     };
     assert_eq!(said(&mut told, NOW), [(5, Said::Offer(answers))]);

@@ -48,7 +48,7 @@ fn tamed(said: Said) -> Said {
         }
         Said::Verdict(Judged {
             number,
-            mission,
+            view_digest: mission,
             own,
             mut slacks,
             stand,
@@ -60,7 +60,7 @@ fn tamed(said: Said) -> Said {
             }
             Said::Verdict(Judged {
                 number,
-                mission,
+                view_digest: mission,
                 own,
                 commit: (!slacks.is_empty()).then_some(0),
                 slacks,

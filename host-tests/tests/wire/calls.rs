@@ -77,11 +77,16 @@ fn a_leader_whose_part_is_cut_off_holds_and_proposes_again_and_again() {
             let out = sent(&mut head, now);
             // Its neighbour answers; alone the leader would propose nothing.
             for (port, said) in &out {
-                if let Said::Heartbeat { mission, ask, .. } = said {
+                if let Said::Heartbeat {
+                    mission,
+                    request: ask,
+                    ..
+                } = said
+                {
                     let answer = Said::Heartbeat {
                         mission: *mission,
-                        ask: 0,
-                        answer: *ask,
+                        request: 0,
+                        reply: *ask,
                     };
                     head.handle_bytes(now, *port, &framed(1, *port, &answer));
                 }

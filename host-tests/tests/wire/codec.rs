@@ -52,8 +52,8 @@ pub(crate) enum Said {
     Heartbeat {
         mission: u16,
         /// Number of the sender's request, and of the answered request; 0 for none.
-        ask: u16,
-        answer: u16,
+        request: u16,
+        reply: u16,
     },
     Measured {
         #[serde(flatten)]
@@ -76,15 +76,13 @@ pub(crate) enum Said {
     Offer(Offer),
     Pulse {
         number: u16,
-        #[serde(rename = "view")]
-        mission: u16,
+        view_digest: u16,
         #[serde(rename = "lease_ds")]
         lease: u16,
     },
     Pulsed {
         number: u16,
-        #[serde(rename = "view")]
-        mission: u16,
+        view_digest: u16,
         done: bool,
     },
     Sense(Heard),
@@ -96,10 +94,8 @@ pub(crate) enum Said {
     },
     /// Claim to a node number, or its echo.
     Claim {
-        #[serde(rename = "claim")]
         number: u32,
-        #[serde(rename = "other_claim")]
-        heard: u32,
+        other_number: u32,
         flags: u8,
     },
 }
@@ -107,12 +103,10 @@ pub(crate) enum Said {
 /// Fence message of the guard.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Fenced {
-    #[serde(rename = "association")]
-    pub(crate) number: u16,
-    #[serde(rename = "line")]
-    pub(crate) mission: u16,
+    pub(crate) association: u16,
+    pub(crate) line_digest: u16,
     pub(crate) echo: u16,
-    pub(crate) fence: u16,
+    pub(crate) number: u16,
     /// Fence x, final x, y and altitude of the sender, and its distance from the fence, m.
     #[serde(flatten, with = "fields::places")]
     pub(crate) places: [f32; 5],
@@ -123,11 +117,11 @@ impl Fenced {
     fn message(&self) -> Message {
         let [x_m, target_m, y_m, altitude_m, apart_m] = self.places;
         Message::Fence {
-            mission: self.mission,
+            line_digest: self.line_digest,
             fence: Fence {
-                association: self.number,
+                association: self.association,
                 echo: self.echo,
-                number: self.fence,
+                number: self.number,
                 x_m,
                 target_m,
                 across: CrossSection { y_m, altitude_m },
@@ -187,15 +181,15 @@ impl Said {
             } => sweep.message(None, Some(upsilon_per_w)),
             Self::Aside { ref sweep, y_m } => sweep.message(Some(y_m), None),
             Self::Verdict(ref judged) => judged.message(),
-            Self::Busy { number } => Message::Busy { sweep: number },
+            Self::Busy { number } => Message::Busy { number },
             Self::Heartbeat {
                 mission,
-                ask,
-                answer,
+                request,
+                reply,
             } => Message::Heartbeat {
                 mission,
-                ask,
-                answer,
+                request,
+                reply,
             },
             Self::Gather(ref seats) => Message::Gather(seats.roster()),
             Self::Gathered(ref seats) => Message::Gathered(seats.roster()),
@@ -208,31 +202,31 @@ impl Said {
             Self::Offer(offer) => offer.message(),
             Self::Pulse {
                 number,
-                mission,
+                view_digest: mission,
                 lease,
             } => Message::Pulse(Pulse {
                 number,
-                mission,
+                view_digest: mission,
                 lease,
             }),
             Self::Pulsed {
                 number,
-                mission,
+                view_digest: mission,
                 done,
             } => Message::Pulsed(Pulsed {
                 number,
-                mission,
+                view_digest: mission,
                 done,
             }),
             Self::Sense(_) | Self::Sensed(_) => Heard::message(self),
             Self::Level { mission, power_w } => Message::Level { mission, power_w },
             Self::Claim {
                 number,
-                heard,
+                other_number: heard,
                 flags,
             } => Message::Claim(Claim {
                 number,
-                heard,
+                other_number: heard,
                 passive: flags % 2 == 1,
                 echo: flags / 2 % 2 == 1,
             }),

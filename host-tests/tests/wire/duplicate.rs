@@ -17,7 +17,7 @@ const ECHO: u8 = 2;
 const fn claim(number: u32, heard: u32, flags: u8) -> Said {
     Said::Claim {
         number,
-        heard,
+        other_number: heard,
         flags,
     }
 }
@@ -38,7 +38,7 @@ fn relay_4(wiring: Wiring) -> (Relay, u32) {
     };
     assert_eq!(out[0].1, claim(number, 0, 0));
     assert!(number < 1 << 30);
-    assert!(!relay.stands_down());
+    assert!(!relay.is_passive());
     (relay, number)
 }
 
@@ -51,7 +51,7 @@ fn a_claim_of_a_neighbour_is_repeated_to_its_number() {
             let echo = claim(7, 9, flags | ECHO);
             assert_eq!(sent_with_claims(&mut relay, NOW), [(port, echo)]);
         }
-        assert!(!relay.stands_down() && events(&mut relay).is_empty());
+        assert!(!relay.is_passive() && events(&mut relay).is_empty());
     }
 }
 
@@ -79,10 +79,10 @@ fn the_smaller_claim_becomes_passive_and_the_larger_one_answers() {
                 };
                 after.handle_bytes(late, port, &bytes);
                 let passive = number > own && heard == own;
-                assert_eq!(after.stands_down(), passive, "{number} {heard} {echo}");
+                assert_eq!(after.is_passive(), passive, "{number} {heard} {echo}");
                 let told = events(&mut after);
                 let expected: &[Event] = if heard == own {
-                    &[Event::IndexTaken { node: 4 }]
+                    &[Event::DuplicateIndex { node: 4 }]
                 } else {
                     &[]
                 };
@@ -116,7 +116,7 @@ fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
             relay.handle_bytes(late, port, &bytes);
             assert_eq!(sent_with_claims(&mut relay, late), []);
             assert_eq!(events(&mut relay), []);
-            assert!(!relay.stands_down());
+            assert!(!relay.is_passive());
         }
     }
 }
@@ -164,7 +164,7 @@ fn with_a_key_handshakes_are_the_claims() {
             while relay.poll_transmit(NOW, &mut buffer).is_some() {
                 sent += 1;
             }
-            (relay.stands_down(), sent)
+            (relay.is_passive(), sent)
         };
         for frame in own.iter().chain(&forged) {
             assert_eq!(given(&relay, frame), (false, 0));

@@ -45,7 +45,7 @@ fn a_proposal_goes_through_three_relays_and_the_decision_back() {
         assert_eq!((relay.view().bits(), relay.index()), (view, index));
         assert_eq!(relay.stats().views, 1);
         assert_eq!(relay.lease(), None, "nothing to hold yet");
-        assert_eq!(events(relay), [Event::Reformed]);
+        assert_eq!(events(relay), [Event::ViewAccepted]);
         assert_eq!(relay.stats().rejected(), 0);
     }
 }
@@ -161,13 +161,13 @@ fn more_than_half_is_a_chain_and_half_of_it_with_its_proposer() {
                             id: id(9, 1),
                             relays: 12,
                         }),
-                        there: 12,
+                        reached: 12,
                         // A missing member may hold the earlier view for as long.
-                        lease_left: if all { 0 } else { 77 },
+                        usable_in: if all { 0 } else { 77 },
                     };
                     assert_eq!(decided, expected, "{votes} of {relays}, {proposer}");
                     let (event, view) = if enough {
-                        (Event::Reformed, id(9, 1))
+                        (Event::ViewAccepted, id(9, 1))
                     } else {
                         (Event::NoQuorum, 0)
                     };
@@ -200,7 +200,7 @@ fn a_member_adds_its_voice() {
             (votes == 10).then_some(view),
             "11 of 20 or 10"
         );
-        assert_eq!(decided.lease_left, lease_left.min(RELIED));
+        assert_eq!(decided.usable_in, lease_left.min(RELIED));
     }
 }
 
@@ -285,8 +285,8 @@ fn what_may_have_been_agreed_on_is_decided_on_again() {
         },
         base: SizedView { id: 0, relays: 8 },
         view: Some(before),
-        there: 8,
-        lease_left: 40,
+        reached: 8,
+        usable_in: 40,
     });
     head.handle_bytes(
         now,

@@ -62,7 +62,7 @@ fn fourth(differs: bool) -> Relay {
 fn of(relay: &Relay, number: u16, after: u16, indices: &[u16]) -> Seats {
     Seats {
         number,
-        mission: digest(relay.mission()),
+        view_digest: digest(relay.mission()),
         after,
         seats: indices.iter().map(|&index| (index, 30.0, 0.5)).collect(),
     }

@@ -75,7 +75,7 @@ fn what_tx_and_rx_may_not_say_is_misaddressed() {
         assert_eq!(counted(after.stats()), [expected], "{one:?}");
         // The relay does not listen.
         let refused = u32::from(matches!(one, Said::Level { .. }));
-        assert_eq!(after.stats().samples_refused, refused, "{one:?}");
+        assert_eq!(after.stats().samples_rejected, refused, "{one:?}");
     }
     for one in [
         Said::Offer(upload(1, base ^ 1)),

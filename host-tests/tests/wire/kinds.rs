@@ -98,7 +98,7 @@ pub(crate) fn settle(relay: &mut Relay, now: &mut Instant) -> Vec<(Port, Said)> 
 pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
     Seats {
         number,
-        mission,
+        view_digest: mission,
         after: 0,
         seats: vec![(index, 30.0, 0.5)],
     }
@@ -108,7 +108,7 @@ pub(crate) fn seats(number: u16, mission: u16, index: u16) -> Seats {
 const fn an_echo() -> Said {
     Said::Claim {
         number: 1,
-        heard: 0,
+        other_number: 0,
         flags: 2,
     }
 }
@@ -119,13 +119,13 @@ pub(crate) fn heard(number: u16, mission: u16) -> Heard {
     [sums[0], sums[14], sums[15], sums[16], sums[17]] = [2.0, 0.5, 2.0, 64.0, 3.0];
     Heard {
         number,
-        mission,
-        told: 1,
+        view_digest: mission,
+        estimate: 1,
         kind: 4,
         source: [62.5, 600.0, -250.0, 1e-6],
         sums,
         receiver: [1e-6, 32.0],
-        off: 0,
+        excluded: 0,
     }
 }
 
@@ -137,7 +137,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let view = id(u32::from(number).max(1), 1);
     let sweep = Swept {
         number,
-        mission,
+        view_digest: mission,
         anchor: 1.0,
         gap: 0,
         growth: 0,
@@ -149,7 +149,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Sweep(sweep.clone()),
         Said::Verdict(Judged {
             number,
-            mission,
+            view_digest: mission,
             own: false,
             commit: Some(0),
             slacks: vec![1.0],
@@ -158,8 +158,8 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Busy { number },
         Said::Heartbeat {
             mission,
-            ask: 0,
-            answer: 0,
+            request: 0,
+            reply: 0,
         },
         Said::Measured {
             sweep: sweep.clone(),
@@ -170,7 +170,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         Said::Gathered(seats(number, mission, 5)),
         Said::Token(Handed {
             number,
-            mission,
+            view_digest: mission,
             x_m,
             altitude_m,
             power_w,
@@ -182,7 +182,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         }),
         Said::Moved(Shifted {
             number,
-            mission,
+            view_digest: mission,
             x_m: 600.0,
             altitude_m,
             any: true,
@@ -192,19 +192,19 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
             mission,
             neighbour: 4,
             behind: 1,
-            newest: view,
-            holds: (mission, 0),
-            nonce: 0,
+            latest_view: view,
+            latest_mission: (mission, 0),
+            offer_number: 0,
             hears: 1,
             flags: 16,
         }),
         Said::Proposal(proposed(view, (mission, 0), 3, 8)),
         granted(view, (mission, 0), 5, 8),
         Said::Fence(Fenced {
-            number: 1,
-            mission,
+            association: 1,
+            line_digest: mission,
             echo: 0,
-            fence: 1,
+            number: 1,
             places: [x_m, x_m, 1.0, 1.0, 1.0],
             flags: 3,
         }),
@@ -214,12 +214,12 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         }),
         Said::Pulse {
             number,
-            mission,
+            view_digest: mission,
             lease: 150,
         },
         Said::Pulsed {
             number,
-            mission,
+            view_digest: mission,
             done: true,
         },
         Said::Sense(heard(number, mission)),

@@ -26,35 +26,48 @@ fn view(number: u16) -> u32 {
 pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
     match &mut said {
         Said::Sweep(sweep) | Said::Measured { sweep, .. } | Said::Aside { sweep, .. } => {
-            (sweep.number, sweep.mission) = (as_number, as_mission);
+            (sweep.number, sweep.view_digest) = (as_number, as_mission);
         }
         Said::Gather(seats) | Said::Gathered(seats) => {
-            (seats.number, seats.mission) = (as_number, as_mission);
+            (seats.number, seats.view_digest) = (as_number, as_mission);
         }
         Said::Verdict(Judged {
-            number, mission, ..
+            number,
+            view_digest: mission,
+            ..
         })
         | Said::Token(Handed {
-            number, mission, ..
+            number,
+            view_digest: mission,
+            ..
         })
         | Said::Moved(Shifted {
-            number, mission, ..
+            number,
+            view_digest: mission,
+            ..
         })
         | Said::Pulse {
-            number, mission, ..
+            number,
+            view_digest: mission,
+            ..
         }
         | Said::Pulsed {
-            number, mission, ..
+            number,
+            view_digest: mission,
+            ..
         } => (*number, *mission) = (as_number, as_mission),
         Said::Claim { number, .. } => *number = as_number.into(),
         Said::Busy { number } => *number = as_number,
         // A fence's number is that of its association, never 0.
         Said::Heartbeat { mission, .. }
-        | Said::Fence(Fenced { mission, .. })
+        | Said::Fence(Fenced {
+            line_digest: mission,
+            ..
+        })
         | Said::Level { mission, .. } => {
             *mission = as_mission;
         }
-        Said::Hello(hello) => (hello.newest, hello.mission) = (view(as_number), as_mission),
+        Said::Hello(hello) => (hello.latest_view, hello.mission) = (view(as_number), as_mission),
         // The view has the loaded mission.
         Said::Proposal(proposed) => {
             let Proposed {
@@ -77,7 +90,7 @@ pub(crate) fn renamed(mut said: Said, as_number: u16, as_mission: u16) -> Said {
         }
         Said::Offer(offer) => offer.base = as_mission,
         Said::Sense(heard) | Said::Sensed(heard) => {
-            (heard.number, heard.mission) = (as_number, as_mission);
+            (heard.number, heard.view_digest) = (as_number, as_mission);
         }
     }
     said
@@ -153,7 +166,7 @@ fn what_a_relay_sends_is_what_the_rules_give() {
             assert_eq!(bytes, plain(header, &said.body()), "frame {counter}");
             let (_, message) = frame::decode(&bytes).unwrap();
             if let Message::Sweep(sweep) = message {
-                assert_eq!(sweep.mission, digest(head.mission()));
+                assert_eq!(sweep.view_digest, digest(head.mission()));
             }
             counter += 1;
         }

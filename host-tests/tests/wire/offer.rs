@@ -43,7 +43,7 @@ pub(crate) struct Offer {
     #[serde(flatten, with = "fields::sites")]
     pub(crate) sites: [i32; 6],
     /// Number of the hello that it answers; 0 for none.
-    pub(crate) answer: u16,
+    pub(crate) offer_number: u16,
 }
 
 /// Offsets in the body: number of relays, noise, and sites.
@@ -142,7 +142,7 @@ impl Offer {
         );
         Message::Offer {
             upload,
-            answer: self.answer,
+            offer_number: self.offer_number,
         }
     }
 }
@@ -176,6 +176,6 @@ pub(crate) fn offer() -> Offer {
         right_m: 40.5,
         noise_w: 0.0,
         sites: [0; 6],
-        answer: 0,
+        offer_number: 0,
     }
 }

@@ -150,7 +150,7 @@ pub(crate) fn offers() -> BoxedStrategy<Said> {
                     right_m,
                     noise_w: (noise * most_w) as f32,
                     sites,
-                    answer,
+                    offer_number: answer,
                 })
             },
         )

@@ -124,14 +124,20 @@ fn an_upload_is_written_as_its_mission_has_it_and_read_back() {
             right_m: 45.0,
             noise_w: 1e-12,
             sites: [0; 6],
-            answer: 77,
+            offer_number: 77,
         };
         let mut bytes = [0; KEPT];
         assert_eq!(upload.encode(&mut bytes), Some(KEPT));
         assert_eq!(bytes[..], offer.kept());
         assert_eq!(Upload::decode(&bytes), Some(upload));
         let answer = 77;
-        assert_eq!(offer.message(), Message::Offer { upload, answer });
+        assert_eq!(
+            offer.message(),
+            Message::Offer {
+                upload,
+                offer_number: answer
+            }
+        );
         let mission = Mission::try_new(config).unwrap();
         assert_eq!(digest(&mission), offer.digest());
     }

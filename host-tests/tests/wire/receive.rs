@@ -199,7 +199,7 @@ fn fed_with_anything(
             for (port, piece, wait_ms) in steps {
                 let stream = streams.entry(format!("{port:?}")).or_default();
                 for frame in piece.split_inclusive(|byte| *byte == 0) {
-                    let silent = relay.stands_down();
+                    let silent = relay.is_passive();
                     let neighbours = relay.neighbours();
                     relay.handle_bytes(now, port, frame);
                     stream.extend(frame);

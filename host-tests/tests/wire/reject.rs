@@ -66,7 +66,7 @@ fn other_versions_and_flags_are_refused_before_the_body_is_read() {
 
 #[test]
 fn node_numbers_that_do_not_fit_are_not_written() {
-    let message = Message::Busy { sweep: 1 };
+    let message = Message::Busy { number: 1 };
     for (number, fits) in [(4094, true), (4095, false), (4096, false), (65535, false)] {
         for header in [
             Header {
@@ -90,13 +90,13 @@ fn what_the_crate_writes_out_of_range_it_refuses_to_read() {
     let answer = |slack, stand| {
         Message::Verdict(Answer {
             number: 0,
-            mission: 0,
+            view_digest: 0,
             verdict: Verdict {
                 commit: None,
                 slacks: PerTarget::from_slice(&[slack]).unwrap(),
             },
             own: true,
-            stand,
+            required_x_m: stand,
         })
     };
     for (slack, stand, fits) in [
@@ -120,7 +120,7 @@ fn a_sweep_or_seat_written_out_of_range_is_refused() {
     let sweep = |y_m| {
         Message::Sweep(Sweep {
             number: 0,
-            mission: 0,
+            view_digest: 0,
             ladder: Ladder::single(1.0),
             relay: Station {
                 at: CrossSection {
@@ -150,7 +150,7 @@ fn a_sweep_or_seat_written_out_of_range_is_refused() {
         };
         let roster = Roster {
             number: 0,
-            mission: 0,
+            view_digest: 0,
             after: 0,
             seats: [seat].into_iter().collect(),
         };
@@ -165,7 +165,7 @@ fn a_sweep_or_seat_written_out_of_range_is_refused() {
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {
         number: 1,
-        mission: 2,
+        view_digest: 2,
         ladder: Ladder::single(1.5),
         relay: Station {
             at: CrossSection::on_line(20.0),

@@ -18,7 +18,7 @@ const KEY: [u8; 32] = *b"whoever reads this is not secret";
 
 /// Flags in byte 3: a tag follows, and the body is a handshake.
 const SIGNED: u8 = 0x10;
-const HELLO: u8 = 0x20;
+const HANDSHAKE: u8 = 0x20;
 
 /// Returns relay `index` of eight in the paper's scenario, with the key.
 pub(crate) fn with_key(index: u16, wiring: Wiring) -> Relay {
@@ -72,7 +72,7 @@ impl Peer {
         peer.handshake(relay, true);
         let answer = frames(relay, Instant::ZERO)
             .into_iter()
-            .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HELLO));
+            .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HANDSHAKE));
         let (_, _, body) = answer.unwrap();
         assert_eq!(body.len(), 17);
         peer.nonces[1] = u64::from_le_bytes(body[..8].try_into().unwrap());
@@ -89,7 +89,7 @@ impl Peer {
             .flat_map(u64::to_le_bytes)
             .collect();
         body.push(u8::from(asks));
-        let frame = self.frame(SIGNED | HELLO, &body);
+        let frame = self.frame(SIGNED | HANDSHAKE, &body);
         relay.handle_bytes(Instant::ZERO, self.port, &frame);
     }
 
@@ -116,7 +116,7 @@ impl Peer {
     pub(crate) fn says(&mut self, relay: &mut Relay, now: Instant, said: &Said) {
         let mut said = said.clone();
         if let Said::Offer(offer) = &mut said {
-            offer.answer = self.clone().number(relay.clone(), now);
+            offer.offer_number = self.clone().number(relay.clone(), now);
         }
         self.says_as_it_is(relay, now, &said);
     }
@@ -128,9 +128,9 @@ impl Peer {
             mission,
             neighbour: 0,
             behind: 1,
-            newest: 0,
-            holds: (mission, 0),
-            nonce: 0,
+            latest_view: 0,
+            latest_mission: (mission, 0),
+            offer_number: 0,
             hears: 0,
             flags: ASKS,
         });
@@ -147,7 +147,7 @@ impl Peer {
                     Ok(Said::Hello(hello)) if (to, flags) == (self.node, SIGNED) => Some(hello),
                     _ => None,
                 });
-        hello.unwrap().nonce
+        hello.unwrap().offer_number
     }
 
     /// Sends a message unchanged.

@@ -99,7 +99,7 @@ fn an_upload_whose_sites_disagree_with_its_distance_is_refused_and_the_event_say
                 let [(_, Said::Hello(hello))] = says.as_slice() else {
                     panic!("{says:?}")
                 };
-                assert_eq!(hello.holds, mission_id(&offer));
+                assert_eq!(hello.latest_mission, mission_id(&offer));
                 assert_eq!(hello.flags & (FLIES | WHOLE | REFUSED), REFUSED);
                 assert_eq!(held(&relay), None);
             }
@@ -196,10 +196,10 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     let (mut relay, mut peers, base) = guarded();
     let fence = |mission| {
         Said::Fence(Fenced {
-            number: 700,
-            mission,
+            association: 700,
+            line_digest: mission,
             echo: 0,
-            fence: 0,
+            number: 0,
             places: [300.0, 310.0, 0.0, 20.0, 0.0],
             flags: 0,
         })
@@ -271,7 +271,7 @@ fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has
     let adopted = until(&mut relay, Instant::from_millis(3_000), 1_700.0);
     assert_eq!(relay.sites(), Some(sites(to)));
     assert!(events(&mut relay).contains(&Event::SetpointChanged));
-    let agreed = relay.final_setpoint().unwrap();
+    let agreed = relay.agreed_place().unwrap();
     assert_eq!(relay.setpoint(), None, "it may still be braking");
     until(
         &mut relay,
@@ -283,5 +283,5 @@ fn a_relay_has_no_place_along_a_new_line_before_it_has_stopped_and_the_chain_has
         Some(agreed),
         "beyond the old box, it is found there and sent on"
     );
-    assert_eq!(relay.final_setpoint(), Some(agreed));
+    assert_eq!(relay.agreed_place(), Some(agreed));
 }

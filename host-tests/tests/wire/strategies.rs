@@ -84,7 +84,7 @@ pub(crate) fn sweeps(least: usize) -> BoxedStrategy<Said> {
                 }
                 Said::Sweep(Swept {
                     number,
-                    mission,
+                    view_digest: mission,
                     anchor: sign * anchor,
                     gap,
                     growth,
@@ -177,7 +177,7 @@ fn rosters() -> BoxedStrategy<Seats> {
             seats.retain(|seat| seat.0 <= 1000);
             Seats {
                 number,
-                mission,
+                view_digest: mission,
                 after,
                 seats,
             }
@@ -217,7 +217,7 @@ fn tokens() -> BoxedStrategy<Said> {
             )| {
                 Said::Token(Handed {
                     number,
-                    mission,
+                    view_digest: mission,
                     x_m,
                     altitude_m,
                     power_w,
@@ -238,7 +238,7 @@ fn moves() -> BoxedStrategy<Said> {
         .prop_map(|((number, mission), x_m, altitude_m, any, worst)| {
             Said::Moved(Shifted {
                 number,
-                mission,
+                view_digest: mission,
                 x_m,
                 altitude_m,
                 any,
@@ -264,7 +264,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         .prop_map(|(number, mission, own, commit, slacks, stand)| {
             Said::Verdict(Judged {
                 number,
-                mission,
+                view_digest: mission,
                 own,
                 commit,
                 slacks,
@@ -275,11 +275,11 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
         3 => sweeps(0),
         3 => verdicts,
         1 => any::<u16>().prop_map(|number| Said::Busy { number }),
-        1 => (any::<[u32; 2]>(), 0..4_u8).prop_map(|([number, heard], flags)| Said::Claim { number, heard, flags }),
+        1 => (any::<[u32; 2]>(), 0..4_u8).prop_map(|([number, heard], flags)| Said::Claim { number, other_number: heard, flags }),
         1 => (any::<u16>(), prop_oneof![Just(1e-30), 1e-12..1e-3_f32, Just(1e6)])
             .prop_map(|(mission, power_w)| Said::Level { mission, power_w }),
         1 => (any::<u16>(), questions(), questions())
-            .prop_map(|(mission, ask, answer)| Said::Heartbeat { mission, ask, answer }),
+            .prop_map(|(mission, ask, answer)| Said::Heartbeat { mission, request: ask, reply: answer }),
         2 => measured(sweeps(0)),
         2 => asides(sweeps(0)),
         2 => rosters().prop_map(Said::Gather),

@@ -54,9 +54,9 @@ pub(crate) fn greeting(mission: u16, neighbour: u16, holds: (u16, u16), flags: u
         mission,
         neighbour,
         behind: 1,
-        newest: 0,
-        holds,
-        nonce: 0,
+        latest_view: 0,
+        latest_mission: holds,
+        offer_number: 0,
         hears: 0,
         flags,
     }
@@ -321,7 +321,7 @@ fn the_node_after_is_offered_the_mission_before_the_proposal() {
     peers[0].says(&mut relay, NOW, &proposal(3));
     // The neighbour has sent no hello that an offer could answer, so it is asked for one.
     let asks = Greeting {
-        newest: id(1, 1),
+        latest_view: id(1, 1),
         behind: 4,
         ..greeting(base, 5, mission_id(&newer), ASKS)
     };

@@ -43,9 +43,9 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
                 mission,
                 neighbour,
                 behind,
-                newest,
-                holds,
-                nonce,
+                latest_view: newest,
+                latest_mission: holds,
+                offer_number: nonce,
                 hears,
                 flags,
             })
@@ -94,8 +94,8 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
                 call,
                 base,
                 view,
-                there,
-                lease_left,
+                reached: there,
+                usable_in: lease_left,
             }))
         },
     );
@@ -107,10 +107,10 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
     )
         .prop_map(|(number, [mission, echo, fence], places, flags)| {
             Said::Fence(Fenced {
-                number,
-                mission,
+                association: number,
+                line_digest: mission,
                 echo,
-                fence,
+                number: fence,
                 places: [
                     places[0].min(1e7),
                     places[1].min(1e7),
@@ -128,13 +128,13 @@ pub(crate) fn formings() -> BoxedStrategy<Said> {
 pub(crate) fn pulses() -> BoxedStrategy<Said> {
     let pulse = (any::<[u16; 2]>(), spans()).prop_map(|([number, mission], span)| Said::Pulse {
         number,
-        mission,
+        view_digest: mission,
         lease: span.max(1),
     });
     let pulsed =
         (any::<[u16; 2]>(), any::<bool>()).prop_map(|([number, mission], done)| Said::Pulsed {
             number,
-            mission,
+            view_digest: mission,
             done,
         });
     prop_oneof![pulse, pulsed].boxed()
@@ -163,13 +163,13 @@ pub(crate) fn hearings() -> BoxedStrategy<Heard> {
         .prop_map(
             |([number, mission, told], (kind, source), sums, (heard_w, count), off)| Heard {
                 number,
-                mission,
-                told,
+                view_digest: mission,
+                estimate: told,
                 kind,
                 source,
                 sums: sums.try_into().unwrap(),
                 receiver: [heard_w, count],
-                off,
+                excluded: off,
             },
         )
         .boxed()

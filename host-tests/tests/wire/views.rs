@@ -132,8 +132,8 @@ fn heartbeats_bear_the_digest_of_the_mission_in_every_view() {
     for (mission, expected) in [(mission, 0), (mission.wrapping_add(mark(view)), 1)] {
         let beat = Said::Heartbeat {
             mission,
-            ask: 0,
-            answer: 0,
+            request: 0,
+            reply: 0,
         };
         relay.handle_bytes(
             Instant::ZERO,
@@ -242,12 +242,12 @@ fn a_lease_is_granted_by_the_next_pulse_and_runs_out() {
     let own = mission.wrapping_add(mark(view));
     let pulse = |number| Said::Pulse {
         number,
-        mission: own,
+        view_digest: own,
         lease: 160,
     };
     let pulsed = |number, done| Said::Pulsed {
         number,
-        mission: own,
+        view_digest: own,
         done,
     };
     let at = Instant::from_millis;

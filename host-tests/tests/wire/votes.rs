@@ -60,8 +60,8 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Sai
         call: Call { of, view, place },
         base: SizedView { id: 0, relays },
         view: Some(SizedView { id: view, relays }),
-        there: relays,
-        lease_left: 0,
+        reached: relays,
+        usable_in: 0,
     })
 }
 
@@ -71,8 +71,8 @@ pub(crate) fn refused(view: u32, of: (u16, u16), place: u16, there: u16) -> Said
         call: Call { of, view, place },
         base: SizedView { id: 0, relays: 8 },
         view: None,
-        there,
-        lease_left: 0,
+        reached: there,
+        usable_in: 0,
     })
 }
 
@@ -82,9 +82,9 @@ pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> S
         mission,
         neighbour,
         behind: 1,
-        newest,
-        holds: (mission, 0),
-        nonce: 0,
+        latest_view: newest,
+        latest_mission: (mission, 0),
+        offer_number: 0,
         hears: 0,
         flags: flags | FLIES,
     })
@@ -109,8 +109,8 @@ pub(crate) fn long(behind: u16, said: Said) -> Said {
 /// Removes a hello's number, which is never 0 at a relay with a key.
 pub(crate) fn unnumbered(mut said: Said) -> Said {
     if let Said::Hello(greeting) = &mut said {
-        assert_ne!(greeting.nonce, 0);
-        greeting.nonce = 0;
+        assert_ne!(greeting.offer_number, 0);
+        greeting.offer_number = 0;
     }
     said
 }

@@ -28,7 +28,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::SizedView;
 
-fields!(holds: (u16, u16), [(holds, holds_version)], holds: u16, holds_version: u16);
+fields!(
+    latest_mission: (u16, u16),
+    [(latest_mission, latest_mission_version)],
+    latest_mission: u16,
+    latest_mission_version: u16
+);
 fields!(mission: (u16, u16), [(mission, version)], mission: u16, version: u16);
 fields!(
     agreed: SizedView,

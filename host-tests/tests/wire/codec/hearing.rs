@@ -11,12 +11,11 @@ use super::{Said, fields};
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Heard {
     pub(crate) number: u16,
-    #[serde(rename = "view")]
-    pub(crate) mission: u16,
+    pub(crate) view_digest: u16,
     /// Number and kind of the current estimate.
-    #[serde(rename = "belief_number")]
-    pub(crate) told: u16,
-    #[serde(rename = "belief")]
+    #[serde(rename = "estimate_number")]
+    pub(crate) estimate: u16,
+    #[serde(rename = "estimate")]
     pub(crate) kind: u8,
     /// Power, X and Y of the source, and its power at the receiver.
     #[serde(flatten, with = "fields::source")]
@@ -26,8 +25,7 @@ pub(crate) struct Heard {
     /// Power at the receiver, and its number of measurements.
     #[serde(flatten, with = "fields::receiver")]
     pub(crate) receiver: [f32; 2],
-    #[serde(rename = "left_out")]
-    pub(crate) off: u16,
+    pub(crate) excluded: u16,
 }
 
 impl Heard {
@@ -55,16 +53,16 @@ impl Heard {
             _ => Belief::Source { source, receiver_w },
         };
         let told = Told {
-            number: self.told,
+            number: self.estimate,
             belief,
         };
         // Only this shows that the sums are in order.
         let sums = format!("Sums {{ numbers: {:?} }}", self.sums);
         hearing.number == self.number
-            && hearing.mission == self.mission
-            && hearing.told == told
+            && hearing.view_digest == self.view_digest
+            && hearing.estimate == told
             && format!("{:?}", hearing.sums) == sums
             && [hearing.receiver.power_w, hearing.receiver.count] == self.receiver
-            && hearing.off == self.off
+            && hearing.excluded == self.excluded
     }
 }

@@ -12,13 +12,11 @@ pub(crate) struct Greeting {
     pub(crate) mission: u16,
     pub(crate) neighbour: u16,
     pub(crate) behind: u16,
-    #[serde(rename = "newest_view")]
-    pub(crate) newest: u32,
+    pub(crate) latest_view: u32,
     /// Digest and version of the held mission.
-    #[serde(flatten, with = "fields::holds")]
-    pub(crate) holds: (u16, u16),
-    #[serde(rename = "offer_number")]
-    pub(crate) nonce: u16,
+    #[serde(flatten, with = "fields::latest_mission")]
+    pub(crate) latest_mission: (u16, u16),
+    pub(crate) offer_number: u16,
     pub(crate) hears: u8,
     pub(crate) flags: u8,
 }
@@ -31,18 +29,18 @@ impl Greeting {
     pub(super) fn message(self) -> Message {
         Message::Hello(Hello {
             mission: self.mission,
-            newest: ViewId::from_bits(self.newest),
+            latest_view: ViewId::from_bits(self.latest_view),
             neighbour: self.neighbour,
-            ask: self.flag(0),
-            form: self.flag(1),
+            requests_reply: self.flag(0),
+            requests_view: self.flag(1),
             fresh: self.flag(2),
             ready: self.flag(3),
             behind: self.behind,
             hears: self.hears,
-            holds: mission_id(self.holds),
-            nonce: self.nonce,
-            flies: self.flag(4),
-            whole: self.flag(5),
+            latest_mission: mission_id(self.latest_mission),
+            offer_number: self.offer_number,
+            active: self.flag(4),
+            active_in_view: self.flag(5),
             refused: self.flag(6),
         })
     }

@@ -8,8 +8,7 @@ use uav_relay::wire::message::{OwnSeat, Roster};
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Seats {
     pub(crate) number: u16,
-    #[serde(rename = "view")]
-    pub(crate) mission: u16,
+    pub(crate) view_digest: u16,
     pub(crate) after: u16,
     /// Relay, altitude or 0, and power of each.
     #[serde(serialize_with = "named", deserialize_with = "unnamed")]
@@ -25,7 +24,7 @@ impl Seats {
         };
         Roster {
             number: self.number,
-            mission: self.mission,
+            view_digest: self.view_digest,
             after: self.after,
             seats: self.seats.iter().map(seat).collect(),
         }

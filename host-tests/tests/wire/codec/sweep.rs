@@ -11,8 +11,7 @@ use uav_relay::wire::message::{Answer, Message, Sweep};
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Swept {
     pub(crate) number: u16,
-    #[serde(rename = "view")]
-    pub(crate) mission: u16,
+    pub(crate) view_digest: u16,
     /// Negative in a plain pass.
     pub(crate) anchor: f32,
     pub(crate) gap: u8,
@@ -29,7 +28,7 @@ impl Swept {
         let ladder = Ladder::from_parts(self.anchor.abs(), self.gap, self.growth).unwrap();
         Message::Sweep(Sweep {
             number: self.number,
-            mission: self.mission,
+            view_digest: self.view_digest,
             ladder: ladder.plainly(self.anchor < 0.0),
             relay: Station {
                 at: CrossSection {
@@ -49,13 +48,12 @@ impl Swept {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Judged {
     pub(crate) number: u16,
-    #[serde(rename = "view")]
-    pub(crate) mission: u16,
+    pub(crate) view_digest: u16,
     pub(crate) own: bool,
     pub(crate) commit: Option<u8>,
     #[serde(rename = "slack_m")]
     pub(crate) slacks: Vec<f32>,
-    #[serde(rename = "stand_m")]
+    #[serde(rename = "required_x_m")]
     pub(crate) stand: Option<f32>,
 }
 
@@ -63,12 +61,12 @@ impl Judged {
     pub(super) fn message(&self) -> Message {
         Message::Verdict(Answer {
             number: self.number,
-            mission: self.mission,
+            view_digest: self.view_digest,
             verdict: Verdict {
                 commit: self.commit,
                 slacks: PerTarget::from_slice(&self.slacks).unwrap(),
             },
-            stand: self.stand,
+            required_x_m: self.stand,
             own: self.own,
         })
     }

@@ -8,8 +8,7 @@ use uav_relay::{Local, Placement};
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Handed {
     pub(crate) number: u16,
-    #[serde(rename = "view")]
-    pub(crate) mission: u16,
+    pub(crate) view_digest: u16,
     pub(crate) x_m: f32,
     pub(crate) altitude_m: f32,
     pub(crate) power_w: f32,
@@ -29,7 +28,7 @@ impl Handed {
         };
         Message::Token(Token {
             number: self.number,
-            mission: self.mission,
+            view_digest: self.view_digest,
             place: Placement::on_line(self.x_m, self.altitude_m),
             power_w: self.power_w,
             turn: match self.turn {
@@ -46,11 +45,10 @@ impl Handed {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Shifted {
     pub(crate) number: u16,
-    #[serde(rename = "view")]
-    pub(crate) mission: u16,
+    pub(crate) view_digest: u16,
     pub(crate) x_m: f32,
     pub(crate) altitude_m: f32,
-    #[serde(rename = "moved")]
+    #[serde(rename = "any_moved")]
     pub(crate) any: bool,
     #[serde(rename = "worst_sir")]
     pub(crate) worst: f32,
@@ -60,10 +58,10 @@ impl Shifted {
     pub(super) fn message(&self) -> Message {
         Message::Moved(Moved {
             number: self.number,
-            mission: self.mission,
+            view_digest: self.view_digest,
             place: Placement::on_line(self.x_m, self.altitude_m),
-            any: self.any,
-            worst: self.worst,
+            any_moved: self.any,
+            worst_sir: self.worst,
         })
     }
 }

@@ -51,7 +51,7 @@ pub(crate) struct Proposed {
     pub(crate) votes: u16,
     #[serde(rename = "lease_left_ds")]
     pub(crate) lease_left: u16,
-    #[serde(rename = "rest_ds")]
+    #[serde(rename = "earlier_lease_left_ds")]
     pub(crate) rest: u16,
     pub(crate) proposer: bool,
     /// Accepted successor: the proposal by which it was decided, and the view.
@@ -63,14 +63,14 @@ impl Proposed {
     pub(super) fn message(self) -> Message {
         Message::Proposal(Proposal {
             mission_id: self.call.mission_id(),
-            view: ViewId::from_bits(self.call.view),
+            proposed_view: ViewId::from_bits(self.call.view),
             place: self.call.place,
             poll: Poll {
                 agreed: self.agreed.view(),
                 votes: self.votes,
                 proposer: self.proposer,
                 lease_left: self.lease_left,
-                rest: self.rest,
+                earlier_lease_left: self.rest,
                 successor: self.successor.map(|(proposal, view)| Accepted {
                     proposal: ViewId::from_bits(proposal),
                     view: view.view(),
@@ -90,21 +90,21 @@ pub(crate) struct Decided {
     pub(crate) base: SizedView,
     #[serde(rename = "accepted")]
     pub(crate) view: Option<SizedView>,
-    pub(crate) there: u16,
-    #[serde(rename = "lease_left_ds")]
-    pub(crate) lease_left: u16,
+    pub(crate) reached: u16,
+    #[serde(rename = "usable_in_ds")]
+    pub(crate) usable_in: u16,
 }
 
 impl Decided {
     pub(super) fn message(self) -> Message {
         Message::Decision(Decision {
             mission_id: self.call.mission_id(),
-            proposal: ViewId::from_bits(self.call.view),
+            proposed_view: ViewId::from_bits(self.call.view),
             place: self.call.place,
-            there: self.there,
+            reached: self.reached,
             base: self.base.view(),
-            view: self.view.map(SizedView::view),
-            lease_left: self.lease_left,
+            accepted: self.view.map(SizedView::view),
+            usable_in: self.usable_in,
         })
     }
 }
