@@ -115,7 +115,8 @@ const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));
-    let seeds: BTreeSet<u64> = (first..first + count).chain(UP_FOR_100_S).collect();
+    let others = UP_FOR_100_S.iter().filter(|_| count == 20);
+    let seeds: BTreeSet<u64> = (first..first + count).chain(others.copied()).collect();
     let mut all: Vec<(f64, u64, String)> = seeds
         .into_par_iter()
         .map(|seed| {

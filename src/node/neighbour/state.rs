@@ -401,7 +401,7 @@ impl Neighbour {
                 } else {
                     none
                 };
-                let is_known = node == self.replaced && !candidate.nearer;
+                let is_known = node == self.replaced && !candidate.nearer && !waits;
                 candidate.is_better()
                     && (is_known || self.damping.has_waited(distance, more, now, settings))
             }
@@ -575,8 +575,11 @@ impl Neighbour {
     /// Returns true if the node `distance` places away and this relay hear each other. The link is not held down.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
-        let known = mask(distance) & self.both_ways.recent(now, settings) & !held != 0;
-        known || self.is_mutual() && self.distance == distance && self.liveness.is_present()
+        let is_in = |nodes: u8| mask(distance) & nodes != 0;
+        // A linked neighbour that is silent may be about to be lost.
+        let is_linked = self.is_mutual() && self.distance == distance;
+        is_in(self.both_ways.recent(now, settings) & !held)
+            || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
     /// Returns true if the neighbour here is linked, and less than `distance` places away.
