@@ -57,22 +57,22 @@ pub enum Event {
     /// epoch is older, or the same with the same seed, and none between them is newer: the node did not increase its epoch at its
     /// last start, and its frames are rejected. An operator increases that node's epoch and restarts it, or restarts this relay and
     /// its other neighbours. A replay of one recorded frame does not raise it, but a replay in order of five handshakes of one
-    /// start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive ([`Event::IndexTaken`]).
+    /// start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
         /// Index of the node.
         node: u16,
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
-    /// `Relay::stands_down`). If it is a neighbour's, that index is received at both ports. An operator lands one of the two and
+    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of the two and
     /// gives it the right index. Raised once until the other node has been silent for twice `dead_after`. With signed frames, an
     /// attacker without the key can raise it, but cause nothing else.
-    IndexTaken {
+    DuplicateIndex {
         /// Duplicate index.
         node: u16,
     },
     /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
-    Reformed,
+    ViewAccepted,
     /// The lease has expired: the relay holds its position and requests a new view. It is no longer certain that all relays of
     /// the view use the last agreement. Raised once until a view is agreed on.
     LeaseLapsed,
@@ -89,7 +89,7 @@ pub enum Event {
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::belief`). New positions follow.
-    Believed,
+    NewEstimate,
     /// The measurements do not fit a single source on the ground (raised at the leader). They may also be too few, or
     /// contradictory. `Relay::unfit` gives the reason.
     InterfererUnclear,
@@ -109,7 +109,7 @@ pub enum Event {
 /// Events without a node, in polling order: `FIRST`, then events with a node, then `LAST`.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const LAST: &[Event] = &[
-    Event::Reformed,
+    Event::ViewAccepted,
     Event::LeaseLapsed,
     Event::NoQuorum,
     Event::UploadRefused {
@@ -129,7 +129,7 @@ const LAST: &[Event] = &[
     },
     Event::Uploaded,
     Event::Adopted,
-    Event::Believed,
+    Event::NewEstimate,
     Event::InterfererUnclear,
 ];
 
@@ -168,7 +168,7 @@ impl About {
             Self::Mission => Event::MissionMismatch { node },
             Self::Key => Event::KeyMismatch { node },
             Self::Epoch => Event::EpochWentBack { node },
-            Self::Index => Event::IndexTaken { node },
+            Self::Index => Event::DuplicateIndex { node },
             Self::Sensor => Event::SensorOff { node },
         }
     }

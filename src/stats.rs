@@ -9,7 +9,7 @@ pub struct Stats {
     /// Retransmissions of round messages (sweeps, gatherings, tokens) and proposals after a missing reply.
     pub repeats: u32,
     /// Passes of any kind, and proposals, that this relay has started as the leader.
-    pub sweeps: u32,
+    pub passes_begun: u32,
     /// Messages received from a neighbour with values in range. Some are also counted below, for example as stale.
     pub received: u32,
     /// Duplicate passes and proposals, to which the reply is sent again.
@@ -50,7 +50,7 @@ pub struct Stats {
     /// Messages of a pass or view change that is over or cannot be joined. Offers that answer no recent hello.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or without a measurement in progress.
-    pub samples_refused: u32,
+    pub samples_rejected: u32,
 }
 
 impl Stats {

@@ -51,13 +51,13 @@ impl Answerer {
         if let Message::Sweep(sweep) = message {
             say(&Message::Verdict(Answer {
                 number: sweep.number,
-                mission: sweep.mission,
+                view_digest: sweep.view_digest,
                 verdict: Verdict {
                     commit: None,
                     slacks: sweep.ladder.targets(),
                 },
                 own: sweep.chosen,
-                stand: None,
+                required_x_m: None,
             }));
         }
     }

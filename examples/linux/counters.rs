@@ -9,7 +9,7 @@ pub fn counted(stats: &Stats) -> Value {
     json!({
         "sent": stats.sent,
         "repeats": stats.repeats,
-        "sweeps": stats.sweeps,
+        "sweeps": stats.passes_begun,
         "received": stats.received,
         "repeated": stats.repeated,
         "overheard": stats.overheard,
@@ -30,6 +30,6 @@ pub fn counted(stats: &Stats) -> Value {
         "view": stats.view,
         "views": stats.views,
         "stale": stats.stale,
-        "samples_refused": stats.samples_refused,
+        "samples_rejected": stats.samples_rejected,
     })
 }

@@ -55,7 +55,7 @@ impl Movement {
     /// Handles a setpoint change; returns the line to log, if any.
     pub(crate) fn changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
         if self.is_sparse {
-            return self.next(now, relay.setpoint(), relay.final_setpoint());
+            return self.next(now, relay.setpoint(), relay.agreed_place());
         }
         let setpoint = relay.setpoint()?;
         self.log(setpoint);
@@ -69,7 +69,7 @@ impl Movement {
         relay: &Relay,
         drone: Option<Placement>,
     ) -> (Option<Step>, Option<Instant>) {
-        let (setpoint, agreed) = (relay.setpoint(), relay.final_setpoint());
+        let (setpoint, agreed) = (relay.setpoint(), relay.agreed_place());
         if self.is_sparse
             && let Some(step) = self.next(now, setpoint, agreed)
         {

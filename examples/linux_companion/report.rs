@@ -129,8 +129,8 @@ impl Report {
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
             Event::Infeasible => tell("infeasible", format_args!("no target SIR can be met")),
             Event::Adopted => self.adopted(now, relay),
-            Event::Reformed => self.reformed(now, relay),
-            Event::Believed => self.believed(now, relay.belief()),
+            Event::ViewAccepted => self.reformed(now, relay),
+            Event::NewEstimate => self.believed(now, relay.belief()),
             Event::LeaseLapsed => tell(
                 "lease expired",
                 format_args!(
@@ -205,7 +205,7 @@ impl Report {
             | Event::MissionMismatch { node }
             | Event::KeyMismatch { node }
             | Event::EpochWentBack { node }
-            | Event::IndexTaken { node }
+            | Event::DuplicateIndex { node }
             | Event::SensorOff { node } => (node, None),
             other => return self.log.tell(now, "event", format_args!("{other:?}")),
         };
@@ -252,7 +252,7 @@ impl Report {
                     "the measurements of {name} do not fit those of the others and are ignored; check its receiver"
                 ),
             ),
-            _ if relay.stands_down() => say(
+            _ if relay.is_passive() => say(
                 "duplicate index",
                 format_args!(
                     "another relay uses number {node}, and this one is passive, without a setpoint; land one and give it its own --index"

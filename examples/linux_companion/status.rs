@@ -31,7 +31,7 @@ pub(crate) fn of_relay(
         "target_sir": relay.target(),
         "transmitter_w": relay.level_w(Side::Upstream),
         "receiver_w": relay.level_w(Side::Downstream),
-        "stands_down": relay.stands_down(),
+        "is_passive": relay.is_passive(),
         "ready": relay.is_ready(),
         "waits": hold_reasons::reasons(relay).map(|reason| reason.map(hold_reasons::word)),
         "lost": lost.nodes(),

@@ -47,7 +47,7 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
         ("distance", format!("{distance_m} m")),
         ("altitude", format!("{} m", common.altitude_m)),
         ("altitudes to choose from", range(band)),
-        ("room to the side", range(lateral)),
+        ("lateral range", range(lateral)),
         ("power of the transmitter", format!("{tx_power_w} W")),
         ("power of a relay", format!("{} W", common.power_w)),
         (

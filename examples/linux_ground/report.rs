@@ -150,7 +150,7 @@ impl Outside {
                 )
             } else if leaves(sides(asked), sides(own)) {
                 (
-                    "room to the side",
+                    "lateral range",
                     sides(asked),
                     sides(own),
                     "this --lateral-min-m and --lateral-max-m",

@@ -287,7 +287,7 @@ pub(crate) fn event(event: Event, relay: &Relay) {
     if event == Event::Adopted {
         defmt::info!("mission version {=u16} adopted", relay.version());
     }
-    if event == Event::Believed
+    if event == Event::NewEstimate
         && let Belief::Source { source, .. } = relay.belief().belief
     {
         defmt::info!(

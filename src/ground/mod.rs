@@ -89,7 +89,7 @@ pub struct Ground {
     /// True if its next hello answers a question.
     asked: bool,
     /// Number of the hello that the next offer answers.
-    answer: Option<u16>,
+    offer_number: Option<u16>,
     due: bool,
     again: Option<Instant>,
     /// Clock, started by the first upload.
@@ -129,7 +129,7 @@ impl Ground {
             unanswered: 0,
             holds: None,
             asked: false,
-            answer: None,
+            offer_number: None,
             due: false,
             again: None,
             clock: MonotonicClock::new(Instant::ZERO),
@@ -176,7 +176,7 @@ impl Ground {
     /// Sends the first hello of an upload or a question.
     fn start(&mut self, now: Instant) {
         self.holds = None;
-        self.answer = None;
+        self.offer_number = None;
         self.unanswered = 0;
         self.due = true;
         self.clock = MonotonicClock::new(now);
@@ -271,7 +271,10 @@ impl Ground {
                 &mut self.stats.received
             }
             Some(Message::Hello(_)) => &mut self.stats.mission,
-            Some(Message::Offer { upload, answer }) if self.is_answer(upload, *answer) => {
+            Some(Message::Offer {
+                upload,
+                offer_number,
+            }) if self.is_answer(upload, *offer_number) => {
                 self.told(sender, *upload);
                 &mut self.stats.received
             }
@@ -315,8 +318,8 @@ impl Ground {
         }
         let flown = FlownMission {
             by,
-            version: hello.holds.version,
-            flies: hello.flies,
+            version: hello.latest_mission.version,
+            flies: hello.active,
             upload: None,
         };
         if flown.is_known() {
@@ -336,37 +339,37 @@ impl Ground {
         self.unanswered = 0;
         self.distance = distance;
         // A relay does not hold a refused mission, which may be another one than this upload.
-        let is_refused = hello.refused && hello.holds == mission_id;
+        let is_refused = hello.refused && hello.latest_mission == mission_id;
         let holds = if hello.refused && !is_refused {
             MissionId {
                 version: 0,
                 digest: self.base,
             }
         } else {
-            hello.holds
+            hello.latest_mission
         };
         self.holds = Some(holds);
         let progress = if is_refused {
             Progress::Refused { by }
         } else if holds > mission_id {
             Progress::Outdated {
-                version: hello.holds.version,
+                version: hello.latest_mission.version,
             }
         } else if holds < mission_id {
             // A relay also answers an offer with a hello. Only an answer to a question causes an offer, otherwise the exchange
             // would not end.
             if core::mem::take(&mut self.asked) {
-                self.answer = Some(hello.nonce);
+                self.offer_number = Some(hello.offer_number);
                 self.due = true;
             }
             Progress::Offering
-        } else if hello.flies && hello.whole {
+        } else if hello.active && hello.active_in_view {
             Progress::Flown {
                 by,
-                view: hello.newest,
+                view: hello.latest_view,
                 relays: hello.behind,
             }
-        } else if hello.flies {
+        } else if hello.active {
             Progress::Adopted { by }
         } else {
             Progress::Held { by }
@@ -395,7 +398,7 @@ impl Ground {
         if self.unanswered >= QUESTIONS {
             self.unanswered = 0;
             self.holds = None;
-            self.answer = None;
+            self.offer_number = None;
             self.distance = if self.distance < self.within {
                 self.distance + 1
             } else {
@@ -448,28 +451,33 @@ impl Ground {
         };
         let id = self.upload.map_or(loaded, |upload| upload.id());
         let older = self.holds.is_some_and(|holds| holds < id);
-        let answer = self.answer.filter(|_| older && self.endpoint.knows(to));
-        let message = if let (Some(upload), Some(answer)) = (self.upload, answer) {
-            self.answer = None;
-            Message::Offer { upload, answer }
+        let offer_number = self
+            .offer_number
+            .filter(|_| older && self.endpoint.knows(to));
+        let message = if let (Some(upload), Some(offer_number)) = (self.upload, offer_number) {
+            self.offer_number = None;
+            Message::Offer {
+                upload,
+                offer_number,
+            }
         } else {
             let asks = self.upload.is_none();
             self.asked = true;
             Message::Hello(Hello {
                 mission: self.base,
-                newest: ViewId::LOADED,
+                latest_view: ViewId::LOADED,
                 hears: 0,
                 behind: 1,
                 neighbour: 0,
-                ask: true,
-                form: false,
+                requests_reply: true,
+                requests_view: false,
                 fresh: false,
                 ready: true,
-                holds: id,
-                flies: false,
-                whole: false,
+                latest_mission: id,
+                active: false,
+                active_in_view: false,
                 refused: false,
-                nonce: if asks { self.question } else { 0 },
+                offer_number: if asks { self.question } else { 0 },
             })
         };
         self.endpoint.transmit(to, &message, frame, &mut self.stats)

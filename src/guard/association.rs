@@ -23,7 +23,7 @@ const SEEN_REMINDERS: u8 = 15;
 
 /// Association that this relay has left, until the neighbour starts a new one.
 #[derive(Clone, Copy, Debug)]
-struct Parting {
+struct LeaveNotice {
     own: u16,
     heard: u16,
     due: bool,
@@ -48,19 +48,19 @@ pub(super) struct Association {
     pub(super) due: bool,
     /// True if the neighbour forwarded a request to open the chain; and the last such request sent to it.
     pub(super) opens: bool,
-    told_open: bool,
+    open_sent: bool,
     /// Reminders until the neighbour's halt request expires, 0 for none.
-    halt_left: u8,
+    halt_reminders_left: u8,
     /// True while a halt request is sent to the neighbour.
-    told_halt: bool,
+    halt_sent: bool,
     /// Number of the association that the neighbour has left, 0 for none. The neighbour is absent, that is not flown.
     absent: u16,
     /// Pending notice of the association that this relay has left.
-    parting: Option<Parting>,
+    leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, in any association, m; NaN before the first.
     seen_m: f32,
     /// Reminders until that x expires.
-    seen_left: u8,
+    seen_reminders_left: u8,
 }
 
 impl Association {
@@ -73,31 +73,31 @@ impl Association {
             strays: 0,
             due: true,
             opens: false,
-            told_open: false,
-            halt_left: 0,
-            told_halt: false,
+            open_sent: false,
+            halt_reminders_left: 0,
+            halt_sent: false,
             absent: 0,
-            parting: None,
+            leave_notice: None,
             seen_m: f32::NAN,
-            seen_left: 0,
+            seen_reminders_left: 0,
         }
     }
 
     /// Returns true without a flown neighbour: the chain ends here, or the neighbour is absent.
-    pub(super) const fn is_none(&self) -> bool {
+    pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
 
     /// Stores the x of a neighbour's message.
-    pub(super) const fn see(&mut self, x_m: f32) {
-        (self.seen_m, self.seen_left) = (x_m, SEEN_REMINDERS);
+    pub(super) const fn record_x(&mut self, x_m: f32) {
+        (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
     /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m. NaN if unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
-            _ if self.seen_left == 0 => f32::NAN,
+            _ if self.seen_reminders_left == 0 => f32::NAN,
             Side::Upstream => x_m - self.seen_m,
             Side::Downstream => self.seen_m - x_m,
         }
@@ -105,7 +105,7 @@ impl Association {
 
     /// Returns the neighbour's last x, m; NaN if it is unknown or expired.
     pub(super) const fn seen_m(&self) -> f32 {
-        if self.seen_left == 0 {
+        if self.seen_reminders_left == 0 {
             f32::NAN
         } else {
             self.seen_m
@@ -127,32 +127,32 @@ impl Association {
     }
 
     /// Marks the neighbour as absent: it has left the association of that number, and may be anywhere.
-    pub(super) const fn miss(&mut self, association: u16) {
+    pub(super) const fn mark_absent(&mut self, association: u16) {
         self.absent = association;
     }
 
     /// Accepts the neighbour's association number; an absent neighbour is back.
-    pub(super) const fn meet(&mut self, association: u16) {
+    pub(super) const fn pair(&mut self, association: u16) {
         self.heard = association;
         self.absent = 0;
     }
 
     /// Returns true if a message states that the neighbour has left this association. The echoed number is not used again, so a
     /// repetition of the message belongs to an earlier association.
-    pub(super) const fn is_left(&self, fence: &Fence) -> bool {
-        fence.says(Fence::RELEASED) && fence.echo == self.own
+    pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
+        fence.has_flag(Fence::LEFT) && fence.echo == self.own
     }
 
     /// Returns the next association after this relay has left this one. It has a notice if the neighbour relies on this one.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
-        let left = Parting {
+        let left = LeaveNotice {
             own: self.own,
             heard: self.heard,
             due: true,
         };
         Self {
-            parting: if self.heard == 0 {
-                self.parting
+            leave_notice: if self.heard == 0 {
+                self.leave_notice
             } else {
                 Some(left)
             },
@@ -163,23 +163,23 @@ impl Association {
     /// Returns the next association; a pending notice of an earlier one is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
-            parting: self.parting,
+            leave_notice: self.leave_notice,
             ..Self::new(self.node, jitter)
         }
     }
 
     /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. The notice is repeated
     /// until the neighbour starts a new association.
-    pub(super) fn is_over(&mut self, fence: &Fence) -> bool {
-        if let Some(parting) = &mut self.parting {
-            let left = fence.association == parting.heard;
+    pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
+        if let Some(leave_notice) = &mut self.leave_notice {
+            let left = fence.association == leave_notice.heard;
             let is_new = fence.echo == 0 || fence.echo == self.own;
-            if left && fence.says(Fence::RELEASED) || !left && is_new {
-                self.parting = None;
+            if left && fence.has_flag(Fence::LEFT) || !left && is_new {
+                self.leave_notice = None;
             } else {
                 // The neighbour still relies on that association, or on an earlier one.
-                parting.heard = fence.association;
-                parting.due = true;
+                leave_notice.heard = fence.association;
+                leave_notice.due = true;
             }
             if left || !is_new {
                 return true;
@@ -190,22 +190,22 @@ impl Association {
 
     /// Schedules a pending notice again; returns true if there is one.
     pub(super) const fn remind(&mut self) -> bool {
-        if let Some(parting) = &mut self.parting {
-            parting.due = true;
+        if let Some(leave_notice) = &mut self.leave_notice {
+            leave_notice.due = true;
         }
-        self.parting.is_some()
+        self.leave_notice.is_some()
     }
 
     /// Returns the notice that this relay has left its association, if it is due.
-    pub(super) fn part(&mut self) -> Option<Fence> {
-        let parting = self.parting.as_mut()?;
-        core::mem::take(&mut parting.due).then(|| Fence {
-            flags: Fence::RELEASED,
-            ..Fence::without_place(parting.own, parting.heard)
+    pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
+        let leave_notice = self.leave_notice.as_mut()?;
+        core::mem::take(&mut leave_notice.due).then(|| Fence {
+            flags: Fence::LEFT,
+            ..Fence::without_place(leave_notice.own, leave_notice.heard)
         })
     }
 
-    pub(super) const fn knows(&mut self, association: u16, echo: u16) -> bool {
+    pub(super) const fn is_current(&mut self, association: u16, echo: u16) -> bool {
         let known = association == self.heard && echo == self.own;
         if known {
             self.strays = 0;
@@ -221,75 +221,75 @@ impl Association {
             number: 0,
             x_m: 0.0,
             target_m: own.target_m(),
-            across: own.across(),
+            across: own.cross_section(),
             apart_m: 0.0,
-            flags: u8::from(own.still) * Fence::STILL
-                + u8::from(self.told_open) * Fence::OPENS
-                + u8::from(self.opens) * Fence::ECHO_OPENS
-                + u8::from(self.told_halt) * Fence::HALTS,
+            flags: u8::from(own.still) * Fence::ARRIVED
+                + u8::from(self.open_sent) * Fence::REQUESTS_OPENING
+                + u8::from(self.opens) * Fence::OPENING_RECEIVED
+                + u8::from(self.halt_sent) * Fence::HALTS,
         }
     }
 
     /// Takes the open request from a message of this association. A reply is due if the neighbour has not received the last
     /// request of this relay.
-    pub(super) const fn hear_open(&mut self, fence: &Fence) {
-        self.opens = fence.says(Fence::OPENS);
-        self.due |= fence.says(Fence::ECHO_OPENS) != self.told_open;
+    pub(super) const fn receive_open(&mut self, fence: &Fence) {
+        self.opens = fence.has_flag(Fence::REQUESTS_OPENING);
+        self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
     /// Forwards a request to open the chain, or its end.
-    pub(super) const fn pass_open(&mut self, opens: bool) {
-        self.due |= self.told_open != opens;
-        self.told_open = opens;
+    pub(super) const fn forward_open(&mut self, opens: bool) {
+        self.due |= self.open_sent != opens;
+        self.open_sent = opens;
     }
 
     /// Takes the halt request from any message of the neighbour. A request is only withdrawn by a relay that is in order on its
     /// other side (`is_placed`), because a rebooted one does not know its earlier request.
-    pub(super) const fn hear_halt(&mut self, fence: &Fence, is_placed: bool) {
-        if fence.says(Fence::HALTS) {
-            self.halt_left = HALT_REMINDERS;
+    pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
+        if fence.has_flag(Fence::HALTS) {
+            self.halt_reminders_left = HALT_REMINDERS;
         } else if is_placed {
-            self.halt_left = 0;
+            self.halt_reminders_left = 0;
         }
     }
 
-    pub(super) const fn requests_halt(&self) -> bool {
-        self.halt_left > 0
+    pub(super) const fn has_halt_request(&self) -> bool {
+        self.halt_reminders_left > 0
     }
 
     /// Forwards a halt request, or its end.
-    pub(super) const fn pass_halt(&mut self, halts: bool) {
-        self.due |= self.told_halt != halts;
-        self.told_halt = halts;
+    pub(super) const fn forward_halt(&mut self, halts: bool) {
+        self.due |= self.halt_sent != halts;
+        self.halt_sent = halts;
     }
 
-    pub(super) const fn tells_halt(&self) -> bool {
-        self.told_halt
+    pub(super) const fn sends_halt(&self) -> bool {
+        self.halt_sent
     }
 
     /// Counts a reminder. A received halt request or position expires unless it is repeated within some reminders.
-    pub(super) const fn age(&mut self) {
-        self.halt_left = self.halt_left.saturating_sub(1);
-        self.seen_left = self.seen_left.saturating_sub(1);
+    pub(super) const fn count_reminder(&mut self) {
+        self.halt_reminders_left = self.halt_reminders_left.saturating_sub(1);
+        self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
     /// Returns the message of a relay without an association: one that is not flown or has just started.
     ///
     /// It contains the relay's position, and a halt request to forward.
-    pub(super) fn tell_alone(&mut self, own: &Own) -> Option<Fence> {
-        let is_due = self.due && self.node != 0 && self.parting.is_none();
+    pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
+        let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
         self.due = false;
         Some(Fence {
             x_m: place.x_m,
             across: place.cross_section(),
-            flags: Fence::RELEASED | Fence::UNPLACED | (u8::from(self.told_halt) * Fence::HALTS),
+            flags: Fence::LEFT | Fence::UNPLACED | (u8::from(self.halt_sent) * Fence::HALTS),
             ..Fence::without_place(self.own, 0)
         })
     }
 
     /// Counts a message of another association; returns true if they are too many to be late ones.
-    pub(super) const fn stray(&mut self) -> bool {
+    pub(super) const fn count_foreign(&mut self) -> bool {
         self.strays = self.strays.saturating_add(1);
         self.strays >= STRAYS
     }
@@ -334,7 +334,7 @@ impl KeepOut {
     }
 
     /// Removes lost relays at or beyond `node`, which has sent a message.
-    pub(super) fn spoken(&mut self, side: Side, node: u16) {
+    pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
             Side::Downstream => lost >= node,
@@ -349,15 +349,15 @@ impl KeepOut {
 
     /// Takes a message that the neighbour is not flown, with its reported position. One of the current association is late, and
     /// ignored.
-    pub(super) fn see(&mut self, association: &Association, fence: &Fence) {
+    pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.heard;
-        if fence.says(Fence::RELEASED) && fence.says(Fence::UNPLACED) && !is_late {
+        if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
             self.unflown = Some((association.node, fence.across.at(fence.x_m)));
         }
     }
 
     /// Removes the obstacle: the neighbour is flown.
-    pub(super) const fn flies(&mut self) {
+    pub(super) const fn remove_unflown(&mut self) {
         self.unflown = None;
     }
 
@@ -377,15 +377,20 @@ impl KeepOut {
     }
 
     /// Returns true if a drone that is not flown blocks this relay's path to its agreed position.
-    pub(super) fn bars(&self, own: &Own) -> bool {
+    pub(super) fn blocks(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
-        ways.is_some_and(|(from, to)| self.way(from, to, &own.config) != to)
+        ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
     /// Returns the part of the path from `from` to `to` that keeps clear of a drone that is not flown. It keeps the separation. If
     /// `from` is closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the
     /// separation apart across the line. Within the separation along x only moves across the line away from the drone remain.
-    pub(super) fn way(&self, from: Placement, to: Placement, config: &GuardConfig) -> Placement {
+    pub(super) fn path_end(
+        &self,
+        from: Placement,
+        to: Placement,
+        config: &GuardConfig,
+    ) -> Placement {
         let Some((_, drone)) = self.unflown else {
             return to;
         };
@@ -418,7 +423,7 @@ impl KeepOut {
     }
 
     /// Marks the last lost relay as possibly closer than the separation, until this relay reaches `near_m`.
-    pub(super) const fn near(&mut self, near_m: f32) {
+    pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
@@ -433,7 +438,7 @@ impl KeepOut {
     }
 
     /// Ends that state if this relay is beyond `near_m` by `is_beyond`. It then stays at least that far away.
-    pub(super) fn part(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
+    pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
                 *limit_m = match side {
@@ -492,27 +497,27 @@ pub struct Fence {
     /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
     /// must not move across the line.
     pub apart_m: f32,
-    /// Sum of the flags [`STILL`](Self::STILL) to [`UNPLACED`](Self::UNPLACED) that are set.
+    /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
 }
 
 impl Fence {
     /// Flag: the sender has arrived at its position across the line.
-    pub const STILL: u8 = 1;
+    pub const ARRIVED: u8 = 1;
     /// Flag of the follower: it agrees to `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: the sender, or a relay beyond it, has to move across the line. It needs the separation along x for that.
-    pub const OPENS: u8 = 4;
-    /// Flag: echo of the last [`OPENS`](Self::OPENS) received from the destination.
-    pub const ECHO_OPENS: u8 = 8;
+    pub const REQUESTS_OPENING: u8 = 4;
+    /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
+    pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
     /// number of the fence are not valid.
-    pub const RELEASED: u8 = 16;
+    pub const LEFT: u8 = 16;
     /// Flag: the sender, or a relay beyond it, is not in order with its neighbours. All relays hold their positions. It is repeated
     /// every second, and valid in any association.
     pub const HALTS: u8 = 32;
     /// Flag: the position shows the order only, and grants nothing. Of the follower: it is not in order with its neighbour
-    /// downstream. With [`RELEASED`](Self::RELEASED): the sender is not flown, and `x_m` is its last reported x.
+    /// downstream. With [`LEFT`](Self::LEFT): the sender is not flown, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_place(association: u16, echo: u16) -> Self {
@@ -528,7 +533,7 @@ impl Fence {
         }
     }
 
-    pub(super) const fn says(&self, flag: u8) -> bool {
+    pub(super) const fn has_flag(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
 

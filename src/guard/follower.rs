@@ -58,7 +58,7 @@ impl FenceFollower {
     /// heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
-        if !self.association.is_none() {
+        if !self.association.has_no_flown_neighbour() {
             // The limit is where this relay has come to, not where it was requested to go.
             let limit_m = self.least(own).min(own.reachable.at_m);
             let separation_m = own.config.separation_m;
@@ -66,11 +66,11 @@ impl FenceFollower {
             let missing_m = separation_m - self.asked_m.min(self.taken_m).min(separation_m);
             keep_out.raise(Side::Upstream, self.association.node, limit_m + missing_m);
             if missing_m > 0.0 {
-                keep_out.near(limit_m + missing_m);
+                keep_out.mark_near(limit_m + missing_m);
             } else if !self.is_agreed() {
-                keep_out.near(limit_m + separation_m);
+                keep_out.mark_near(limit_m + separation_m);
             } else if !self.clear {
-                keep_out.near(self.fence_m);
+                keep_out.mark_near(self.fence_m);
             }
         }
         *self = Self {
@@ -108,44 +108,45 @@ impl FenceFollower {
             self.keep_out.raise(Side::Upstream, node, at_m);
         }
         if is_ordered {
-            self.association.miss(association);
+            self.association.mark_absent(association);
         }
     }
 
-    pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
-        let is_placed = !fence.says(Fence::RELEASED) && fence.number != 0;
-        self.association.hear_halt(fence, is_placed);
-        self.keep_out.see(&self.association, fence);
+    pub(super) fn handle_fence(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
+        let is_placed = !fence.has_flag(Fence::LEFT) && fence.number != 0;
+        self.association.receive_halt(fence, is_placed);
+        self.keep_out.record_x(&self.association, fence);
         // With a fence number the x is that of the fence, which may be far from its owner.
-        if fence.says(Fence::UNPLACED) || !fence.says(Fence::RELEASED) && fence.number == 0 {
-            self.association.see(fence.x_m);
+        if fence.has_flag(Fence::UNPLACED) || !fence.has_flag(Fence::LEFT) && fence.number == 0 {
+            self.association.record_x(fence.x_m);
         }
-        if self.association.is_over(fence) || fence.says(Fence::RELEASED) {
-            if self.association.is_left(fence) {
+        if self.association.is_of_left_association(fence) || fence.has_flag(Fence::LEFT) {
+            if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
             // A relay without an association needs no reply.
-            self.association.due |= !fence.says(Fence::UNPLACED);
+            self.association.due |= !fence.has_flag(Fence::UNPLACED);
             return;
         }
-        self.keep_out.flies();
+        self.keep_out.remove_unflown();
         if self.association.heard == 0 {
-            self.association.meet(fence.association);
-        } else if fence.association != self.association.heard && self.association.stray() {
+            self.association.pair(fence.association);
+        } else if fence.association != self.association.heard && self.association.count_foreign() {
             self.renew(own, jitter);
             self.association.heard = fence.association;
         }
         // Always reply, since the message may be repeated because a reply was lost.
         self.association.due = true;
-        if !self.association.knows(fence.association, fence.echo) {
+        if !self.association.is_current(fence.association, fence.echo) {
             return;
         }
-        self.association.hear_open(fence);
+        self.association.receive_open(fence);
         self.target_m = fence.target_m;
         let ahead = fence.number.wrapping_sub(self.number);
         if fence.number != 0 && (self.number == 0 || (1..AHEAD).contains(&ahead)) {
             if self.number == 0 {
-                self.keep_out.spoken(Side::Upstream, self.association.node);
+                self.keep_out
+                    .on_fence(Side::Upstream, self.association.node);
             }
             self.number = fence.number;
             self.fence_m = fence.x_m;
@@ -157,7 +158,7 @@ impl FenceFollower {
     /// Returns the smallest allowed x, m; above the current setpoint, it is a request to go there.
     #[inline(never)] // called from several places
     pub(super) fn least(&self, own: &Own) -> f32 {
-        let granted = match (self.association.is_none(), self.number) {
+        let granted = match (self.association.has_no_flown_neighbour(), self.number) {
             (true, _) => f32::NEG_INFINITY,
             (false, 0) => own.reachable.at_m,
             (false, _) => self.fence_m,
@@ -167,7 +168,9 @@ impl FenceFollower {
 
     /// Returns true if this side allows a move across the line.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
-        (self.association.is_none() || self.clear) && !self.is_held(own) && !self.keep_out.is_near()
+        (self.association.has_no_flown_neighbour() || self.clear)
+            && !self.is_held(own)
+            && !self.keep_out.is_near()
     }
 
     /// Returns true if this relay must not move across the line. Its position there may separate the two.
@@ -206,7 +209,8 @@ impl FenceFollower {
 
     /// Returns true without a neighbour, or if the neighbour has found this relay beyond it. Before, it announces no fence.
     pub(super) const fn is_ordered(&self) -> bool {
-        !self.keep_out.is_disordered() && (self.association.is_none() || self.is_agreed())
+        !self.keep_out.is_disordered()
+            && (self.association.has_no_flown_neighbour() || self.is_agreed())
     }
 
     /// Returns true if the neighbour upstream has reported that it is beyond this relay.
@@ -240,8 +244,8 @@ impl FenceFollower {
 
     /// Returns the pending message, with `low_m` as the valid x. A relay that is not `placed`, that is in order with its
     /// neighbour downstream, only sends a halt request.
-    pub(super) fn tell(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
-        let is_due = self.association.due && (placed || self.association.tells_halt());
+    pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
+        let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {
             return None;
         }
@@ -264,15 +268,15 @@ impl FenceFollower {
         }
         let target_m = own.target_m();
         let limit = self.keep_out.limit_m();
-        let stays = self.keep_out.is_near() && !own.is_across();
-        let bars = self.keep_out.bars(own);
+        let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
+        let bars = self.keep_out.blocks(own);
         if stays || bars || limit.is_some_and(|limit| target_m < limit) {
             return Some(
                 self.keep_out
                     .reason(self.association.node, HoldReason::Lost),
             );
         }
-        if self.association.is_none() {
+        if self.association.has_no_flown_neighbour() {
             return None;
         }
         if self.is_out_of_order(own) {

@@ -238,10 +238,11 @@ impl Guard {
         }
         match side {
             Side::Upstream if self.follower.association.node == from => {
-                self.follower.hear(fence, &self.own, &mut self.jitter);
+                self.follower
+                    .handle_fence(fence, &self.own, &mut self.jitter);
             }
             Side::Downstream if self.owner.association.node == from => {
-                self.owner.hear(fence, &self.own, &mut self.jitter);
+                self.owner.handle_fence(fence, &self.own, &mut self.jitter);
             }
             _ => {}
         }
@@ -276,7 +277,7 @@ impl Guard {
                 low_m,
                 &mut self.follower.keep_out,
             ),
-            Side::Downstream => (self.owner.is_heard(), high_m, &mut self.owner.keep_out),
+            Side::Downstream => (self.owner.has_reply(), high_m, &mut self.owner.keep_out),
         };
         keep_out.clear();
         if others && !is_heard {
@@ -315,7 +316,7 @@ impl Guard {
         };
         let mut least = self.follower.least(own);
         let mut most = self.owner.most(own, apart);
-        if !own.is_across() {
+        if !own.has_agreed_cross_section() {
             // A relay that has to move across the line first moves away from one that became silent nearby.
             least = least.max(self.follower.keep_out.near_m());
             most = most.min(self.owner.keep_out.near_m());
@@ -329,11 +330,11 @@ impl Guard {
         // A relay outside of the geofence returns as far as its limits allow, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
         let next = own.config.cut_toward(wanted, before);
-        let from = own.way_begins(before);
-        let next = self.follower.keep_out.way(from, next, &own.config);
-        let next = self.owner.keep_out.way(from, next, &own.config);
+        let from = own.path_start(before);
+        let next = self.follower.keep_out.path_end(from, next, &own.config);
+        let next = self.owner.keep_out.path_end(from, next, &own.config);
         self.own.reachable.go(next.x_m, now);
-        self.own.go(next, now);
+        self.own.set_setpoint(next, now);
         if self.follower.is_ordered() {
             let upstream_m = self.follower.high_m(&self.own);
             self.owner.settle(&self.own, taken_m, upstream_m);
@@ -346,24 +347,24 @@ impl Guard {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
             .keep_out
-            .part(Side::Upstream, |near_m| low_m >= near_m);
+            .end_near(Side::Upstream, |near_m| low_m >= near_m);
         self.owner
             .keep_out
-            .part(Side::Downstream, |near_m| high_m <= near_m);
+            .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
     /// Updates the open state of the chain, and forwards requests away from the relay that needs it.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
-        let waits = !clear && !own.is_across();
+        let waits = !clear && !own.has_agreed_cross_section();
         let close = self.follower.is_close(own) || self.owner.is_close(own);
         let tight = close && (self.follower.is_tight() || self.owner.is_tight());
         let needs = tight || waits && (self.follower.is_held(own) || self.owner.holds(own));
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         own.open = needs || up.opens || down.opens;
         let (upward, downward) = (needs || down.opens, needs || up.opens);
-        up.pass_open(upward);
-        down.pass_open(downward);
+        up.forward_open(upward);
+        down.forward_open(downward);
     }
 
     /// Returns true if this relay is known to be in order with both neighbours.
@@ -399,9 +400,9 @@ impl Guard {
     /// Forwards halt requests; returns true if there are any.
     fn pass_halt(&mut self) -> bool {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-        let (upstream, downstream) = (up.requests_halt(), down.requests_halt());
-        up.pass_halt(self.disorder || downstream);
-        down.pass_halt(self.disorder || upstream);
+        let (upstream, downstream) = (up.has_halt_request(), down.has_halt_request());
+        up.forward_halt(self.disorder || downstream);
+        down.forward_halt(self.disorder || upstream);
         self.disorder || upstream || downstream
     }
 
@@ -414,7 +415,7 @@ impl Guard {
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         for (side, association) in [(Side::Upstream, up), (Side::Downstream, down)] {
-            if let Some(fence) = association.part() {
+            if let Some(fence) = association.poll_leave_notice() {
                 return Some((side, association.node, fence));
             }
         }
@@ -424,7 +425,7 @@ impl Guard {
             let told = [(Side::Upstream, up), (Side::Downstream, down)]
                 .into_iter()
                 .find_map(|(side, association)| {
-                    let fence = association.tell_alone(&self.own)?;
+                    let fence = association.poll_unpaired(&self.own)?;
                     Some((side, association.node, fence))
                 });
             if let Some((_, _, fence)) = &told {
@@ -436,16 +437,17 @@ impl Guard {
         let placed = self.owner.is_ordered(own);
         if placed {
             let taken_m = self.follower.taken_m();
-            self.follower.agree(own, self.owner.kept(own, taken_m));
+            self.follower
+                .agree(own, self.owner.kept_distance(own, taken_m));
         }
         let low_m = self.owner.low_m(own);
-        if let Some(fence) = self.follower.tell(own, low_m, placed) {
+        if let Some(fence) = self.follower.poll_fence(own, low_m, placed) {
             return Some((Side::Upstream, self.follower.association.node, fence));
         }
         let moves = self.follower.is_ordered();
         let upstream_m = self.follower.high_m(own);
         let taken_m = self.follower.taken_m();
-        let fence = self.owner.tell(own, taken_m, upstream_m, moves)?;
+        let fence = self.owner.poll_fence(own, taken_m, upstream_m, moves)?;
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
@@ -462,14 +464,14 @@ impl Guard {
         let follower = self.follower.association.node != 0 && !(there && self.follower.is_agreed());
         let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-        self.own.age();
+        self.own.count_reminder();
         // A relay without an association sends its position less often, unless it moves.
         self.reminders = self.reminders.wrapping_add(1);
         let speaks = begun || self.own.has_moved() || self.reminders.is_multiple_of(ALONE_EVERY);
-        up.due |= follower && (speaks || up.tells_halt());
-        down.due |= owner && (speaks || down.tells_halt());
-        up.age();
-        down.age();
+        up.due |= follower && (speaks || up.sends_halt());
+        down.due |= owner && (speaks || down.sends_halt());
+        up.count_reminder();
+        down.count_reminder();
         let leaves = up.remind() | down.remind();
         follower || owner || leaves
     }
@@ -483,7 +485,7 @@ impl Guard {
                 !(own.open || own.halted)
                     && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
                     && own.reachable.is_still()
-                    && own.is_across()
+                    && own.has_agreed_cross_section()
                     && own.still
             }
             _ => false,
@@ -512,7 +514,7 @@ impl Guard {
             Side::Upstream => &self.follower.association,
             Side::Downstream => &self.owner.association,
         };
-        let halted = association.requests_halt();
+        let halted = association.has_halt_request();
         reason
             .or(halted.then_some(HoldReason::Halted))
             .or_else(|| self.pending(side))

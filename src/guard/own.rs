@@ -122,7 +122,7 @@ impl ReachableInterval {
 }
 
 /// Reminders, one per second, after which a setpoint short of the agreed position is reported.
-const MOST_STANDS: u8 = 5;
+const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
@@ -168,8 +168,8 @@ impl Own {
         }
     }
 
-    pub(super) fn go(&mut self, setpoint: Placement, now: Instant) {
-        if self.across() != setpoint.cross_section() {
+    pub(super) fn set_setpoint(&mut self, setpoint: Placement, now: Instant) {
+        if self.cross_section() != setpoint.cross_section() {
             self.turned = now;
             self.still = false;
         }
@@ -180,7 +180,7 @@ impl Own {
     }
 
     /// Returns the start of the next path. On its way to `setpoint` the relay may stop as far along x as it was reported.
-    pub(super) fn way_begins(&self, setpoint: Placement) -> Placement {
+    pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
             Some(place) if !self.reachable.is_still() => (place.x_m, self.config.hover_m),
@@ -192,7 +192,7 @@ impl Own {
         setpoint.cross_section().at(x_m)
     }
 
-    pub(super) const fn age(&mut self) {
+    pub(super) const fn count_reminder(&mut self) {
         self.stands = self.stands.saturating_add(1);
     }
 
@@ -206,8 +206,8 @@ impl Own {
             Side::Upstream => setpoint.x_m - target.x_m,
             Side::Downstream => target.x_m - setpoint.x_m,
         };
-        let wants = ahead_m > self.config.rounding() || !clear && !self.is_across();
-        self.stands >= MOST_STANDS && wants
+        let wants = ahead_m > self.config.rounding() || !clear && !self.has_agreed_cross_section();
+        self.stands >= MAX_REMINDERS_STILL && wants
     }
 
     /// Returns true if the relay, while not flown, was reported away from the position that it has sent.
@@ -242,19 +242,19 @@ impl Own {
                 stop = reported.cross_section().at(stop.x_m);
             }
             self.reachable.go(stop.x_m, now);
-            self.go(stop, now);
+            self.set_setpoint(stop, now);
         }
     }
 
     pub(super) fn begin(&mut self, place: Placement, now: Instant) {
         self.left = place;
-        self.go(place, now);
+        self.set_setpoint(place, now);
     }
 
     /// Takes a report. The relay has arrived across the line if `at` is long enough after the last change there.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag
-            && self.is_near(place.cross_section(), self.across());
+            && self.is_near(place.cross_section(), self.cross_section());
         if let Some(setpoint) = self.setpoint.filter(|_| self.still) {
             self.left = setpoint;
         }
@@ -266,14 +266,14 @@ impl Own {
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
     }
 
-    pub(super) fn across(&self) -> CrossSection {
+    pub(super) fn cross_section(&self) -> CrossSection {
         self.setpoint.unwrap_or_default().cross_section()
     }
 
     /// Returns true if the setpoint across the line is the agreed one.
-    pub(super) fn is_across(&self) -> bool {
+    pub(super) fn has_agreed_cross_section(&self) -> bool {
         self.target
-            .is_none_or(|target| target.cross_section() == self.across())
+            .is_none_or(|target| target.cross_section() == self.cross_section())
     }
 
     pub(super) fn target_m(&self) -> f32 {

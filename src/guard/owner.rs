@@ -64,13 +64,13 @@ impl FenceOwner {
     /// heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
-        if !self.association.is_none() {
+        if !self.association.has_no_flown_neighbour() {
             let limit_m = self.most(own, own.config.separation_m);
             keep_out.raise(Side::Downstream, self.association.node, limit_m);
             if !self.is_ordered(own) {
-                keep_out.near(limit_m - own.config.separation_m);
+                keep_out.mark_near(limit_m - own.config.separation_m);
             } else if self.holds(own) || !self.clear {
-                keep_out.near(limit_m);
+                keep_out.mark_near(limit_m);
             }
         }
         *self = Self {
@@ -108,18 +108,19 @@ impl FenceOwner {
             self.keep_out.raise(Side::Downstream, node, at_m);
         }
         if is_ordered {
-            self.association.miss(association);
+            self.association.mark_absent(association);
         }
     }
 
-    pub(super) const fn is_heard(&self) -> bool {
+    pub(super) const fn has_reply(&self) -> bool {
         self.association.heard != 0
     }
 
     /// Returns true without a neighbour, or if the neighbour is beyond this relay.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
-            && (self.association.is_none() || self.is_heard() && self.is_beyond(own))
+            && (self.association.has_no_flown_neighbour()
+                || self.has_reply() && self.is_beyond(own))
     }
 
     /// Returns true if the neighbour downstream has reported that it is not beyond this relay. It may have done so with or without
@@ -127,7 +128,7 @@ impl FenceOwner {
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
-        } else if self.is_heard() {
+        } else if self.has_reply() {
             !self.is_beyond(own) && self.counted_m > f32::NEG_INFINITY
         } else {
             !self.is_ordered(own) && self.association.is_passed(own, Side::Downstream)
@@ -140,7 +141,7 @@ impl FenceOwner {
     /// once more at each relay, each time that one halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
-        let may_pass = own.config.least_step(own.across(), self.across) <= 0.0;
+        let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
         let least_m = match (self.clear, may_pass) {
             (true, _) => -2.0 * off_m - own.config.rounding(),
             (false, true) => -off_m - own.config.rounding(),
@@ -153,7 +154,7 @@ impl FenceOwner {
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
-        if !self.association.is_none() && self.is_heard() && is_lower {
+        if !self.association.has_no_flown_neighbour() && self.has_reply() && is_lower {
             self.counted_m
         } else {
             low_m
@@ -167,8 +168,8 @@ impl FenceOwner {
     }
 
     /// Returns the minimum distance to the relay downstream, m. 0 near a lost one, and before the first fence is cleared.
-    pub(super) fn kept(&self, own: &Own, taken_m: f32) -> f32 {
-        let is_open = self.association.is_none() || self.clear;
+    pub(super) fn kept_distance(&self, own: &Own, taken_m: f32) -> f32 {
+        let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
             0.0
         } else {
@@ -181,47 +182,47 @@ impl FenceOwner {
         self.asked_m.min(self.granted_m) < own.config.separation_m
     }
 
-    pub(super) fn hear(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
-        let is_placed = !fence.says(Fence::RELEASED) && !fence.says(Fence::UNPLACED);
-        self.association.hear_halt(fence, is_placed);
-        self.keep_out.see(&self.association, fence);
-        if !fence.says(Fence::RELEASED) || fence.says(Fence::UNPLACED) {
-            self.association.see(fence.x_m);
+    pub(super) fn handle_fence(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
+        let is_placed = !fence.has_flag(Fence::LEFT) && !fence.has_flag(Fence::UNPLACED);
+        self.association.receive_halt(fence, is_placed);
+        self.keep_out.record_x(&self.association, fence);
+        if !fence.has_flag(Fence::LEFT) || fence.has_flag(Fence::UNPLACED) {
+            self.association.record_x(fence.x_m);
         }
-        if self.association.is_over(fence) || fence.says(Fence::RELEASED) {
-            if self.association.is_left(fence) {
+        if self.association.is_of_left_association(fence) || fence.has_flag(Fence::LEFT) {
+            if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
             // A relay without an association needs no reply.
-            self.association.due |= !fence.says(Fence::UNPLACED);
+            self.association.due |= !fence.has_flag(Fence::UNPLACED);
             return;
         }
-        self.keep_out.flies();
-        if !self.is_heard() && fence.echo == self.association.own {
-            self.association.meet(fence.association);
+        self.keep_out.remove_unflown();
+        if !self.has_reply() && fence.echo == self.association.own {
+            self.association.pair(fence.association);
             self.association.due = true;
             self.keep_out
-                .spoken(Side::Downstream, self.association.node);
+                .on_fence(Side::Downstream, self.association.node);
         }
-        if !self.association.knows(fence.association, fence.echo) {
-            if self.is_heard() && self.association.stray() {
+        if !self.association.is_current(fence.association, fence.echo) {
+            if self.has_reply() && self.association.count_foreign() {
                 self.renew(own, jitter);
             }
             self.association.due |= self.association.is_absent();
             return;
         }
-        self.association.hear_open(fence);
-        if fence.says(Fence::UNPLACED) {
+        self.association.receive_open(fence);
+        if fence.has_flag(Fence::UNPLACED) {
             return;
         }
         self.target_m = fence.target_m;
-        (self.across, self.still) = (fence.across, fence.says(Fence::STILL));
+        (self.across, self.still) = (fence.across, fence.has_flag(Fence::ARRIVED));
         self.answered = fence.number == self.number;
         if self.answered {
             self.counted_m = self.counted_m.max(fence.x_m.min(self.fence_m));
             self.clear |= self.number != 0 && fence.x_m >= self.fence_m;
-            if self.still && fence.says(Fence::AGREES) {
-                let least_m = own.config.least_step(own.across(), fence.across);
+            if self.still && fence.has_flag(Fence::AGREES) {
+                let least_m = own.config.least_step(own.cross_section(), fence.across);
                 self.granted_m = self.granted_m.min(self.asked_m.max(least_m));
             }
         } else {
@@ -232,7 +233,10 @@ impl FenceOwner {
     /// Returns the largest allowed x, m, at the distance `apart` from the neighbour.
     #[inline(never)] // called from several places
     pub(super) fn most(&self, own: &Own, apart: f32) -> f32 {
-        let granted = match (self.association.is_none(), self.is_beyond(own)) {
+        let granted = match (
+            self.association.has_no_flown_neighbour(),
+            self.is_beyond(own),
+        ) {
             (true, _) => f32::INFINITY,
             (false, true) => self.counted_m - apart,
             (false, false) => own.reachable.at_m,
@@ -242,17 +246,19 @@ impl FenceOwner {
 
     /// Returns true if this side allows a move across the line.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
-        (self.association.is_none() || self.clear) && !self.holds(own) && !self.keep_out.is_near()
+        (self.association.has_no_flown_neighbour() || self.clear)
+            && !self.holds(own)
+            && !self.keep_out.is_near()
     }
 
     /// Returns true if the neighbour may have been too close since the start.
     pub(super) const fn is_tight(&self) -> bool {
-        self.is_heard() && !self.clear
+        self.has_reply() && !self.clear
     }
 
     /// Returns true if the agreed positions are closer along x than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
-        self.is_heard() && own.is_close(self.target_m - own.target_m())
+        self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
     /// Returns true if the neighbour has received and cleared the newest fence.
@@ -265,18 +271,19 @@ impl FenceOwner {
     fn best_apart(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
-        let settled = self.clear && self.still && own.still && own.is_across() && !own.open;
+        let settled =
+            self.clear && self.still && own.still && own.has_agreed_cross_section() && !own.open;
         if !(settled && own.is_close(step_m)) {
             return separation_m;
         }
-        let least_m = own.config.least_step(own.across(), self.across);
+        let least_m = own.config.least_step(own.cross_section(), self.across);
         step_m.max(least_m).min(separation_m)
     }
 
     /// Returns the best current x of the fence, m, its step, and true if that is final. `None` if there may be no fence.
     #[inline(never)] // called from several places
-    fn wish(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
-        if !self.is_heard() || !self.is_beyond(own) {
+    fn proposed_fence(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
+        if !self.has_reply() || !self.is_beyond(own) {
             return None;
         }
         let best = self.best_apart(own);
@@ -299,7 +306,7 @@ impl FenceOwner {
 
     /// Schedules a message after a move of the setpoint. At once for a final fence, otherwise at the next reminder.
     pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
-        if let Some((x_m, ask, last)) = self.wish(own, taken_m, upstream_m) {
+        if let Some((x_m, ask, last)) = self.proposed_fence(own, taken_m, upstream_m) {
             let stays = last || own.reachable.is_still();
             self.association.due |= stays && self.is_other(own, x_m, ask);
         }
@@ -311,7 +318,7 @@ impl FenceOwner {
     }
 
     /// Returns the pending message. The fence only moves here, so that an unsent fence uses no number.
-    pub(super) fn tell(
+    pub(super) fn poll_fence(
         &mut self,
         own: &Own,
         taken_m: f32,
@@ -321,7 +328,7 @@ impl FenceOwner {
         if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
             return None;
         }
-        let wish = self.wish(own, taken_m, upstream_m);
+        let wish = self.proposed_fence(own, taken_m, upstream_m);
         if let Some((x_m, ask, _)) =
             wish.filter(|(x_m, ask, _)| moves && self.is_other(own, *x_m, *ask))
         {
@@ -354,18 +361,18 @@ impl FenceOwner {
         }
         let target_m = own.target_m();
         let limit = self.keep_out.limit_m();
-        let stays = self.keep_out.is_near() && !own.is_across();
-        let bars = self.keep_out.bars(own);
+        let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
+        let bars = self.keep_out.blocks(own);
         if stays || bars || limit.is_some_and(|limit| target_m > limit) {
             return Some(
                 self.keep_out
                     .reason(self.association.node, HoldReason::Lost),
             );
         }
-        if self.association.is_none() {
+        if self.association.has_no_flown_neighbour() {
             return None;
         }
-        if !self.is_heard() {
+        if !self.has_reply() {
             return Some(HoldReason::Unheard);
         }
         if !self.is_beyond(own) {

@@ -290,13 +290,13 @@ impl Circulation {
 pub(crate) const SUSPICIOUS: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stragglers(u8);
+pub(crate) struct LateMessages(u8);
 
-impl Stragglers {
+impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
     /// Counts a late message; returns true if there are too many, and starts again from zero.
-    pub(crate) const fn one_more(&mut self) -> bool {
+    pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;
         if suspicious {

@@ -203,7 +203,7 @@ pub(crate) struct Effects {
     pub(crate) proposed_by: Option<Proposer>,
     /// Outstanding proposal: no pass continues before its decision.
     pub(crate) view_proposed: bool,
-    pub(crate) news: Option<News>,
+    pub(crate) news: Option<LayerEvent>,
     /// Changes of the interference estimate and of the faulty receivers.
     pub(crate) sensed: Sensed,
 }
@@ -224,7 +224,7 @@ pub(crate) enum Peer {
 
 /// Result of a layer, which the others or the firmware need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum News {
+pub(crate) enum LayerEvent {
     /// The chain has agreed on a target.
     Converged,
     /// The leader has found no feasible target.
@@ -232,16 +232,16 @@ pub(crate) enum News {
     /// The lease has expired.
     Lapsed,
     /// A request for a view is due to the neighbour toward the leader.
-    Ask,
+    RequestView,
     /// A proposal is decided.
-    Decided(Decided),
+    ProposalDecided(ProposalOutcome),
 }
 
 /// Results of sensing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sensed {
     /// The interference estimate has changed.
-    pub(crate) believes: bool,
+    pub(crate) new_estimate: bool,
     /// The measurements do not fit a single source.
     pub(crate) unclear: bool,
     /// Node whose measurements do not fit those of the others.
@@ -250,13 +250,13 @@ pub(crate) struct Sensed {
 
 /// Decision on a proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Decided {
-    /// Accepted: a view of `relays` relays, whose positions may be used in `lease_left` tenths of a second.
-    Granted { relays: u16, lease_left: u16 },
+pub(crate) enum ProposalOutcome {
+    /// Accepted: a view of `relays` relays, whose positions may be used in `usable_in` tenths of a second.
+    Granted { relays: u16, usable_in: u16 },
     /// Superseded: an earlier view was decided, which the leader's next proposal follows.
-    Earlier,
+    Superseded,
     /// Rejected: no quorum.
-    Refused,
+    NoQuorum,
 }
 
 /// Origin of a proposal at this relay.
@@ -277,7 +277,7 @@ impl Effects {
         view_proposed: false,
         news: None,
         sensed: Sensed {
-            believes: false,
+            new_estimate: false,
             unclear: false,
             off: None,
         },
@@ -299,7 +299,7 @@ impl Effects {
         ..Self::STALE
     };
 
-    pub(crate) const fn of(news: News) -> Self {
+    pub(crate) const fn of(news: LayerEvent) -> Self {
         Self {
             news: Some(news),
             ..Self::NONE

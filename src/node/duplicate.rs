@@ -10,7 +10,7 @@
 //! | state | event | action | next state |
 //! | --- | --- | --- | --- |
 //! | any | own claim, or frame with a tag of its own, received | none: an echo of its own radio | same |
-//! | any | claim of another node received, the first for twice `dead_after` | `Event::IndexTaken` | same |
+//! | any | claim of another node received, the first for twice `dead_after` | `Event::DuplicateIndex` | same |
 //! | active | other frame with its own index received, no key | send a claim, and 8 more every four `hop_time`; none if an echo of its own was received within `probe_after` | active |
 //! | active | smaller claim, or one that does not name its own | send a claim, and 32 more every four `hop_time` while the other node is not known to be passive | active |
 //! | active | claim of a passive node | send a claim | active |
@@ -102,7 +102,7 @@ const fn passive_interval(settings: &Settings) -> Duration {
 
 /// Claims of this relay to its index, and the other node that uses it.
 #[derive(Clone, Debug)]
-pub(crate) struct DuplicateIndex {
+pub(crate) struct IndexClaims {
     number: u32,
     /// Largest claim number of another node of this epoch.
     rival: u32,
@@ -136,7 +136,7 @@ pub(crate) enum Duplicated {
     Neighbour,
 }
 
-impl DuplicateIndex {
+impl IndexClaims {
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         let mut jitter = Jitter::new(seed);
         let number = (jitter.draw() >> 2).max(1);
@@ -156,7 +156,7 @@ impl DuplicateIndex {
             sessions_due: false,
             jitter,
         };
-        duplicate.announce(now + AFTER_START, settings);
+        duplicate.schedule_unprompted(now + AFTER_START, settings);
         duplicate
     }
 
@@ -189,16 +189,16 @@ impl DuplicateIndex {
             number: claim.number,
             newer_epoch: false,
             passive: claim.passive,
-            is_current: claim.heard | RAISED == self.number | RAISED,
+            is_current: claim.other_number | RAISED == self.number | RAISED,
         })
     }
 
-    pub(crate) const fn heard(&self) -> u32 {
+    pub(crate) const fn other_number(&self) -> u32 {
         self.heard
     }
 
     /// Returns true if this relay had a position before it received the other node, which it receives now.
-    fn held_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
+    fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
         let held = known.map_or(has_lease, |(_, held)| held);
@@ -207,7 +207,7 @@ impl DuplicateIndex {
     }
 
     /// Handles a frame with this relay's index; returns true if the relay becomes passive.
-    pub(crate) fn hear(
+    pub(crate) fn handle_frame(
         &mut self,
         now: Instant,
         sender: Sender,
@@ -219,15 +219,15 @@ impl DuplicateIndex {
                 self.echoed = Some(now);
                 self.defences = 0;
             }
-            Sender::Unknown if self.is_passive() => self.wait(now, settings),
+            Sender::Unknown if self.is_passive() => self.become_passive(now, settings),
             Sender::Unknown => {
                 let echoes = self.echoed;
                 let echoes = echoes.is_some_and(|at| now.since(at) < settings.probe_after);
                 if settings.auth.is_none() && !echoes {
-                    self.held_before(now, has_lease, settings);
+                    self.had_position_before(now, has_lease, settings);
                     self.defences = self.defences.max(QUESTIONS);
-                    self.announce(now, settings);
-                    self.claim(now, settings);
+                    self.schedule_unprompted(now, settings);
+                    self.schedule_claim(now, settings);
                 }
             }
             Sender::Rival(rival) => return self.compare(now, rival, has_lease, settings),
@@ -243,14 +243,14 @@ impl DuplicateIndex {
         has_lease: bool,
         settings: &Settings,
     ) -> bool {
-        let held = self.held_before(now, has_lease, settings);
+        let held = self.had_position_before(now, has_lease, settings);
         if !rival.newer_epoch {
             self.rival = self.rival.max(rival.number);
             self.heard = rival.number;
         }
         if self.is_passive() {
             if !rival.passive {
-                self.wait(now, settings);
+                self.become_passive(now, settings);
             }
             return false;
         }
@@ -267,11 +267,11 @@ impl DuplicateIndex {
             if settings.auth.is_some() {
                 // A replayed frame does not have this effect again.
                 self.defences = QUESTIONS;
-                self.announce(now, settings);
+                self.schedule_unprompted(now, settings);
             }
             return false;
         }
-        self.wait(now, settings);
+        self.become_passive(now, settings);
         self.claim_due = settings.auth.is_none();
         let next = now + passive_interval(settings);
         self.next_claim = settings.auth.is_none().then_some(next);
@@ -279,7 +279,7 @@ impl DuplicateIndex {
     }
 
     /// Schedules a claim unless one was sent recently.
-    fn claim(&mut self, now: Instant, settings: &Settings) {
+    fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);
             self.claim_due = true;
@@ -293,18 +293,18 @@ impl DuplicateIndex {
             if settings.auth.is_none() {
                 self.defences = DEFENCES;
             }
-            self.announce(now, settings);
+            self.schedule_unprompted(now, settings);
         }
-        self.claim(now, settings);
+        self.schedule_claim(now, settings);
     }
 
-    fn wait(&mut self, now: Instant, settings: &Settings) {
+    fn become_passive(&mut self, now: Instant, settings: &Settings) {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
     /// Starts the unprompted claims on links without a key, and those of a defence. On a shared channel, which every unprompted
     /// frame loads, the other node is received directly, by whatever it sends.
-    fn announce(&mut self, now: Instant, settings: &Settings) {
+    fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
         let announces = unasked || self.defences > 0;
@@ -354,7 +354,7 @@ impl DuplicateIndex {
     fn activate(&mut self, now: Instant, settings: &Settings) {
         self.passive_until = None;
         self.sessions_due = true;
-        self.announce(now + AFTER_START, settings);
+        self.schedule_unprompted(now + AFTER_START, settings);
     }
 
     /// Removes the other node, which is gone; returns true if the relay becomes active.
@@ -376,15 +376,15 @@ impl DuplicateIndex {
 mod tests {
     extern crate std;
 
-    use super::{Claim, DuplicateIndex, Duplicated, RAISED, Rival, Sender, Settings, Wiring};
+    use super::{Claim, Duplicated, IndexClaims, RAISED, Rival, Sender, Settings, Wiring};
     use crate::time::Instant;
 
     fn at(seconds: u64) -> Instant {
         Instant::from_millis(1_000 * seconds)
     }
 
-    fn duplicate() -> DuplicateIndex {
-        DuplicateIndex::new(1, at(0), &Settings::default())
+    fn duplicate() -> IndexClaims {
+        IndexClaims::new(1, at(0), &Settings::default())
     }
 
     fn rival(number: u32) -> Rival {
@@ -399,7 +399,7 @@ mod tests {
     fn claim(number: u32) -> Claim {
         Claim {
             number,
-            heard: 0,
+            other_number: 0,
             passive: false,
             echo: true,
         }
@@ -413,22 +413,25 @@ mod tests {
             let mut duplicate = duplicate();
             let own = duplicate.number();
             let before = Claim {
-                heard: 5,
+                other_number: 5,
                 ..claim(own + 9)
             };
             let sender = duplicate.rival(before);
             assert!(matches!(sender, Sender::Rival(rival) if !rival.is_current));
-            assert!(!duplicate.hear(at(1), sender, has_lease, &settings));
+            assert!(!duplicate.handle_frame(at(1), sender, has_lease, &settings));
             assert!(duplicate.poll_claim() && !duplicate.is_passive());
-            assert_eq!((duplicate.number(), duplicate.heard()), (own, own + 9));
+            assert_eq!(
+                (duplicate.number(), duplicate.other_number()),
+                (own, own + 9)
+            );
             // Its sender is present and answers.
             let answer = Claim {
-                heard: own,
+                other_number: own,
                 ..before
             };
             let sender = duplicate.rival(answer);
             assert_eq!(
-                duplicate.hear(at(2), sender, has_lease, &settings),
+                duplicate.handle_frame(at(2), sender, has_lease, &settings),
                 !has_lease
             );
         }
@@ -457,7 +460,7 @@ mod tests {
                             is_current: true,
                         };
                         let sender = Sender::Rival(rival);
-                        let becomes = duplicate.hear(at(1), sender, has_lease, &settings);
+                        let becomes = duplicate.handle_frame(at(1), sender, has_lease, &settings);
                         let larger = !passive && (newer_epoch || number > own);
                         let raises = larger && !newer_epoch && has_lease && raised_wins;
                         assert_eq!(becomes, larger && !raises, "{rival:?} {has_lease}");
@@ -480,9 +483,9 @@ mod tests {
         {
             let mut duplicate = duplicate();
             let smaller = Sender::Rival(rival(duplicate.number() - 1));
-            assert!(!duplicate.hear(at(1), smaller, had_place, &settings));
+            assert!(!duplicate.handle_frame(at(1), smaller, had_place, &settings));
             let larger = Sender::Rival(rival(duplicate.number() + 1));
-            let becomes = duplicate.hear(at(1 + later_s), larger, true, &settings);
+            let becomes = duplicate.handle_frame(at(1 + later_s), larger, true, &settings);
             assert_eq!(becomes, !raises, "{had_place} {later_s}");
         }
     }
@@ -491,12 +494,12 @@ mod tests {
     fn two_that_hold_a_lease_come_to_one_within_three_claims() {
         let settings = Settings::default();
         for seeds in [[1, 2], [2, 1], [3, 9], [9, 3]] {
-            let mut both = seeds.map(|seed| DuplicateIndex::new(seed, at(0), &settings));
+            let mut both = seeds.map(|seed| IndexClaims::new(seed, at(0), &settings));
             let mut claims = 0;
             while both.iter().all(|one| !one.is_passive()) {
                 let [from, to] = if claims % 2 == 0 { [0, 1] } else { [1, 0] };
                 let claim = rival(both[from].number());
-                both[to].hear(at(claims), Sender::Rival(claim), true, &settings);
+                both[to].handle_frame(at(claims), Sender::Rival(claim), true, &settings);
                 claims += 1;
             }
             assert!(claims <= 4, "{claims} with {seeds:?}");
@@ -512,12 +515,12 @@ mod tests {
         let own = duplicate.number();
         assert_eq!(duplicate.rival(claim(own)), Sender::Itself);
         assert_eq!(duplicate.rival(claim(own | RAISED)), Sender::Itself);
-        assert!(!duplicate.hear(at(1), Sender::Unknown, false, &settings));
+        assert!(!duplicate.handle_frame(at(1), Sender::Unknown, false, &settings));
         assert!(duplicate.poll_claim());
-        assert!(!duplicate.hear(at(2), Sender::Itself, false, &settings));
-        assert!(!duplicate.hear(at(6), Sender::Unknown, false, &settings));
+        assert!(!duplicate.handle_frame(at(2), Sender::Itself, false, &settings));
+        assert!(!duplicate.handle_frame(at(6), Sender::Unknown, false, &settings));
         assert!(!duplicate.poll_claim());
-        duplicate.hear(at(7), Sender::Unknown, false, &settings);
+        duplicate.handle_frame(at(7), Sender::Unknown, false, &settings);
         assert!(duplicate.poll_claim());
     }
 
@@ -529,7 +532,7 @@ mod tests {
         let mut sent = 0;
         for tenth in 0..100 {
             let now = Instant::from_millis(20 * tenth);
-            duplicate.hear(now, smaller, false, &settings);
+            duplicate.handle_frame(now, smaller, false, &settings);
             sent += u32::from(duplicate.poll_claim());
         }
         assert_eq!(sent, 17, "one in 0.12 s");
@@ -541,7 +544,7 @@ mod tests {
             wiring: Wiring::Shared,
             ..Settings::default()
         };
-        let shared = DuplicateIndex::new(1, at(0), &settings);
+        let shared = IndexClaims::new(1, at(0), &settings);
         assert_eq!(shared.next_timeout(), None);
         let settings = Settings::default();
         let mut duplicate = duplicate();
@@ -558,7 +561,7 @@ mod tests {
         {
             assert!((least..=least + least / 8).contains(&at), "{at}");
         }
-        let mut duplicate = DuplicateIndex::new(1, at(0), &settings);
+        let mut duplicate = IndexClaims::new(1, at(0), &settings);
         let mut sent = 0;
         while let Some(next) = duplicate.next_timeout().filter(|next| *next < at(3_600)) {
             duplicate.handle_timeout(next, &settings);
@@ -574,14 +577,14 @@ mod tests {
         let settings = Settings::default();
         for passive in [false, true] {
             let mut duplicate = duplicate();
-            duplicate.hear(at(100), Sender::Rival(rival(0)), false, &settings);
+            duplicate.handle_frame(at(100), Sender::Rival(rival(0)), false, &settings);
             assert!(duplicate.poll_claim());
             let other = Rival {
                 passive: true,
                 ..rival(0)
             };
             if passive {
-                duplicate.hear(at(101), Sender::Rival(other), false, &settings);
+                duplicate.handle_frame(at(101), Sender::Rival(other), false, &settings);
             }
             let mut sent = 0;
             while let Some(next) = duplicate.next_timeout().filter(|next| *next < at(105)) {
@@ -599,19 +602,19 @@ mod tests {
         let mut duplicate = duplicate();
         let own = duplicate.number();
         let larger = rival(own + 7);
-        assert!(duplicate.hear(at(0), Sender::Rival(larger), false, &settings));
-        assert!(!duplicate.hear(at(20), Sender::Unknown, false, &settings));
-        assert!(!duplicate.hear(at(40), Sender::Rival(larger), false, &settings));
+        assert!(duplicate.handle_frame(at(0), Sender::Rival(larger), false, &settings));
+        assert!(!duplicate.handle_frame(at(20), Sender::Unknown, false, &settings));
+        assert!(!duplicate.handle_frame(at(40), Sender::Rival(larger), false, &settings));
         // A passive node keeps no other node passive.
         let passive = Rival {
             passive: true,
             ..larger
         };
-        duplicate.hear(at(60), Sender::Rival(passive), false, &settings);
+        duplicate.handle_frame(at(60), Sender::Rival(passive), false, &settings);
         assert!(!duplicate.handle_timeout(at(69), &settings) && duplicate.poll_claim());
         assert!(duplicate.handle_timeout(at(75), &settings) && !duplicate.is_passive());
         assert_eq!(duplicate.number(), own, "the other one may be there still");
-        assert!(duplicate.hear(at(80), Sender::Rival(larger), false, &settings));
+        assert!(duplicate.handle_frame(at(80), Sender::Rival(larger), false, &settings));
         assert!(duplicate.clear(at(81), &settings) && !duplicate.is_passive());
         assert!(duplicate.number() > own + 7 && !duplicate.clear(at(82), &settings));
     }

@@ -30,7 +30,7 @@
 
 use super::circulation::{Circulation, Reply};
 use super::context::Held;
-use super::context::{Context, Effects, News, Peer};
+use super::context::{Context, Effects, LayerEvent, Peer};
 use super::context::{PAUSE, earliest, longest_lease, tenths};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -58,7 +58,7 @@ pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
     /// Time until which other members may rely on this relay.
-    relied_on: Instant,
+    vouched_until: Instant,
     /// Last accepted view, and the earliest time at which its positions may be used.
     rest: (ViewId, Instant),
     /// Latest possible expiry of a lease granted before the accepted view; `None` if unknown.
@@ -83,7 +83,7 @@ impl Lease {
         Self {
             state: LeaseState::Open,
             current: None,
-            relied_on: now + settings.dead_after,
+            vouched_until: now + settings.dead_after,
             rest: (ViewId::LOADED, now),
             bound: Some(now),
             is_whole: false,
@@ -96,7 +96,7 @@ impl Lease {
 
     /// Allows for a view before the restart. Other members may rely on this relay for the longest possible lease.
     pub(crate) fn resume(&mut self, settings: &Settings) {
-        self.relied_on = self.relied_on + longest_lease(settings);
+        self.vouched_until = self.vouched_until + longest_lease(settings);
     }
 
     /// Returns the lease's expiry time; `None` without a lease or after its expiry.
@@ -119,9 +119,9 @@ impl Lease {
     }
 
     /// Returns the remaining leases of other members, as far as this relay knows.
-    pub(crate) fn held(&self, now: Instant) -> Held {
+    pub(crate) fn other_leases(&self, now: Instant) -> Held {
         Held {
-            lease_left: self.relied_on.since(now),
+            lease_left: self.vouched_until.since(now),
             view: self.rest.0,
             rest: self.bound.map(|until| until.since(now)),
         }
@@ -132,7 +132,7 @@ impl Lease {
     /// Members of `base` that have not accepted the new view hold a lease for no longer than they rely on this relay, if it was a
     /// member of `base`: without it no renewal completes. The age of an outstanding renewal counts as a round trip only if the
     /// view loses no relay (`lost`) and this relay was a member of `base`; otherwise it measures an outage.
-    pub(crate) fn renew(
+    pub(crate) fn accept_view(
         &mut self,
         now: Instant,
         (view, base): (ViewId, ViewId),
@@ -145,13 +145,13 @@ impl Lease {
             self.slowest = self.slowest.max(now.since(at));
         }
         let known = self.bound.filter(|_| self.rest.0 == base);
-        self.bound = known.map(|until| until.max(rest).max(self.relied_on));
+        self.bound = known.map(|until| until.max(rest).max(self.vouched_until));
         self.rest = (view, rest);
-        self.leave();
+        self.end();
     }
 
     /// Ends the lease: there is no agreement until this relay agrees on its position in another view.
-    pub(crate) fn leave(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
         self.state = LeaseState::Open;
@@ -161,7 +161,7 @@ impl Lease {
     }
 
     /// Records that all members have accepted this relay's view.
-    pub(crate) fn commit(&mut self) {
+    pub(crate) fn confirm_view(&mut self) {
         self.bound = Some(self.rest.1);
         // The initial view is configured and needs no acceptance.
         self.is_whole |= self.rest.0 != ViewId::LOADED;
@@ -173,7 +173,7 @@ impl Lease {
     }
 
     /// Records this relay's agreement in the view. If it leads, all members have agreed, and the first renewal is scheduled.
-    pub(crate) fn begin(&mut self, now: Instant, leads: bool) {
+    pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
             self.next_at = Some(now + PAUSE);
@@ -211,7 +211,7 @@ impl Lease {
             // Another node with this relay's index has agreed on the position.
             return Effects::FOREIGN;
         }
-        self.take(context, pulse.number, pulse.lease);
+        self.join_renewal(context, pulse.number, pulse.lease);
         effects
     }
 
@@ -233,21 +233,23 @@ impl Lease {
         }
     }
 
-    fn take(&mut self, context: &Context<'_>, number: u16, span: u16) {
+    fn join_renewal(&mut self, context: &Context<'_>, number: u16, span: u16) {
         self.current = Some(Current { number, span });
         self.circulation.start(context.now);
         if context.is_last() {
-            self.finish(context);
+            self.complete_renewal(context);
         }
     }
 
     /// Completes the current renewal.
-    fn finish(&mut self, context: &Context<'_>) {
+    fn complete_renewal(&mut self, context: &Context<'_>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
             return;
         };
-        self.relied_on = self.relied_on.max(context.now + from_tenths(current.span));
+        self.vouched_until = self
+            .vouched_until
+            .max(context.now + from_tenths(current.span));
         self.circulation
             .complete(context.now, context.path_to_leader());
         if !context.leads() {
@@ -263,7 +265,7 @@ impl Lease {
         let part = self.slowest.as_micros() / 32;
         let lately = self.slowest.as_micros().saturating_sub(part);
         self.slowest = took.max(Duration::from_micros(lately));
-        let next = self.given(context.settings());
+        let next = self.announced_span(context.settings());
         self.grant(context, current, next);
         let soon = context.now + PAUSE;
         let paced = forwarded_at + period;
@@ -278,7 +280,7 @@ impl Lease {
     }
 
     /// Returns the span that the leader announces, in tenths of a second.
-    fn given(&self, settings: &Settings) -> u16 {
+    fn announced_span(&self, settings: &Settings) -> u16 {
         let slow = self.slowest.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
         let most = longest_lease(settings);
@@ -297,7 +299,7 @@ impl Lease {
         }
         let forwarded_at = self.circulation.started_at();
         if pulsed.done {
-            self.finish(context);
+            self.complete_renewal(context);
         } else {
             let path = context.path_to_last();
             self.circulation.on_in_progress(context.now, path);
@@ -316,8 +318,8 @@ impl Lease {
         if self.next_at.is_some_and(|at| at <= now) {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
-            let span = self.given(context.settings());
-            self.take(context, number.wrapping_add(1), span);
+            let span = self.announced_span(context.settings());
+            self.join_renewal(context, number.wrapping_add(1), span);
         }
         let lapsed = self.until().is_some_and(|at| at <= now);
         if lapsed {
@@ -326,31 +328,31 @@ impl Lease {
         Effects {
             resent,
             view_needed: lapsed,
-            news: lapsed.then_some(News::Lapsed),
+            news: lapsed.then_some(LayerEvent::Lapsed),
             ..Effects::NONE
         }
     }
 
     /// Returns the renewal to forward, if one is pending, and marks it as sent.
-    pub(crate) fn take_onward(&mut self, context: &Context<'_>) -> Option<Message> {
+    pub(crate) fn poll_onward(&mut self, context: &Context<'_>) -> Option<Message> {
         let is_due = self.circulation.poll_forward();
         let current = self.current.filter(|_| is_due)?;
         self.circulation
             .await_result(context.now, context.path_to_last());
         Some(Message::Pulse(Pulse {
             number: current.number,
-            mission: context.digest(),
+            view_digest: context.digest(),
             lease: current.span,
         }))
     }
 
     /// Returns the reply, if one is pending, and marks it as sent.
-    pub(crate) fn take_back(&mut self, context: &Context<'_>) -> Option<Message> {
+    pub(crate) fn poll_back(&mut self, context: &Context<'_>) -> Option<Message> {
         let reply = self.circulation.poll_reply()?;
         let current = self.current?;
         Some(Message::Pulsed(Pulsed {
             number: current.number,
-            mission: context.digest(),
+            view_digest: context.digest(),
             done: reply == Reply::Result,
         }))
     }
@@ -381,8 +383,8 @@ mod tests {
         });
         lease.circulation.start(Instant::ZERO);
         let now = Instant::ZERO + Duration::from_millis(40_000);
-        lease.renew(now, (view(base + 1), view(base)), now, false);
-        lease.given(&settings)
+        lease.accept_view(now, (view(base + 1), view(base)), now, false);
+        lease.announced_span(&settings)
     }
 
     #[test]

@@ -121,7 +121,7 @@ struct Uploads {
 }
 
 /// Returns true if uploads are accepted, which requires signed frames.
-pub(crate) const fn takes_uploads(member: &Member) -> bool {
+pub(crate) const fn accepts_uploads(member: &Member) -> bool {
     UPLOAD && member.settings.auth.is_some()
 }
 
@@ -167,9 +167,9 @@ impl MissionUpdate {
     }
 
     /// Returns the number for a hello sent now; 0 if uploads are not accepted.
-    pub(crate) fn ask(&mut self, now: Instant, member: &Member) -> u16 {
+    pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
-        let Some(uploads) = uploads.filter(|_| takes_uploads(member)) else {
+        let Some(uploads) = uploads.filter(|_| accepts_uploads(member)) else {
             return 0;
         };
         let [current, before] = &mut uploads.asked;
@@ -186,7 +186,7 @@ impl MissionUpdate {
     }
 
     /// Returns true if `answer` is the number of a hello that was sent within the last two `dead_after`.
-    pub(crate) fn asked(&self, answer: u16, now: Instant, member: &Member) -> bool {
+    pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
         answer != 0 && self.uploads().is_some_and(|it| it.asked.iter().any(is_it))
@@ -201,7 +201,7 @@ impl MissionUpdate {
     }
 
     /// Records the number of a hello of the neighbour at `side`, which an offer can answer.
-    pub(crate) fn may_answer(&mut self, side: Side, nonce: u16, now: Instant) {
+    pub(crate) fn record_hello_number(&mut self, side: Side, nonce: u16, now: Instant) {
         if let Some(offering) = self.offering(side) {
             offering.nonce = nonce;
             offering.heard = Some(now);
@@ -209,14 +209,14 @@ impl MissionUpdate {
     }
 
     /// Schedules an offer at `side`.
-    pub(crate) fn offer(&mut self, side: Side) {
+    pub(crate) fn schedule_offer(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.is_due = true;
         }
     }
 
     /// Restarts the repetitions at `side`: there is a new mission or a new neighbour.
-    pub(crate) fn begin_offers(&mut self, side: Side) {
+    pub(crate) fn reset_offers(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.tries = 0;
         }
@@ -231,7 +231,7 @@ impl MissionUpdate {
     /// Returns the pending offer to the neighbour `to` at `side`, and marks it as sent. The neighbour `holds` an older or unknown
     /// mission. The number is that of the hello that it answers; `None` if a hello has to be requested first, because the last
     /// one is older than half of `dead_after`.
-    pub(crate) fn take_offer(
+    pub(crate) fn poll_offer(
         &mut self,
         (side, to): (Side, u16),
         holds: Option<MissionId>,
@@ -240,7 +240,7 @@ impl MissionUpdate {
     ) -> Option<(Upload, Option<u16>)> {
         let settings = &member.settings;
         let is_due = core::mem::take(&mut self.offering(side)?.is_due);
-        let upload = self.offer_to(holds).filter(|_| is_due && to != 0)?;
+        let upload = self.offer_for(holds).filter(|_| is_due && to != 0)?;
         let tries = self.offering(side)?.tries;
         let hops = OFFER_HOPS << (tries / OFFERS_AT_A_PACE).min(OFFERS);
         let wait = settings.hop_time.times(hops).min(settings.probe_after);
@@ -279,25 +279,25 @@ impl MissionUpdate {
     }
 
     /// Returns true if a hello to the ground station at `side` is pending, and marks it as sent.
-    pub(crate) fn take_report(&mut self, side: Side) -> bool {
+    pub(crate) fn poll_report(&mut self, side: Side) -> bool {
         let offering = self.offering(side);
         offering.is_some_and(|offering| core::mem::take(&mut offering.reports))
     }
 
     /// Returns the upload that the ground station at `side` has requested, and the number of its hello.
-    pub(crate) fn take_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
+    pub(crate) fn poll_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
         let answer = core::mem::take(&mut self.offering(side)?.ground_asks);
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
     /// Returns the refused mission if it is the stored or a newer one, and not `active`.
-    pub(crate) fn refused_of(&self, active: MissionId) -> Option<MissionId> {
+    pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
     /// Records a neighbour's refusal; returns true if it is new and concerns the stored mission.
-    pub(crate) fn hear_refused(&mut self, refused: MissionId) -> bool {
+    pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
 
@@ -308,7 +308,7 @@ impl MissionUpdate {
     }
 
     /// Stores `upload` if it is for this relay and newer than the stored mission.
-    pub(crate) fn hold(&mut self, member: &Member, upload: &Upload) -> Offered {
+    pub(crate) fn store_if_newer(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
         if id <= self.latest {
             return Offered::Passed;
@@ -334,12 +334,16 @@ impl MissionUpdate {
         }
     }
 
-    pub(crate) fn hand_in(&mut self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
-        if !takes_uploads(member) {
+    pub(crate) fn accept_upload(
+        &mut self,
+        member: &Member,
+        upload: &Upload,
+    ) -> Result<(), UploadError> {
+        if !accepts_uploads(member) {
             return Err(UploadError::Unsigned);
         }
         self.fits(member, upload)?;
-        match self.hold(member, upload) {
+        match self.store_if_newer(member, upload) {
             Offered::Held => Ok(()),
             _ => Err(UploadError::Old),
         }
@@ -370,7 +374,7 @@ impl MissionUpdate {
     }
 
     /// Returns the upload to offer to a neighbour that `holds` an older or unknown mission.
-    pub(crate) fn offer_to(&self, holds: Option<MissionId>) -> Option<Upload> {
+    pub(crate) fn offer_for(&self, holds: Option<MissionId>) -> Option<Upload> {
         let older = holds.is_none_or(|holds| holds < self.latest);
         self.upload().copied().filter(|_| older)
     }
@@ -408,12 +412,12 @@ impl MissionUpdate {
     }
 
     /// Returns the digest of the line of this relay's positions.
-    pub(crate) fn line(&self, member: &Member) -> u16 {
+    pub(crate) fn line_digest(&self, member: &Member) -> u16 {
         between(member.digest, self.sites())
     }
 
     /// Adopts the sites of the stored mission; returns true if they differ, so that positions are void.
-    pub(crate) fn fly_between(&mut self) -> bool {
+    pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| core::mem::replace(&mut uploads.sites, sites) != sites)

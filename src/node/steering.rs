@@ -100,7 +100,7 @@ impl Steering {
     }
 
     /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know it.
-    pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
+    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
             self.remind_at = Some(now + REMINDER);
@@ -109,13 +109,13 @@ impl Steering {
     }
 
     /// Changes the line of the positions at time `now`, or after a start if `None`.
-    pub(crate) fn leave_line(&mut self, now: Option<Instant>) {
+    pub(crate) fn switch_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
         }
     }
 
-    pub(crate) fn set_box(&mut self, fence: Option<Geofence>) {
+    pub(crate) fn set_geofence(&mut self, fence: Option<Geofence>) {
         if let Some(guard) = self.guard()
             && let Some(fence) = fence
         {
@@ -123,9 +123,9 @@ impl Steering {
         }
     }
 
-    pub(crate) fn position(&mut self, at: Instant, place: Placement) {
+    pub(crate) fn handle_position(&mut self, measured_at: Instant, place: Placement) {
         if let Some(guard) = self.guard() {
-            guard.position(at, place);
+            guard.position(measured_at, place);
         }
     }
 

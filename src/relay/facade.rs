@@ -416,8 +416,8 @@ impl Relay {
     }
 
     /// Returns the agreed position, before the guard limits it; `None` before the first agreement.
-    pub fn final_setpoint(&self) -> Option<Placement> {
-        self.node.final_setpoint()
+    pub fn agreed_place(&self) -> Option<Placement> {
+        self.node.agreed_place()
     }
 
     /// Returns true unless the drone is known to be out of order with a flown neighbour.
@@ -472,8 +472,8 @@ impl Relay {
     /// Returns true while this relay is passive. Another relay with the larger claim then uses its index.
     ///
     /// It has no setpoint and takes no part in the protocol until the other relay has been silent for twice
-    /// `Settings::dead_after`, or until [`clear_index_taken`](Self::clear_index_taken) is called.
-    pub fn stands_down(&self) -> bool {
+    /// `Settings::dead_after`, or until [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
+    pub fn is_passive(&self) -> bool {
         self.node.is_passive()
     }
 
@@ -541,7 +541,7 @@ impl Relay {
 
     /// Returns the estimate of the interference and its number. The mission's until the chain has estimated another.
     pub fn belief(&self) -> Told {
-        self.node.round().sensing().told()
+        self.node.round().sensing().estimate()
     }
 
     /// Returns the interference measured at the transmitter (upstream) or the receiver (downstream), W.
@@ -571,7 +571,7 @@ impl Relay {
 impl Relay {
     /// Processes one measurement of the interference, W or linear SIR. It is used if `Settings::measure` requires measurements.
     ///
-    /// Takes constant time. Unusable samples are counted as [`Stats::samples_refused`](crate::Stats::samples_refused).
+    /// Takes constant time. Unusable samples are counted as [`Stats::samples_rejected`](crate::Stats::samples_rejected).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -582,7 +582,7 @@ impl Relay {
     /// let mut relay = relay(Settings { listen: Some(Listen::default()), ..Settings::default() });
     /// let at = Placement { x_m: 350.0, y_m: 0.0, altitude_m: 20.0 };
     /// relay.handle_sample(Instant::from_millis(1_000), Sample::Heard { at, power_w: 2.5e-8 });
-    /// assert_eq!(relay.stats().samples_refused, 0);
+    /// assert_eq!(relay.stats().samples_rejected, 0);
     /// # }
     /// ```
     pub fn handle_sample(&mut self, now: Instant, sample: Sample) {
@@ -606,10 +606,10 @@ impl Relay {
     /// relay.handle_position(now, measured, Placement { x_m: 10.0, y_m: 0.0, altitude_m: 20.0 });
     /// # }
     /// ```
-    pub fn handle_position(&mut self, now: Instant, at: Instant, place: Placement) {
+    pub fn handle_position(&mut self, now: Instant, measured_at: Instant, place: Placement) {
         let now = self.clock.advance(now);
         self.node
-            .handle_position(now, self.clock.internal(at), place);
+            .handle_position(now, self.clock.internal(measured_at), place);
     }
 
     /// Reports whether the drone flies to the setpoints from now on; initially true. Takes constant time.
@@ -646,10 +646,10 @@ impl Relay {
         self.node.clear_lost(self.clock.advance(now), side);
     }
 
-    /// Reports that the other relay with this index is gone. See [`Event::IndexTaken`](crate::Event::IndexTaken).
+    /// Reports that the other relay with this index is gone. See [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// A [passive](Self::stands_down) relay becomes active, with a larger claim than the other had. Takes constant time.
-    pub fn clear_index_taken(&mut self, now: Instant) {
+    /// A [passive](Self::is_passive) relay becomes active, with a larger claim than the other had. Takes constant time.
+    pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }
 }

@@ -48,14 +48,14 @@ pub(super) fn receive(
     if is_duplicate {
         receive_duplicate(node, endpoint, now, frame);
     } else if let Some(through) = through {
-        node.hear_at_both(now, through, header.sender);
+        node.on_received_at_both_ports(now, through, header.sender);
     }
 }
 
 /// Handles a frame with this relay's own index as its sender.
 fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: &Opened<'_>) {
     if let Some(session) = endpoint.session() {
-        return node.hear_duplicate(now, session.sender(frame));
+        return node.on_duplicate_index(now, session.sender(frame));
     }
     if frame.tag.is_some() {
         return;
@@ -66,7 +66,7 @@ fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: 
         Ok(Message::Claim(claim)) => node.rival(claim),
         Ok(_) => Sender::Unknown,
     };
-    node.hear_duplicate(now, sender);
+    node.on_duplicate_index(now, sender);
 }
 
 /// Handles a frame to this relay from a neighbour or a possible neighbour.
@@ -99,23 +99,23 @@ fn receive_signed(
     if let Some(rival) = rival
         && !node.is_passive()
     {
-        node.hear_duplicate(now, Sender::Rival(rival));
+        node.on_duplicate_index(now, Sender::Rival(rival));
     }
     let sender = frame.header.sender;
     match checked {
         Checked::Fresh { first } => {
-            node.is_signed_right(side, sender);
-            node.meet(side, sender, first);
+            node.on_key_match(side, sender);
+            node.on_authentic(side, sender, first);
             decode(node, now, side, frame);
         }
         Checked::Handshake { first } => {
-            node.is_signed_right(side, sender);
-            node.meet(side, sender, first);
+            node.on_key_match(side, sender);
+            node.on_authentic(side, sender, first);
         }
-        Checked::Unproven => node.called(side, sender),
+        Checked::Unproven => node.on_handshake(side, sender),
         // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.
-        Checked::Forged if frame.handshake => node.is_forged(side, sender),
-        Checked::WentBack => node.went_back(side, sender),
+        Checked::Forged if frame.handshake => node.on_forged(side, sender),
+        Checked::WentBack => node.on_epoch_went_back(side, sender),
         Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
     }
 }
@@ -167,17 +167,17 @@ pub(super) fn poll_transmit(
 
 /// Schedules the handshake that accompanies `message`, if there is one.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
-    if let Message::Heartbeat { ask, .. } = message
+    if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0
         && ask % QUESTIONS == 0
     {
         session.ask_silent(to);
     }
-    if node.shows_its_nonce(message) {
+    if node.needs_handshake(message) {
         session.show(to);
     }
     if let Message::Hello(hello) = message
-        && hello.ask
+        && hello.requests_reply
         && !hello.is_heard(node.member().node, to)
     {
         // The node may have restarted: then it accepts only handshakes and sends nothing by itself.

@@ -187,7 +187,7 @@ pub(crate) fn review(
     } else {
         Some(Unfit::NoSource)
     };
-    let still = listen.is_for_one_that_stands();
+    let still = listen.is_source_fixed();
     let mut track = before.track;
     let heard = Instant::from_micros(now.as_micros().saturating_sub(sums.age_us()));
     let ahead = (found.is_one && !still)
@@ -292,7 +292,7 @@ fn followed(
     [heard, now]: [Instant; 2],
     listen: &Listen,
 ) -> Option<Interferer> {
-    track.take(found, heard, listen.half_life);
+    track.update(found, heard, listen.half_life);
     // The agreement is used until the next review, and the drones have to fly to the new positions.
     let ahead = Duration::from_micros(listen.every.as_micros() / 2);
     let [was, will] = track.ahead(now + ahead + FLIGHT)?;
@@ -302,7 +302,7 @@ fn followed(
         return Some(at(will));
     }
     *track = Track::NONE;
-    track.take(found, heard, listen.half_life);
+    track.update(found, heard, listen.half_life);
     None
 }
 
@@ -491,7 +491,7 @@ impl Track {
     };
 
     /// Updates the track with a fit of measurements at `at`, with this half-life.
-    pub(crate) fn take(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
+    pub(crate) fn update(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]
             .into_iter()

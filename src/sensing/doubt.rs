@@ -134,7 +134,7 @@ impl Trial {
     }
 
     /// Evaluates a pass of `relays` relays, whose nodes are among 1 to `nodes`.
-    pub(crate) fn take(
+    pub(crate) fn update(
         &mut self,
         sums: &Sums,
         relative_error: f32,

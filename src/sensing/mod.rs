@@ -85,7 +85,7 @@ impl Listen {
     }
 
     /// Returns true if the interferer is assumed to be stationary.
-    pub(crate) const fn is_for_one_that_stands(&self) -> bool {
+    pub(crate) const fn is_source_fixed(&self) -> bool {
         self.half_life.as_micros() / 10 >= self.every.as_micros()
     }
 

@@ -277,7 +277,7 @@ impl Listener {
     }
 
     /// Adds a measurement `heard` above 0 at `at`; `expected` returns v of the estimate by terms.
-    pub(crate) fn take(
+    pub(crate) fn add(
         &mut self,
         now: Instant,
         distance_m: f32,
@@ -294,7 +294,7 @@ impl Listener {
             self.at = at;
             self.heard = Average::NONE;
         }
-        self.heard.take(now, self.half_life, heard);
+        self.heard.add(now, self.half_life, heard);
         let share = 1.0 / self.heard.weight;
         self.at.x_m += (at.x_m - self.at.x_m) * share;
         self.at.y_m += (at.y_m - self.at.y_m) * share;
@@ -363,7 +363,7 @@ impl Average {
         behind_s: 0.0,
     };
 
-    pub(crate) fn take(&mut self, now: Instant, half_life: Duration, value: f32) {
+    pub(crate) fn add(&mut self, now: Instant, half_life: Duration, value: f32) {
         let age = now.since(self.last);
         let before = self.weight * left(age, half_life);
         self.weight = before + 1.0;

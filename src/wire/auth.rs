@@ -137,7 +137,7 @@ pub(crate) struct Window {
 
 impl Window {
     /// Accepts `counter` once; false if it was accepted before or is too old to know. `u32::MAX` is never accepted.
-    pub(crate) const fn take(&mut self, counter: u32) -> bool {
+    pub(crate) const fn accept(&mut self, counter: u32) -> bool {
         let Some(next) = counter.checked_add(1) else {
             return false;
         };
@@ -175,7 +175,7 @@ mod tests {
         for _ in 0..200_000 {
             let counter = (largest + random(40)).saturating_sub(random(120));
             let fresh = !seen.contains(&counter) && (seen.is_empty() || counter + 63 >= largest);
-            assert_eq!(window.take(counter), fresh, "{counter} after {largest}");
+            assert_eq!(window.accept(counter), fresh, "{counter} after {largest}");
             if fresh {
                 seen.insert(counter);
                 late += u32::from(counter < largest);
@@ -188,8 +188,8 @@ mod tests {
     #[test]
     fn the_last_counter_is_never_taken() {
         let mut window = Window::default();
-        assert!(!window.take(u32::MAX));
-        assert!(window.take(u32::MAX - 1) && !window.take(u32::MAX - 1));
-        assert!(!window.take(0), "far too old");
+        assert!(!window.accept(u32::MAX));
+        assert!(window.accept(u32::MAX - 1) && !window.accept(u32::MAX - 1));
+        assert!(!window.accept(0), "far too old");
     }
 }

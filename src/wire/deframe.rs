@@ -23,7 +23,7 @@ impl core::fmt::Display for DeframeError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Oversized => "the frame is longer than any frame of the format",
-            Self::Truncated => "the frame ended inside a run",
+            Self::Truncated => "the frame ended inside a COBS block",
         })
     }
 }

@@ -23,7 +23,7 @@ pub const MAX_FRAME: usize = MAX_DECODED + 2;
 const SIGNED: u16 = 0x1000;
 
 /// Flag: the body is a handshake; valid with a tag only.
-const HELLO: u16 = 0x2000;
+const HANDSHAKE: u16 = 0x2000;
 
 /// Buffer for one encoded frame.
 pub type FrameBuf = [u8; MAX_FRAME];
@@ -99,7 +99,7 @@ pub(crate) fn encode_handshake(
         place.copy_from_slice(handshake);
         handshake.len()
     });
-    close(header, SIGNED | HELLO, len, Some(signer), out)
+    close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
 /// Returns the place of the body. The first byte and the last are for COBS and the delimiter.
@@ -181,7 +181,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let first = u16::from_le_bytes([a, b]);
     let second = u16::from_le_bytes([c, d]);
     let flags = second & 0xF000;
-    let known = flags == 0 || AUTH && (flags == SIGNED || flags == SIGNED | HELLO);
+    let known = flags == 0 || AUTH && (flags == SIGNED || flags == SIGNED | HANDSHAKE);
     if first >> 12 != u16::from(VERSION) || !known {
         return Err(FrameError::Version);
     }
@@ -202,7 +202,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
         body,
         signed,
         tag,
-        handshake: flags & HELLO != 0,
+        handshake: flags & HANDSHAKE != 0,
     })
 }
 

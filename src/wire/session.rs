@@ -31,7 +31,7 @@ use crate::node::duplicate::{RAISED, Rival, Sender};
 use crate::time::{Duration, Instant};
 
 /// Length of a handshake's body, bytes.
-pub(crate) const HELLO: usize = 17;
+pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
@@ -228,8 +228,8 @@ impl Session {
         self.find(to).is_some_and(|peer| peer.proven)
     }
 
-    pub(crate) fn handshake(&mut self, to: u16) -> [u8; HELLO] {
-        let mut body = [0; HELLO];
+    pub(crate) fn handshake(&mut self, to: u16) -> [u8; HANDSHAKE_LENGTH] {
+        let mut body = [0; HANDSHAKE_LENGTH];
         let epoch = self.epoch;
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             let Nonces { sender, receiver } = peer.nonces(epoch);
@@ -279,7 +279,7 @@ impl Session {
         let Some(peer) = self.touch(sender) else {
             return Checked::Forged;
         };
-        if !peer.taken.take(frame.header.counter) {
+        if !peer.taken.accept(frame.header.counter) {
             return Checked::Replayed;
         }
         let first = !peer.proven;
@@ -335,7 +335,7 @@ impl Session {
                 Checked::Replayed
             });
         }
-        if !peer.taken.take(frame.header.counter) {
+        if !peer.taken.accept(frame.header.counter) {
             return Some(Checked::Replayed);
         }
         peer.older.times = 0;

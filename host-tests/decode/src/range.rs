@@ -173,11 +173,11 @@ fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
                 "source_y_m",
                 "source_at_rx_w",
             ];
-            let is_source = get("belief") == 4.0;
+            let is_source = get("estimate") == 4.0;
             let first = numbers.list("sum_ab").first();
             &[
                 (
-                    "belief",
+                    "estimate",
                     if is_source {
                         get("source_power_w") > 0.0
                     } else {

@@ -351,8 +351,8 @@ impl Chain {
             return;
         }
         let places = (
-            before.watched.relay().final_setpoint(),
-            after.watched.relay().final_setpoint(),
+            before.watched.relay().agreed_place(),
+            after.watched.relay().agreed_place(),
         );
         if let (Some(from), Some(to)) = places {
             let config = self.mission.config();

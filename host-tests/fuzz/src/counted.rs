@@ -25,7 +25,7 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
     let Stats {
         sent,
         repeats,
-        sweeps,
+        passes_begun: sweeps,
         received,
         repeated,
         overheard,
@@ -45,7 +45,7 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
         view,
         views,
         stale,
-        samples_refused,
+        samples_rejected,
     } = *stats;
     [
         ("sent", sent),
@@ -70,7 +70,7 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
         ("view", view),
         ("views", views),
         ("stale", stale),
-        ("samples_refused", samples_refused),
+        ("samples_rejected", samples_rejected),
     ]
 }
 

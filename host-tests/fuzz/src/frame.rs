@@ -142,7 +142,7 @@ fn signed(plain: &[u8]) {
         stale: before.stale,
         misdirected: before.misdirected,
         repeated: before.repeated,
-        sweeps: before.sweeps,
+        passes_begun: before.passes_begun,
         ..*relay.stats()
     };
     assert_eq!(after, expected);

@@ -16,7 +16,7 @@ use super::setting::KEY;
 const SIGNED: u16 = 1;
 
 /// Flag of a handshake.
-const HELLO: u16 = 2;
+const HANDSHAKE: u16 = 2;
 
 const NONCE: usize = 8;
 
@@ -91,7 +91,7 @@ impl Member {
         let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
         let body = [&*self.own, &*self.relay, &[asks]].concat();
         let to = self.relay.clone();
-        self.frame(header, SIGNED | HELLO, &to, &body)
+        self.frame(header, SIGNED | HANDSHAKE, &to, &body)
     }
 
     fn frame(&mut self, header: Header, flags: u16, to: &[u8], body: &[u8]) -> Vec<u8> {

@@ -231,7 +231,7 @@ impl Watched {
         assert!(view >= self.view, "{view:?} after {:?}", self.view);
         let counted = relay.stats().views > self.stats.views;
         assert_eq!(counted, view > self.view, "{view:?} in silence");
-        let told = events.contains(&Event::Reformed);
+        let told = events.contains(&Event::ViewAccepted);
         assert_eq!(told, view > self.view, "{view:?}, {events:?}");
         let index = relay.index();
         assert!((1..=left).contains(&index), "place {index} of {left}");
@@ -259,7 +259,7 @@ impl Watched {
         assert!(told || setpoint == self.setpoint, "moved in silence");
         // A passive relay has no setpoint; nor has one whose line has changed, before the next agreement.
         let moved = self.sites != self.relay.sites();
-        let silent = self.relay.stands_down() || moved;
+        let silent = self.relay.is_passive() || moved;
         let before = self.setpoint;
         self.setpoint = setpoint.or(self.setpoint.filter(|_| !silent));
         assert_eq!(setpoint, self.setpoint, "a place that was taken away");
@@ -291,13 +291,13 @@ impl Watched {
                 );
             }
         } else {
-            assert_eq!(setpoint, self.relay.final_setpoint());
+            assert_eq!(setpoint, self.relay.agreed_place());
         }
     }
 
     /// Checks an agreed position. It is on the line's length and in its lateral range, at an altitude that this relay may have.
     fn look_at_agreed(&mut self, events: &[Event]) {
-        let agreed = self.relay.final_setpoint();
+        let agreed = self.relay.agreed_place();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
             self.held = Some((self.view, self.frames.number));
         }

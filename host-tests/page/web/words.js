@@ -14,7 +14,7 @@ function summary(report) {
 /** Returns the summary of a tick before the last one. */
 function moment(tick, worst, chain) {
   const told = chain.filter((relay) => relay.told).length;
-  const sir = told < chain.length ? `${told} of ${chain.length} relays have a position` : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
+  const sir = told < chain.length ? `${told} of ${chain.length} relays have an agreed position` : `worst hop: SIR ${worst.toPrecision(5)} (${decibels(worst)})`;
   return `At ${tick.at_s.toFixed(3)} s: ${sir}; ${tick.messages} messages.`;
 }
 

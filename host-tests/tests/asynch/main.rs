@@ -149,7 +149,7 @@ fn a_stuck_radio_delays_nobody_who_shares_its_channel() {
     );
     let reformed = |drone: usize| {
         let mut events = stuck.drones[drone].events.iter();
-        events.any(|(_, event)| matches!(event, Event::Reformed))
+        events.any(|(_, event)| matches!(event, Event::ViewAccepted))
     };
     assert!(
         [0, 1, 3, 4].into_iter().all(reformed),

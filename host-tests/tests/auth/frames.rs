@@ -8,7 +8,7 @@ use crc::{CRC_32_ISCSI, Crc, Table};
 pub(crate) const HEADER: usize = 10;
 pub(crate) const TAG: usize = 8;
 pub(crate) const SIGNED: u16 = 0x1000;
-pub(crate) const HELLO: u16 = 0x2000;
+pub(crate) const HANDSHAKE: u16 = 0x2000;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
@@ -68,7 +68,7 @@ impl Plain {
     }
 
     pub(crate) fn is_handshake(&self) -> bool {
-        self.flags() == SIGNED | HELLO
+        self.flags() == SIGNED | HANDSHAKE
     }
 
     /// Returns a handshake's nonces: the sender's and the receiver's.
@@ -110,7 +110,7 @@ pub(crate) fn handshake(
     asks: bool,
 ) -> Plain {
     let (network, from, to) = addresses;
-    let mut handshake = Plain::new(network, from, to, SIGNED | HELLO, counter);
+    let mut handshake = Plain::new(network, from, to, SIGNED | HANDSHAKE, counter);
     for nonce in nonces {
         handshake.0.extend(nonce.to_le_bytes());
     }

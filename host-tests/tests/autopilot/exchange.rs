@@ -90,7 +90,7 @@ fn a_relay_has_a_setpoint_while_its_drone_is_engaged_and_the_drone_flies_there()
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let (mut vehicle, mut relay) = flies(kind, Settings::default());
         assert_eq!(vehicle.link.state(), State::Standby);
-        assert!(relay.final_setpoint().is_some());
+        assert!(relay.agreed_place().is_some());
         assert_eq!(relay.setpoint(), None, "its pilot flies");
 
         vehicle.mode = Mode::Companion;
@@ -98,7 +98,7 @@ fn a_relay_has_a_setpoint_while_its_drone_is_engaged_and_the_drone_flies_there()
         assert!(positions.len() >= 9, "{positions:?}");
         assert_eq!(vehicle.link.state(), State::Engaged);
         run(&mut vehicle, &mut relay, 120_000);
-        let (place, agreed) = (vehicle.place, relay.final_setpoint().unwrap());
+        let (place, agreed) = (vehicle.place, relay.agreed_place().unwrap());
         assert_eq!(relay.setpoint(), Some(agreed));
         assert!(
             (place.x_m - agreed.x_m).abs() < 0.05,
@@ -133,14 +133,14 @@ fn a_relay_has_a_setpoint_while_its_drone_is_engaged_and_the_drone_flies_there()
 #[test]
 fn a_relay_is_handed_what_the_radio_hears() {
     let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
-    assert_eq!(relay.stats().samples_refused, 0);
+    assert_eq!(relay.stats().samples_rejected, 0);
     let said = RADIO_STATUS_DATA {
         noise: 100,
         ..RADIO_STATUS_DATA::DEFAULT
     };
     vehicle.say_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
     assert!(vehicle.link.exchange(&mut relay, vehicle.now).0);
-    assert_eq!(relay.stats().samples_refused, 1);
+    assert_eq!(relay.stats().samples_rejected, 1);
 }
 
 /// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.

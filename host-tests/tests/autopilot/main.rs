@@ -369,7 +369,7 @@ fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
     };
     let view = |vehicle: &mut Vehicle, hold| -> Vec<String> {
         let from = vehicle.now;
-        vehicle.link.handle_event(Event::Reformed);
+        vehicle.link.handle_event(Event::ViewAccepted);
         vehicle.run(500);
         vehicle.link.handle_event(Event::Converged);
         for _ in 0..600 {

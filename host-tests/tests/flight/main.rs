@@ -60,7 +60,7 @@ fn together(outcome: &Outcome) -> Option<Instant> {
         .moments
         .iter()
         .filter_map(|moment| match moment.what {
-            TimelineEvent::Reformed { view: to, .. } if to == view => Some(moment.at),
+            TimelineEvent::ViewAccepted { view: to, .. } if to == view => Some(moment.at),
             _ => None,
         });
     all.then(|| came.max().unwrap_or(Instant::ZERO))

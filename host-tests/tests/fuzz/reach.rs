@@ -39,7 +39,7 @@ fn relays_of_the_corpus_count_everything_and_hold_places_of_every_method() {
     assert!(counters.iter().all(|&count| count > 0), "{counters:?}");
     let mut places = BTreeMap::new();
     for watched in &relays {
-        let held = u32::from(watched.relay().final_setpoint().is_some());
+        let held = u32::from(watched.relay().agreed_place().is_some());
         *places.entry(method(watched)).or_insert(0) += held;
     }
     println!("{places:?}");

@@ -97,8 +97,8 @@ impl World {
                 guard.hear(letter.side, node(letter.from), &letter.fence);
                 let side = usize::from(letter.side == Side::Downstream);
                 // Only a message of the present association counts.
-                let told = letter.fence.flags & Fence::RELEASED != 0
-                    && letter.fence.echo == drone.said[side];
+                let told =
+                    letter.fence.flags & Fence::LEFT != 0 && letter.fence.echo == drone.said[side];
                 tell.extend(told.then_some((letter, drone.stretch()[0])));
                 // The setpoint may be read at any time between two messages.
                 if self.rng.random_bool(0.5) {
@@ -136,7 +136,7 @@ impl World {
             };
             assert!(fence.is_valid(), "{fence:?}");
             drone.messages += 1;
-            if fence.flags & Fence::RELEASED == 0 {
+            if fence.flags & Fence::LEFT == 0 {
                 drone.said[usize::from(side == Side::Downstream)] = fence.association;
             }
             let heard_from = match side {

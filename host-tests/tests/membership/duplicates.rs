@@ -71,7 +71,7 @@ struct Found {
     flies: u64,
     /// True if the duplicate that started first has the setpoint in the end.
     first_stays: bool,
-    /// Records for each duplicate that it raised `Event::IndexTaken`.
+    /// Records for each duplicate that it raised `Event::DuplicateIndex`.
     reported: [bool; 2],
 }
 
@@ -166,7 +166,7 @@ fn flown(case: Case) -> Found {
                 flying.push((at, transmit.port, frame[..transmit.len].to_vec()));
             }
             while let Some(event) = relay.poll_event() {
-                let taken = event == Event::IndexTaken { node: twice };
+                let taken = event == Event::DuplicateIndex { node: twice };
                 if taken && at == first {
                     reported[0] = true;
                 } else if taken && at == second {

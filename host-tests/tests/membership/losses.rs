@@ -18,7 +18,11 @@ fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
         .map(|moment| moment.at)
         .max()
         .unwrap();
-    let all: u32 = outcome.relays.iter().map(|relay| relay.stats.sweeps).sum();
+    let all: u32 = outcome
+        .relays
+        .iter()
+        .map(|relay| relay.stats.passes_begun)
+        .sum();
     (outcome.ended.since(last), all - sweeps_before)
 }
 

@@ -76,7 +76,7 @@ fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
 
 /// Returns how often a relay accepted a new view.
 fn views(outcome: &Outcome, relay: u16) -> usize {
-    let reformed = |what| matches!(what, TimelineEvent::Reformed { .. });
+    let reformed = |what| matches!(what, TimelineEvent::ViewAccepted { .. });
     outcome
         .moments
         .iter()

@@ -111,7 +111,7 @@ impl<'a> World<'a> {
             .iter()
             .filter(|event| matches!(event, Event::NeighbourLost { .. }));
         missed.for_each(|_| self.tally.add("neighbours missed"));
-        if events.contains(&Event::Reformed) {
+        if events.contains(&Event::ViewAccepted) {
             self.tally.add("views agreed on");
         }
         if self.ledgers[at].audit(self.scenario, at, &turn)? {

@@ -140,7 +140,7 @@ impl Ledger {
 
     /// Records a message sent to the neighbour at `to`.
     pub(crate) fn told(&mut self, to: Side, message: &Message, now: Instant) {
-        if let Message::Heartbeat { ask: 1.., .. } = message {
+        if let Message::Heartbeat { request: 1.., .. } = message {
             self.signs[side(to)].ask(message, now);
         }
         self.leased(message);
@@ -183,7 +183,7 @@ impl Ledger {
         let beside = [before, after.filter(|&node| node <= all)];
         prop_assert_eq!(relay.neighbours(), beside);
         let views = relay.stats().views;
-        let told = events.contains(&Event::Reformed);
+        let told = events.contains(&Event::ViewAccepted);
         prop_assert_eq!(told, views > self.stats.views, "a view in silence");
         prop_assert!(relay.view().number() >= views);
         prop_assert!(!events.contains(&Event::NoQuorum), "everybody is there");
@@ -284,7 +284,7 @@ impl Ledger {
             [
                 stats.sent,
                 stats.repeats,
-                stats.sweeps,
+                stats.passes_begun,
                 stats.received,
                 stats.repeated,
                 stats.view,
@@ -325,7 +325,7 @@ impl Ledger {
             "from neighbours of the same mission on links of their own"
         );
         prop_assert!(stats.repeated + stats.view + stats.stale <= stats.received);
-        prop_assert_eq!(stats.samples_refused, self.refused);
+        prop_assert_eq!(stats.samples_rejected, self.refused);
         self.stats = *stats;
         Ok(())
     }

@@ -44,7 +44,7 @@ impl Signs {
     }
 
     pub(crate) fn ask(&mut self, message: &Message, now: Instant) {
-        if let Message::Heartbeat { ask, .. } = message {
+        if let Message::Heartbeat { request: ask, .. } = message {
             self.asked.push((*ask, now));
             self.open += 1;
             self.perhaps_open += 1;
@@ -55,7 +55,7 @@ impl Signs {
     /// Records signs of life: an answer counts from its question, a completion from the forwarding.
     pub(crate) fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
-            Message::Heartbeat { answer, .. } => {
+            Message::Heartbeat { reply: answer, .. } => {
                 let known = self.asked.iter().rev().find(|(number, _)| number == answer);
                 let Some((_, asked)) = known else {
                     return;

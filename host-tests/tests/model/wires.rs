@@ -84,7 +84,7 @@ pub(crate) fn pass(frame: &[u8]) -> Option<Pass> {
     };
     Some(Pass {
         number,
-        digest: message.mission()?,
+        digest: message.digest()?,
         moves: matches!(message, Message::Token(_)),
         follows: match &message {
             Message::Gather(roster) => roster.after > 0,

@@ -13,8 +13,8 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
         let mission = digest(&mission(2));
         let beat = Message::Heartbeat {
             mission,
-            ask,
-            answer,
+            request: ask,
+            reply: answer,
         };
         encode(1, 2, &beat)
     };
@@ -36,7 +36,12 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
             if let Message::Claim(_) = message {
                 continue;
             }
-            let Message::Heartbeat { ask, answer: 0, .. } = message else {
+            let Message::Heartbeat {
+                request: ask,
+                reply: 0,
+                ..
+            } = message
+            else {
                 panic!("{message:?}");
             };
             asked.push(now);

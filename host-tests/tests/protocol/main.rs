@@ -223,7 +223,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
     let [(Port::Upstream, Message::Hello(hello), bytes)] = &said[..] else {
         panic!("{said:?}");
     };
-    assert!(hello.ask && !hello.form, "{hello:?}");
+    assert!(hello.requests_reply && !hello.requests_view, "{hello:?}");
     head.handle_bytes(now, Port::Downstream, bytes);
     assert_eq!((head.stats().mission, head.stats().rejected()), (1, 1));
     assert_eq!(events(&mut head), [Event::MissionMismatch { node: 2 }]);
@@ -231,8 +231,8 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
     // A heartbeat shows the mismatch too.
     let beat = Message::Heartbeat {
         mission: digest(head.mission()),
-        ask: 1,
-        answer: 0,
+        request: 1,
+        reply: 0,
     };
     tail.handle_bytes(now, Port::Upstream, &encode(1, 2, &beat));
     assert_eq!((tail.stats().mission, tail.stats().rejected()), (1, 2));
@@ -245,8 +245,8 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
 fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else() {
     let beat = Message::Heartbeat {
         mission: digest(&mission(3)),
-        ask: 300,
-        answer: 0,
+        request: 300,
+        reply: 0,
     };
     let mut relay = relay(mission(3), 2);
     let now = Instant::ZERO;
@@ -257,7 +257,7 @@ fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else
     relay.handle_bytes(
         now,
         Port::Upstream,
-        &encode(1, 2, &Message::Busy { sweep: 1 }),
+        &encode(1, 2, &Message::Busy { number: 1 }),
     );
     assert_eq!(relay.stats().misdirected, 1);
     relay.handle_bytes(now, Port::Shared, &encode(1, 2, &beat));
@@ -277,8 +277,8 @@ fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else
         [(
             Port::Upstream,
             Message::Heartbeat {
-                ask: 0,
-                answer: 300,
+                request: 0,
+                reply: 300,
                 ..
             },
             _

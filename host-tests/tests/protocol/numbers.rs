@@ -42,7 +42,7 @@ fn calls(relay: &mut Relay, now: Instant) -> bool {
     said.extend(drain(relay, later));
     said.iter().any(|(port, message, _)| {
         *port == Port::Upstream
-            && matches!(message, Message::Hello(hello) if hello.form && hello.ask)
+            && matches!(message, Message::Hello(hello) if hello.requests_view && hello.requests_reply)
     })
 }
 

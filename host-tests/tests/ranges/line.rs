@@ -137,7 +137,7 @@ impl Line {
     /// Checks that every reported number is finite, and no relay sends messages that others refuse.
     pub(crate) fn check(&self) {
         for relay in &self.relays {
-            for place in [relay.setpoint(), relay.final_setpoint()]
+            for place in [relay.setpoint(), relay.agreed_place()]
                 .into_iter()
                 .flatten()
             {

@@ -61,7 +61,7 @@ fn what_is_believed_is_drawn_beside_what_is_true() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {
         let picture = Picture {
             others: vec![(30.0, x, y)],
-            others_are: OtherInterferers::Believed,
+            others_are: OtherInterferers::NewEstimate,
             ..level(8)
         };
         let svg = draw(&picture);

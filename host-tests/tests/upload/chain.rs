@@ -200,7 +200,7 @@ fn an_upload_in_the_midst_of_forming_anew_is_not_forgotten() {
     setup.kills = vec![(3, AT)];
     setup.deadline = seconds(200);
     let calm = run(setup.clone()).unwrap();
-    let formed = |moment: &&Moment| matches!(moment.what, TimelineEvent::Reformed { .. });
+    let formed = |moment: &&Moment| matches!(moment.what, TimelineEvent::ViewAccepted { .. });
     let at = calm.moments.iter().find(formed).unwrap().at;
     for ms in (0..600).step_by(10) {
         for end in [Side::Upstream, Side::Downstream] {

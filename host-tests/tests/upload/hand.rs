@@ -172,7 +172,7 @@ fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
         for event in [
             Event::Uploaded,
             Event::Adopted,
-            Event::Reformed,
+            Event::ViewAccepted,
             Event::Converged,
         ] {
             assert!(events.contains(&event), "{event:?} of {events:?}");

@@ -72,7 +72,7 @@ fn judge(
             TimelineEvent::Uploaded(version) => {
                 holders.entry(version).or_default().insert(moment.relay);
             }
-            TimelineEvent::Reformed {
+            TimelineEvent::ViewAccepted {
                 view,
                 version,
                 relays,

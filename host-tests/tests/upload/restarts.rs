@@ -27,7 +27,7 @@ fn views(outcome: &Outcome) -> usize {
         .iter()
         .filter(|moment| moment.at > seconds(41));
     moments
-        .filter(|moment| matches!(moment.what, TimelineEvent::Reformed { .. }))
+        .filter(|moment| matches!(moment.what, TimelineEvent::ViewAccepted { .. }))
         .count()
 }
 

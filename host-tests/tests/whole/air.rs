@@ -289,7 +289,7 @@ impl Air {
             Deed::Clear(at) => {
                 let drone = &mut self.drones[at];
                 let now = drone.clock(self.now_us);
-                drone.relay.clear_index_taken(now);
+                drone.relay.clear_duplicate_index(now);
                 return Some(at);
             }
             Deed::Cut { from, to } => self.cuts[from * all + to] += 1,

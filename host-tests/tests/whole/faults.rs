@@ -1,5 +1,7 @@
 //! Single faults: a one-way or flapping link, a relay with another mission, an epoch that goes back.
 
+use std::collections::BTreeSet;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -105,11 +107,17 @@ fn a_relay_that_is_left_out_draws_no_other_away() {
     assert!(share > 0.98, "{share}");
 }
 
-/// Checks any flapping link with a period of 5 s to 300 s; RESULTS.md lists the seeds below 90 %.
+/// Links that stay up for a little longer than the longest hold-down: one end is released before the other one, and the link is
+/// lost again soon.
+const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
+
+/// Checks any flapping link with a period of 5 s to 300 s.
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));
-    let mut all: Vec<(f64, u64, String)> = (first..first + count)
+    let others = UP_FOR_100_S.iter().filter(|_| count == 20);
+    let seeds: BTreeSet<u64> = (first..first + count).chain(others.copied()).collect();
+    let mut all: Vec<(f64, u64, String)> = seeds
         .into_par_iter()
         .map(|seed| {
             let rng = &mut ChaCha8Rng::seed_from_u64(seed);
@@ -126,7 +134,8 @@ fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let below = all.iter().filter(|(share, ..)| *share < 0.9).count();
     let median = all[all.len() / 2].0;
     println!(
-        "{count} flapping links: {below} below 90 %, median {:.1} %, worst {:?}",
+        "{} flapping links: {below} below 90 %, median {:.1} %, worst {:?}",
+        all.len(),
         100.0 * median,
         &all[..all.len().min(8)]
     );

@@ -41,7 +41,7 @@ fn a_granted_view_flies_the_mission_of_its_proposal() {
     let (flown, version) = mission_id(&newer);
     assert_eq!((met.version(), met.view().number()), (version, 1));
     assert_eq!(digest(met.mission()), flown);
-    let told = [Event::Reformed, Event::Uploaded, Event::Adopted];
+    let told = [Event::ViewAccepted, Event::Uploaded, Event::Adopted];
     assert_eq!(met.events(), told);
     assert_eq!(met.stats().rejected(), 0);
     let mark = mark(met.view().bits());

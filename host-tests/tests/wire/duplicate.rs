@@ -34,7 +34,7 @@ fn relay_4(wiring: Wiring, port: Port) -> (Bench, Said, u32) {
     let number = out[0].1.number("claim") as u32;
     assert_eq!(out, [(out[0].0, claim(number, 0, 0))]);
     assert!(number < 1 << 30);
-    assert!(!bench.stands_down());
+    assert!(!bench.is_passive());
     (bench, sweep, number)
 }
 
@@ -46,7 +46,7 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
             let out = hears(&mut bench, port, &between(from, 4, &claim(7, 9, flags)));
             assert_eq!(out, [(port, claim(7, 9, flags | ECHO))]);
         }
-        assert!(!bench.stands_down() && bench.events().is_empty());
+        assert!(!bench.is_passive() && bench.events().is_empty());
     }
 }
 
@@ -71,8 +71,8 @@ fn the_smaller_claim_turns_passive_and_the_larger_answers() {
                 };
                 let out = hears(&mut after, port, &bytes);
                 let passive = number > own && heard == own;
-                assert_eq!(after.stands_down(), passive, "{number} {heard} {echo}");
-                let told = (heard == own).then_some(Event::IndexTaken { node: 4 });
+                assert_eq!(after.is_passive(), passive, "{number} {heard} {echo}");
+                let told = (heard == own).then_some(Event::DuplicateIndex { node: 4 });
                 assert_eq!(after.events(), Vec::from_iter(told));
                 assert_eq!(out.len(), 1);
                 assert_eq!(out[0].1, claim(own, number, u8::from(passive)));
@@ -95,7 +95,7 @@ fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
         ] {
             assert_eq!(hears(&mut bench, port, &bytes), []);
             assert_eq!(bench.events(), []);
-            assert!(!bench.stands_down());
+            assert!(!bench.is_passive());
         }
     }
 }
@@ -144,7 +144,7 @@ fn with_a_key_handshakes_are_the_claims() {
             let mut relay = relay.clone();
             relay.handle_bytes(NOW, Port::Shared, frame);
             let sent = frames(&mut relay).len();
-            (relay.stands_down(), sent)
+            (relay.is_passive(), sent)
         };
         for frame in own.iter().chain(&forged) {
             assert_eq!(given(&relay, frame), (false, 0));

@@ -36,7 +36,7 @@ fn a_proposal_passes_three_relays_and_the_decision_returns() {
         assert_eq!((bench.view().bits(), bench.index()), (view, index));
         assert_eq!(bench.stats().views, 1);
         assert_eq!(bench.lease(), None, "nothing to hold yet");
-        assert_eq!(bench.events(), [Event::Reformed]);
+        assert_eq!(bench.events(), [Event::ViewAccepted]);
         assert_eq!(bench.stats().rejected(), 0);
     }
 }
@@ -105,7 +105,7 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
                     let decided = decided_by(&mut last, &proposal);
                     let enough = 2 * votes + u16::from(proposer) > relays || !quorum;
                     let (event, view, decision) = if enough {
-                        (Event::Reformed, id(9, 1), granted(id(9, 1), of, 12, 12))
+                        (Event::ViewAccepted, id(9, 1), granted(id(9, 1), of, 12, 12))
                     } else {
                         (Event::NoQuorum, 0, refused(id(9, 1), of, 12, 12))
                     };

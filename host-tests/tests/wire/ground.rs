@@ -75,7 +75,7 @@ fn messages_that_the_ground_may_not_send_are_misaddressed() {
         assert_eq!(after.counted(), [expected], "{said:?}");
         // The relay does not listen.
         let refused = u32::from(said.is("Level"));
-        assert_eq!(after.stats().samples_refused, refused, "{said:?}");
+        assert_eq!(after.stats().samples_rejected, refused, "{said:?}");
     }
     for said in [
         upload(1, base ^ 1),

@@ -90,27 +90,27 @@ pub(crate) fn message(said: &Said) -> Message {
         "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
         "Verdict" => Message::Verdict(Answer {
             number: of.word("number"),
-            mission: of.word("view"),
+            view_digest: of.word("view"),
             verdict: Verdict {
                 commit: of.has("commit").then(|| of.byte("commit")),
                 slacks: of.targets("slack_m"),
             },
-            stand: of.has("stand_m").then(|| of.real("stand_m")),
+            required_x_m: of.has("stand_m").then(|| of.real("stand_m")),
             own: of.flag("own", 0),
         }),
         "Busy" => Message::Busy {
-            sweep: of.word("number"),
+            number: of.word("number"),
         },
         "Heartbeat" => Message::Heartbeat {
             mission: of.word("mission"),
-            ask: of.word("ask"),
-            answer: of.word("answer"),
+            request: of.word("ask"),
+            reply: of.word("answer"),
         },
         "Gather" => Message::Gather(roster(&of)),
         "Gathered" => Message::Gathered(roster(&of)),
         "Token" => Message::Token(Token {
             number: of.word("number"),
-            mission: of.word("view"),
+            view_digest: of.word("view"),
             place: of.place(),
             power_w: of.real("power_w"),
             turn: match (of.byte("turn"), of.byte("columns")) {
@@ -128,15 +128,15 @@ pub(crate) fn message(said: &Said) -> Message {
         }),
         "Moved" => Message::Moved(Moved {
             number: of.word("number"),
-            mission: of.word("view"),
+            view_digest: of.word("view"),
             place: of.place(),
-            any: of.flag("moved", 0),
-            worst: of.real("worst_sir"),
+            any_moved: of.flag("moved", 0),
+            worst_sir: of.real("worst_sir"),
         }),
         "Hello" => Message::Hello(hello(&of)),
         "Proposal" | "Decision" => vote(said.name(), &of),
         "Fence" => Message::Fence {
-            mission: of.word("line"),
+            line_digest: of.word("line"),
             fence: Fence {
                 association: of.word("association"),
                 echo: of.word("echo"),
@@ -153,16 +153,16 @@ pub(crate) fn message(said: &Said) -> Message {
         },
         "Offer" => Message::Offer {
             upload: upload(said, &of),
-            answer: of.word("answer"),
+            offer_number: of.word("answer"),
         },
         "Pulse" => Message::Pulse(Pulse {
             number: of.word("number"),
-            mission: of.word("view"),
+            view_digest: of.word("view"),
             lease: of.word("lease_ds"),
         }),
         "Pulsed" => Message::Pulsed(Pulsed {
             number: of.word("number"),
-            mission: of.word("view"),
+            view_digest: of.word("view"),
             done: of.flag("done", 0),
         }),
         "Sense" | "Sensed" => sense(said, &of),
@@ -172,7 +172,7 @@ pub(crate) fn message(said: &Said) -> Message {
         },
         "Claim" => Message::Claim(Claim {
             number: of.long("claim"),
-            heard: of.long("other_claim"),
+            other_number: of.long("other_claim"),
             passive: of.flag("flags", 0),
             echo: of.flag("flags", 1),
         }),
@@ -186,7 +186,7 @@ fn sweep(name: &str, of: &Of<'_>) -> Sweep {
     let chosen = name == "Aside";
     Sweep {
         number: of.word("number"),
-        mission: of.word("view"),
+        view_digest: of.word("view"),
         // The anchor is negative in a plain pass.
         ladder: ladder.plainly(anchor < 0.0),
         relay: Station {
@@ -216,7 +216,7 @@ fn roster(of: &Of<'_>) -> Roster {
     };
     Roster {
         number: of.word("number"),
-        mission: of.word("view"),
+        view_digest: of.word("view"),
         after: of.word("after"),
         seats: seats.iter().map(seat).collect(),
     }
@@ -225,18 +225,18 @@ fn roster(of: &Of<'_>) -> Roster {
 fn hello(of: &Of<'_>) -> Hello {
     Hello {
         mission: of.word("mission"),
-        newest: of.id("newest_view"),
+        latest_view: of.id("newest_view"),
         neighbour: of.word("neighbour"),
         behind: of.word("behind"),
         hears: of.byte("hears"),
-        holds: of.mission_id("holds", "holds_version"),
-        nonce: of.word("offer_number"),
-        ask: of.flag("flags", 0),
-        form: of.flag("flags", 1),
+        latest_mission: of.mission_id("holds", "holds_version"),
+        offer_number: of.word("offer_number"),
+        requests_reply: of.flag("flags", 0),
+        requests_view: of.flag("flags", 1),
         fresh: of.flag("flags", 2),
         ready: of.flag("flags", 3),
-        flies: of.flag("flags", 4),
-        whole: of.flag("flags", 5),
+        active: of.flag("flags", 4),
+        active_in_view: of.flag("flags", 5),
         refused: of.flag("flags", 6),
     }
 }
@@ -248,25 +248,25 @@ fn vote(name: &str, of: &Of<'_>) -> Message {
         let accepted = of.group("accepted");
         return Message::Decision(Decision {
             mission_id,
-            proposal: view,
+            proposed_view: view,
             place,
-            there: of.word("there"),
+            reached: of.word("there"),
             base: of.view("base_view", "base_relays"),
-            view: accepted.map(|of| of.view("view", "relays")),
-            lease_left: of.word("lease_left_ds"),
+            accepted: accepted.map(|of| of.view("view", "relays")),
+            usable_in: of.word("lease_left_ds"),
         });
     }
     let successor = of.group("successor");
     Message::Proposal(Proposal {
         mission_id,
-        view,
+        proposed_view: view,
         place,
         poll: Poll {
             agreed: of.view("agreed_view", "agreed_relays"),
             votes: of.word("votes"),
             proposer: of.flag("proposer", 0),
             lease_left: of.word("lease_left_ds"),
-            rest: of.word("rest_ds"),
+            earlier_lease_left: of.word("rest_ds"),
             successor: successor.map(|of| Successor {
                 proposal: of.id("proposal"),
                 view: of.view("view", "relays"),
@@ -358,11 +358,11 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
     let numbers: Vec<f32> = lists.concat().into_iter().chain(ends).collect();
     let Heard {
         number,
-        mission,
-        told,
+        view_digest: mission,
+        estimate: told,
         sums,
         receiver,
-        off,
+        excluded: off,
     } = heard;
     assert_eq!(*number, of.word("number"));
     assert_eq!(*mission, of.word("view"));

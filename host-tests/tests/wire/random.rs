@@ -163,7 +163,7 @@ fn the_draws_reach_messages_and_both_refusals() {
 
 #[test]
 fn node_numbers_that_do_not_fit_are_not_written() {
-    let message = Message::Busy { sweep: 1 };
+    let message = Message::Busy { number: 1 };
     for (number, fits) in [(4094, true), (4095, false), (4096, false), (65535, false)] {
         for [sender, destination] in [[number, 2], [1, number]] {
             let header = Header {
@@ -183,7 +183,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {
         number: 1,
-        mission: 2,
+        view_digest: 2,
         ladder: Ladder::single(1.5),
         relay: Station {
             at: CrossSection::on_line(20.0),

@@ -119,7 +119,7 @@ fn fed_with_anything(
             for (port, piece, wait_ms) in steps {
                 let stream = streams.entry(format!("{port:?}")).or_default();
                 for frame in piece.split_inclusive(|byte| *byte == 0) {
-                    let silent = bench.stands_down();
+                    let silent = bench.is_passive();
                     let neighbours = bench.neighbours();
                     let now = bench.now;
                     bench.handle_bytes(now, port, frame);

@@ -24,7 +24,7 @@ const KEY: [u8; 32] = *b"whoever reads this is not secret";
 
 /// Flags of a frame: a tag follows, and the body is a handshake.
 const SIGNED: u16 = 1;
-const HELLO: u16 = 2;
+const HANDSHAKE: u16 = 2;
 
 /// Returns settings with the key.
 pub(crate) fn settings(wiring: Wiring) -> Settings {
@@ -201,7 +201,7 @@ impl Peer {
         peer.handshake(relay, true);
         let answer = frames(relay, NOW)
             .into_iter()
-            .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HELLO));
+            .find(|(to, flags, _)| (*to, *flags) == (node, SIGNED | HANDSHAKE));
         let (_, _, body) = answer.unwrap();
         assert_eq!(body.len(), 17);
         peer.nonces[1] = u64::from_le_bytes(body[..8].try_into().unwrap());
@@ -213,7 +213,7 @@ impl Peer {
     fn handshake(&mut self, relay: &mut Relay, asks: bool) {
         let mut body = self.nonces.map(u64::to_le_bytes).concat();
         body.push(u8::from(asks));
-        let frame = self.frame(SIGNED | HELLO, &body);
+        let frame = self.frame(SIGNED | HANDSHAKE, &body);
         relay.handle_bytes(NOW, self.port, &frame);
     }
 

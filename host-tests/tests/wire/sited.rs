@@ -216,11 +216,11 @@ fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let adopted = until(&mut relay, Instant::from_millis(3_000), 1_700.0);
     assert_eq!(relay.sites(), Some(sites(to)));
     assert!(events(&mut relay).contains(&Event::SetpointChanged));
-    let agreed = relay.final_setpoint().unwrap();
+    let agreed = relay.agreed_place().unwrap();
     assert_eq!(relay.setpoint(), None, "it may still be braking");
     let stopped = adopted + guard.lag + Duration::from_millis(500);
     until(&mut relay, stopped, 1_700.0);
     // Beyond the old box, it is found there and sent on.
     assert_eq!(relay.setpoint(), Some(agreed));
-    assert_eq!(relay.final_setpoint(), Some(agreed));
+    assert_eq!(relay.agreed_place(), Some(agreed));
 }

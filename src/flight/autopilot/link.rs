@@ -352,7 +352,7 @@ impl Autopilot {
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.hear(event);
         match event {
-            Event::Reformed => self.is_new_view = true,
+            Event::ViewAccepted => self.is_new_view = true,
             Event::Converged => {
                 let is_new = core::mem::take(&mut self.is_new_view);
                 if is_new && self.state == State::Engaged && self.hold == [None; 2] {

@@ -107,7 +107,7 @@ impl Line {
             Event::LeaseLapsed => "relay: lease expired, holds position",
             Event::Adopted => "relay: new mission adopted",
             Event::UploadRefused { .. } => "relay: mission rejected: line or geofence",
-            Event::IndexTaken { .. } => "relay: duplicate relay number",
+            Event::DuplicateIndex { .. } => "relay: duplicate relay number",
             _ => return None,
         };
         Some(Self::info(Topic::Relay, text))

@@ -127,7 +127,9 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
         one.hears(Side::Upstream, 1, fence(9, up_m, 50.0));
         one.hears(Side::Downstream, 3, fence(9, down_m, 200.0));
         let told = core::iter::from_fn(|| one.guard.poll());
-        let halted = told.filter(|(.., fence)| fence.says(Fence::HALTS)).count();
+        let halted = told
+            .filter(|(.., fence)| fence.has_flag(Fence::HALTS))
+            .count();
         assert_eq!(halted > 0, halts, "{up_m} {down_m}");
     }
 }
@@ -223,11 +225,11 @@ fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
         one.hears(side, node, halts);
         assert_eq!(one.guard.hold_reason(side.other()), None);
         let is_halted = |one: &One| match side {
-            Side::Upstream => one.guard.follower.association.requests_halt(),
-            Side::Downstream => one.guard.owner.association.requests_halt(),
+            Side::Upstream => one.guard.follower.association.has_halt_request(),
+            Side::Downstream => one.guard.owner.association.has_halt_request(),
         };
         assert!(is_halted(&one));
-        for flags in [Fence::RELEASED | Fence::UNPLACED, Fence::UNPLACED] {
+        for flags in [Fence::LEFT | Fence::UNPLACED, Fence::UNPLACED] {
             let first = Fence {
                 flags,
                 ..fence(77, x_m, x_m)
@@ -265,7 +267,7 @@ fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
         one.is_at(100.0);
         one.is_at(100.0);
         let told = core::iter::from_fn(|| one.guard.poll());
-        let halts = told.filter(|(.., fence)| fence.says(Fence::HALTS));
+        let halts = told.filter(|(.., fence)| fence.has_flag(Fence::HALTS));
         assert!(halts.count() > 0, "{side:?}");
     }
 }
@@ -284,7 +286,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     one.hears(Side::Downstream, 3, halts);
     let (side, node, told) = one.guard.poll().unwrap();
     assert_eq!((side, node), (Side::Upstream, 1));
-    let flags = Fence::RELEASED | Fence::UNPLACED | Fence::HALTS;
+    let flags = Fence::LEFT | Fence::UNPLACED | Fence::HALTS;
     assert_eq!((told.flags, told.x_m), (flags, 100.0));
     assert!(told.is_valid());
     assert!(one.guard.poll().is_none());
@@ -465,7 +467,7 @@ fn gaps_that_are_negative_by_the_error_add_up() {
             guard.steer(now);
             guard.remind();
             while let Some((side, to, fence)) = guards[k].poll() {
-                let counts = fence.flags & (Fence::UNPLACED | Fence::RELEASED) == 0;
+                let counts = fence.flags & (Fence::UNPLACED | Fence::LEFT) == 0;
                 if k == 1 && side == Side::Upstream && counts {
                     told = told.or(Some(fence.x_m));
                 }

@@ -288,7 +288,7 @@ fn what_is_lost_is_told_again() {
     for _ in 0..3 {
         row.all[1].guard.remind();
         while let Some((_, _, fence)) = row.all[1].guard.poll() {
-            assert_eq!(fence.flags, Fence::RELEASED);
+            assert_eq!(fence.flags, Fence::LEFT);
             assert!(fence.is_valid());
             said += 1;
         }
@@ -299,7 +299,7 @@ fn what_is_lost_is_told_again() {
     row.all[1].is_at(200.0);
     row.all[1].guard.remind();
     let first = row.speak(1).map(|fence| fence.flags);
-    assert_eq!(first, Some(Fence::RELEASED));
+    assert_eq!(first, Some(Fence::LEFT));
     row.talk();
     assert!(row.all.iter().all(|one| one.guard.is_there()));
 }

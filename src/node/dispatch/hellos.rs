@@ -2,7 +2,7 @@
 
 use super::Node;
 use crate::event::About;
-use crate::node::mission_update::takes_uploads;
+use crate::node::mission_update::accepts_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::node::neighbour::state::Candidate;
 use crate::side::Side;
@@ -12,7 +12,7 @@ use crate::wire::message::Hello;
 use crate::wire::upload::UPLOAD;
 
 /// Mission state in a hello.
-struct MissionSaid {
+struct MissionState {
     holds: MissionId,
     flies: bool,
     whole: bool,
@@ -22,9 +22,12 @@ struct MissionSaid {
 impl Node {
     /// Schedules a hello to node `to` at `side`; `ask` requests one in return.
     #[inline(never)] // called from many places
-    pub(super) fn owe_hello(&mut self, side: Side, to: u16, ask: bool) {
+    pub(super) fn schedule_hello(&mut self, side: Side, to: u16, ask: bool) {
         let distance = to.abs_diff(self.member.node);
-        self.layers.neighbours.at_mut(side).owe(distance, ask);
+        self.layers
+            .neighbours
+            .at_mut(side)
+            .schedule_hello(distance, ask);
     }
 
     /// Returns the next pending hello with its side and its destination node.
@@ -32,7 +35,7 @@ impl Node {
         let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
             for _ in 0..CANDIDATES {
-                let Some((distance, ask)) = self.layers.neighbours.at_mut(side).take_hello() else {
+                let Some((distance, ask)) = self.layers.neighbours.at_mut(side).poll_hello() else {
                     break;
                 };
                 let to = match side {
@@ -40,9 +43,9 @@ impl Node {
                     Side::Downstream => own.saturating_add(distance),
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
-                    let nonce = self.layers.update.ask(now, &self.member);
+                    let offer_number = self.layers.update.next_offer_number(now, &self.member);
                     let ready = self.is_between(now, side, to);
-                    let hello = self.hello(now, side, ask, nonce);
+                    let hello = self.hello(now, side, ask, offer_number);
                     return Some((side, to, Hello { ready, ..hello }));
                 }
             }
@@ -50,14 +53,14 @@ impl Node {
         None
     }
 
-    pub(super) fn hello(&self, now: Instant, side: Side, ask: bool, nonce: u16) -> Hello {
-        let said = self.says_of_mission();
+    pub(super) fn hello(&self, now: Instant, side: Side, ask: bool, offer_number: u16) -> Hello {
+        let said = self.mission_state();
         Hello {
             mission: self.member.digest,
-            newest: self.layers.view.newest(),
+            latest_view: self.layers.view.latest_view(),
             neighbour: self.layers.neighbours.at(side).node(),
-            ask,
-            form: self.layers.view.asking.asks() && side == self.back(),
+            requests_reply: ask,
+            requests_view: self.layers.view.request.is_pending() && side == self.back(),
             fresh: self.layers.round.is_fresh(),
             ready: false,
             behind: self.behind(side.other()),
@@ -65,20 +68,20 @@ impl Node {
                 .layers
                 .neighbours
                 .at(side)
-                .hears(now, &self.member.settings),
-            holds: said.holds,
-            flies: said.flies,
-            whole: said.whole,
+                .received_nodes(now, &self.member.settings),
+            latest_mission: said.holds,
+            active: said.flies,
+            active_in_view: said.whole,
             refused: said.refused,
-            nonce,
+            offer_number,
         }
     }
 
     /// Returns the state of the stored mission, or of a newer one that was refused.
-    fn says_of_mission(&self) -> MissionSaid {
+    fn mission_state(&self) -> MissionState {
         let (active, latest) = (self.member.active, self.layers.update.latest());
-        if let Some(refused) = self.layers.update.refused_of(active) {
-            return MissionSaid {
+        if let Some(refused) = self.layers.update.refused_mission(active) {
+            return MissionState {
                 holds: refused,
                 flies: false,
                 whole: false,
@@ -87,7 +90,7 @@ impl Node {
         }
         let flies = active == latest;
         let whole = UPLOAD && flies && latest.version > 0 && self.layers.lease.is_whole();
-        MissionSaid {
+        MissionState {
             holds: latest,
             flies,
             whole,
@@ -104,7 +107,7 @@ impl Node {
             .layers
             .neighbours
             .at(side)
-            .taken_by(other.abs_diff(own));
+            .selected_by(other.abs_diff(own));
         let there = match side {
             Side::Upstream => beyond > own,
             Side::Downstream => beyond != 0 && beyond < own,
@@ -113,8 +116,8 @@ impl Node {
         let far = self.layers.neighbours.at(side.other());
         let distance = beyond.abs_diff(own);
         // If two links cross, the one whose end is nearer to Rx is replaced.
-        let crosses = side == Side::Downstream && far.goes_past(distance);
-        there && (far.is_two_way(distance, now, settings) || far.comes_along(distance) || crosses)
+        let crosses = side == Side::Downstream && far.has_link_beyond(distance);
+        there && (far.is_two_way(distance, now, settings) || far.joins_with(distance) || crosses)
     }
 
     /// Returns the number of relays that a neighbour reaches through this one. `far` is this relay's other side.
@@ -136,7 +139,7 @@ impl Node {
         let (place, all) = self
             .layers
             .view
-            .counted()
+            .place_and_count()
             .unwrap_or_else(|| self.member.place_in_all());
         if side == self.back() {
             place.saturating_sub(1)
@@ -150,74 +153,79 @@ impl Node {
     /// Handles a hello of the same mission from node `from` at `side`.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
-        let known = self.layers.view.newest();
-        self.layers.view.heard_of(hello.newest);
+        let known = self.layers.view.latest_view();
+        self.layers.view.observe_view(hello.latest_view);
         if self.searches() {
             let heard = hello.is_heard(from, own);
             // A hello without a request may be a reply to one that was just received.
-            if heard || hello.ask {
-                self.says_it_hears(side, from, heard);
+            if heard || hello.requests_reply {
+                self.record_reception(side, from, heard);
             }
             let (distance, settings) = (from.abs_diff(own), &self.member.settings);
             let neighbour = self.layers.neighbours.at_mut(side);
-            neighbour.says(distance, hello.neighbour, heard, now, settings);
+            neighbour.record_hello(distance, hello.neighbour, heard, now, settings);
         }
-        if hello.ask {
-            self.owe_hello(side, from, false);
+        if hello.requests_reply {
+            self.schedule_hello(side, from, false);
         }
         if self.layers.neighbours.at(side).node() == from {
-            self.layers.update.may_answer(side, hello.nonce, now);
+            self.layers
+                .update
+                .record_hello_number(side, hello.offer_number, now);
             if hello.refused {
-                self.hear_refused(side, hello.holds);
+                self.on_refused(side, hello.latest_mission);
             } else {
-                self.compare(side, from, hello.holds);
+                self.compare_missions(side, from, hello.latest_mission);
             }
-            self.layers.neighbours.at_mut(side).holds = Some(hello.holds);
+            self.layers.neighbours.at_mut(side).holds = Some(hello.latest_mission);
             if self.searches() {
                 let two_way = hello.is_heard(from, own);
                 // A few lost frames do not end a link; the neighbour's silence has its own timer.
                 let linked = self.layers.neighbours.at(side).is_mutual();
                 let mutual = hello.neighbour == own && (two_way || linked);
-                self.told(now, side, mutual);
+                self.on_mutual(now, side, mutual);
             }
-            let waits = self.layers.view.awaited().is_some();
+            let waits = self.layers.view.outstanding().is_some();
             // A neighbour with a newer mission joins no view without it, so a view is requested when this relay has that mission.
-            let newer = takes_uploads(&self.member)
+            let newer = accepts_uploads(&self.member)
                 && !hello.refused
-                && hello.holds > self.layers.update.latest();
-            if hello.form && !newer && (hello.newest >= known || hello.fresh && !waits) {
-                if self.layers.view.newest() > known {
-                    self.layers.view.asking.ask_anew(now);
+                && hello.latest_mission > self.layers.update.latest();
+            if hello.requests_view
+                && !newer
+                && (hello.latest_view >= known || hello.fresh && !waits)
+            {
+                if self.layers.view.latest_view() > known {
+                    self.layers.view.request.request_now(now);
                 } else {
-                    self.layers.view.asking.ask(now);
+                    self.layers.view.request.start(now);
                 }
             }
         } else if self.searches() {
-            self.consider(now, side, from, hello);
+            self.consider_candidate(now, side, from, hello);
         }
-        self.review(now);
+        self.review_neighbours(now);
     }
 
     /// Records whether node `from` receives this relay, and reports the node if it repeatedly does not.
-    pub(super) fn says_it_hears(&mut self, side: Side, from: u16, heard: bool) {
+    pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
             .layers
             .neighbours
             .at_mut(side)
-            .says_it_hears(distance, heard)
+            .record_reception(distance, heard)
         {
             self.raise_about(About::NotHeard, side, from);
         }
     }
 
     /// Considers node `from` at `side` as the new neighbour there; one-way links are ignored.
-    fn consider(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
+    fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.beyond(side);
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
-        neighbour.notice(now, settings);
+        neighbour.record_unselected(now, settings);
         // The candidate prefers this relay to a neighbour that is farther away.
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther;
@@ -236,29 +244,31 @@ impl Node {
             ready: hello.ready,
             longer: hello.behind > there || all_but_one,
         };
-        if neighbour.consider(candidate, now, settings) {
-            let tells = neighbour.tells_found();
-            neighbour.holds = Some(hello.holds);
-            layers.update.may_answer(side, hello.nonce, now);
-            layers.update.begin_offers(side);
+        if neighbour.consider_candidate(candidate, now, settings) {
+            let tells = neighbour.should_report_found();
+            neighbour.holds = Some(hello.latest_mission);
+            layers
+                .update
+                .record_hello_number(side, hello.offer_number, now);
+            layers.update.reset_offers(side);
             self.steering.link(side, Some(from));
             if tells {
                 self.raise_about(About::Back, side, from);
             }
-            self.owe_hello(side, from, true);
-            self.told(now, side, pairs);
+            self.schedule_hello(side, from, true);
+            self.on_mutual(now, side, pairs);
         }
     }
 
     /// Handles the neighbour's report whether it uses this relay as its neighbour (`mutual`).
-    pub(super) fn told(&mut self, now: Instant, side: Side, mutual: bool) {
-        if !self.layers.neighbours.at_mut(side).told(mutual, now) || !mutual {
+    pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
+        if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;
         }
-        let newer = self.layers.view.newest() > self.member.view;
+        let newer = self.layers.view.latest_view() > self.member.view;
         if newer && !self.layers.neighbours.at(side).has_grace(now) {
             // One of the two relays has missed a view change.
-            self.layers.view.asking.ask(now);
+            self.layers.view.request.start(now);
         }
         self.layers.resend();
     }

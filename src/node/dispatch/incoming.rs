@@ -1,18 +1,16 @@
 //! Received messages: which are accepted, on which side their sender is, and which layer handles each.
 
 use super::Node;
-use crate::event::{About, Event};
-use crate::mission::{Heading, Mission};
-use crate::node::context::{Decided, Effects};
-use crate::node::duplicate::{Duplicated, Sender};
-use crate::node::mission_update::takes_uploads;
+use crate::event::About;
+use crate::node::context::Effects;
+use crate::node::duplicate::Duplicated;
+use crate::node::mission_update::accepts_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
-use crate::settings::{Method, Wiring};
+use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::bump;
-use crate::time::{Duration, Instant};
-use crate::wire::digest::MissionId;
-use crate::wire::message::{Claim, Message};
+use crate::time::Instant;
+use crate::wire::message::Message;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
@@ -41,7 +39,7 @@ impl Node {
         let taken = self.layers.neighbours.at(side).node() == from;
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);
-        neighbour.heard(distance, taken, now, &self.member.settings);
+        neighbour.record_frame(distance, taken, now, &self.member.settings);
         if let Message::Hello(hello) = message {
             if self.is_of_mission(now, side, from, hello.mission) {
                 self.on_hello(now, side, from, *hello);
@@ -49,23 +47,26 @@ impl Node {
             }
             return true;
         }
-        if let Message::Offer { upload, answer } = message
+        if let Message::Offer {
+            upload,
+            offer_number,
+        } = message
             && !taken
-            && takes_uploads(&self.member)
+            && accepts_uploads(&self.member)
         {
             // The sender uses this relay as its neighbour: a hello alone would only trigger the same offer again.
             if self.is_of_mission(now, side, from, upload.base()) {
-                self.on_offer(now, side, from, upload, *answer);
+                self.on_offer(now, side, from, upload, *offer_number);
             }
             return true;
         }
         if !taken {
-            self.owe_hello(side, from, false);
+            self.schedule_hello(side, from, false);
             return false;
         }
         if self.searches() {
             // Such a message is sent only to a neighbour, so the sender uses this relay as one.
-            self.told(now, side, true);
+            self.on_mutual(now, side, true);
         }
         if !self.is_of_this_view(now, side, from, message) {
             return true;
@@ -79,15 +80,15 @@ impl Node {
     ///
     /// Other messages are counted and answered by a hello. A pass of another view also triggers a request for a new view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
-        let Some(digest) = message.mission() else {
+        let Some(digest) = message.digest() else {
             return true;
         };
         let (active, latest) = (self.member.active, self.layers.update.latest());
-        let proposes = message.is_of_a_proposal();
+        let proposes = message.is_view_change();
         if UPLOAD && matches!(message, Message::Fence { .. }) {
             return self.is_of_line(now, side, from, digest);
         }
-        if !proposes && !message.is_of_a_view() {
+        if !proposes && !message.belongs_to_view() {
             return self.is_of_mission(now, side, from, digest);
         }
         let known = match message {
@@ -98,11 +99,11 @@ impl Node {
         if !known {
             // The hello informs the sender of this relay's mission and view.
             bump(&mut self.telemetry.stats.view);
-            self.owe_hello(side, from, true);
+            self.schedule_hello(side, from, true);
             // The sender has the same mission, so only the view differs.
             let of_mission = self.layers.neighbours.at(side).holds.is_some();
-            if of_mission && message.is_of_a_view() && message.is_onward() {
-                self.layers.view.asking.ask(now);
+            if of_mission && message.belongs_to_view() && message.is_onward() {
+                self.layers.view.request.start(now);
             }
         }
         known
@@ -110,7 +111,7 @@ impl Node {
 
     /// Returns true if positions of `from` are along the same line: both relays fly between the same sites.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
-        let same = digest == self.layers.update.line(&self.member);
+        let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).holds.is_some() {
             bump(&mut self.telemetry.stats.stale);
         } else if !same {
@@ -132,7 +133,7 @@ impl Node {
         bump(&mut self.telemetry.stats.mission);
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);
-        if neighbour.is_stranger(distance, now) {
+        if neighbour.should_report_mismatch(distance, now) {
             self.raise_about(About::Mission, side, from);
         }
     }
@@ -140,10 +141,10 @@ impl Node {
     /// Passes a message of the current mission and view to its layer.
     fn dispatch(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
         match message {
-            Message::Heartbeat { ask, answer, .. } => {
+            Message::Heartbeat { request, reply, .. } => {
                 let neighbour = self.layers.neighbours.at_mut(side);
-                neighbour.asked(*ask);
-                if let Some(at) = neighbour.answered(*answer) {
+                neighbour.record_request(*request);
+                if let Some(at) = neighbour.record_reply(*reply) {
                     self.confirm(now, side, at);
                 }
                 return;
@@ -151,12 +152,15 @@ impl Node {
             Message::Fence { fence, .. } => {
                 return self.steering.handle(side, from, fence);
             }
-            Message::Offer { upload, answer } => {
-                return self.on_offer(now, side, from, upload, *answer);
+            Message::Offer {
+                upload,
+                offer_number,
+            } => {
+                return self.on_offer(now, side, from, upload, *offer_number);
             }
             _ => {}
         }
-        if message.is_of_a_view() && !self.layers.neighbours.at(side).is_agreed() {
+        if message.belongs_to_view() && !self.layers.neighbours.at(side).is_agreed() {
             // The sender is not this relay's neighbour in the view.
             return bump(&mut self.telemetry.stats.stale);
         }
@@ -171,15 +175,21 @@ impl Node {
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
         let effects = match message {
+            // The relays that it leaves out may link at any moment; it is retransmitted.
+            Message::Proposal(proposal) if layers.is_premature(now, side, proposal) => {
+                Effects::STALE
+            }
             Message::Proposal(_) | Message::Decision(_) => layers.view.handle(&context, message),
-            Message::Busy { sweep } if layers.view.on_busy(&context, *sweep) => Effects::NONE,
+            Message::Busy { number: sweep } if layers.view.on_busy(&context, *sweep) => {
+                Effects::NONE
+            }
             // No pass continues during a view change.
-            _ if layers.view.awaited().is_some() => Effects::STALE,
+            _ if layers.view.outstanding().is_some() => Effects::STALE,
             _ => {
-                if message.is_of_a_view() && message.is_onward() {
+                if message.belongs_to_view() && message.is_onward() {
                     // A pass or a renewal shows that all members have accepted the view.
                     layers.view.commit(self.member.view);
-                    layers.lease.commit();
+                    layers.lease.confirm_view();
                 }
                 if let Message::Pulse(_) | Message::Pulsed(_) = message {
                     layers.lease.handle(&context, message)
@@ -194,7 +204,7 @@ impl Node {
     /// Records that the neighbour at `side` was alive at time `at` or later, by its reply to a message.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
-        if neighbour.confirmed(now, at) {
+        if neighbour.record_sign_of_life(now, at) {
             let node = neighbour.node();
             self.raise_about(About::Back, side, node);
         }
@@ -203,14 +213,14 @@ impl Node {
 
 impl Node {
     /// Handles an authentic frame of node `from` at `side`; after the `first` one, messages are sent again.
-    pub(crate) fn meet(&mut self, side: Side, from: u16, first: bool) {
+    pub(crate) fn on_authentic(&mut self, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
         }
         if self.layers.neighbours.at(side).node() != from {
             if first {
                 // That node could not verify earlier messages of this relay.
-                self.owe_hello(side, from, true);
+                self.schedule_hello(side, from, true);
             }
             return;
         }
@@ -220,32 +230,34 @@ impl Node {
     }
 
     /// Handles a handshake of node `from` at `side` that does not prove that this relay is received.
-    pub(crate) fn called(&mut self, side: Side, from: u16) {
-        self.is_signed_right(side, from);
+    pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
+        self.on_key_match(side, from);
         if self.searches() {
-            self.says_it_hears(side, from, false);
+            self.record_reception(side, from, false);
         }
     }
 
     /// Handles a handshake under the number of node `from` at `side` with a wrong tag.
-    pub(crate) fn is_forged(&mut self, side: Side, from: u16) {
+    pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
-        if self.layers.neighbours.at_mut(side).is_forged(distance) {
+        if self
+            .layers
+            .neighbours
+            .at_mut(side)
+            .should_report_forged(distance)
+        {
             self.raise_about(About::Key, side, from);
         }
     }
 
     /// Records that node `from` at `side` has the right key.
-    pub(crate) fn is_signed_right(&mut self, side: Side, from: u16) {
+    pub(crate) fn on_key_match(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
-        self.layers
-            .neighbours
-            .at_mut(side)
-            .is_signed_right(distance);
+        self.layers.neighbours.at_mut(side).on_key_match(distance);
     }
 
     /// Reports that node `from` at `side` uses an older epoch than before.
-    pub(crate) fn went_back(&mut self, side: Side, from: u16) {
+    pub(crate) fn on_epoch_went_back(&mut self, side: Side, from: u16) {
         self.raise_about(About::Epoch, side, from);
     }
 }
@@ -284,7 +296,7 @@ impl Node {
             Wiring::Pair => 1,
             Wiring::Shared => CANDIDATES,
         };
-        let near = takes_uploads(&self.member) && node.abs_diff(own) <= most;
+        let near = accepts_uploads(&self.member) && node.abs_diff(own) <= most;
         match node {
             0 if near => Some(Side::Upstream),
             _ if near && node == all.saturating_add(1) => Some(Side::Downstream),
@@ -298,238 +310,17 @@ impl Node {
     }
 
     /// Handles a frame of node `from` at the port `through`. Received at both ports, its index is a duplicate.
-    pub(crate) fn hear_at_both(&mut self, now: Instant, through: Side, from: u16) {
+    pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;
         };
         let settings = self.member.settings;
-        if self.layers.neighbours.at(side).is_there()
+        if self.layers.neighbours.at(side).is_present()
             && self
                 .duplicate
                 .should_report(now, Duplicated::Neighbour, &settings)
         {
             self.raise_about(About::Index, side, from);
-        }
-    }
-}
-
-impl Node {
-    /// Handles the decision on a proposal: on acceptance, starts the new view with its mission.
-    pub(super) fn decided(&mut self, now: Instant, decided: Decided) {
-        let Some(proposed) = self.layers.view.proposed() else {
-            return;
-        };
-        let (place, id) = (proposed.place, proposed.mission_id);
-        let leads = place == 1;
-        let (relays, lease_left) = match decided {
-            Decided::Granted { relays, lease_left } => (relays, lease_left),
-            Decided::Earlier => {
-                if leads {
-                    self.layers.view.asking.ask(now);
-                }
-                return;
-            }
-            Decided::Refused => {
-                if !core::mem::replace(&mut self.telemetry.told_refused, true) {
-                    self.raise(Event::NoQuorum);
-                }
-                return self.layers.neighbours.refuse();
-            }
-        };
-        let mission = self.layers.update.mission_of(&self.member, id);
-        let mission = mission.and_then(|mission| mission.with_relays(relays).ok());
-        let Some(mission) = mission else {
-            return self.layers.view.asking.ask(now);
-        };
-        let before = self.member.mission.relays();
-        self.member.index = match mission.heading() {
-            Heading::TowardRx => place,
-            Heading::TowardTx => relays.saturating_sub(place).saturating_add(1),
-        };
-        self.member.view = proposed.view;
-        self.fly(now, mission, id);
-        self.layers.view.heard_of(proposed.view);
-        let (back, onward) = (self.back(), self.onward());
-        self.layers.neighbours.at_mut(back).agree_with_proposer();
-        self.layers.neighbours.at_mut(onward).agree(place == relays);
-        let works = self.member.settings.method == Method::Joint;
-        let rest = now + Duration::from_millis(100).times(u32::from(lease_left));
-        let views = (proposed.view, proposed.base.id);
-        self.layers.lease.renew(now, views, rest, relays < before);
-        if leads {
-            self.layers.lease.commit();
-        }
-        self.layers.round.renew(rest, leads, works);
-        bump(&mut self.telemetry.stats.views);
-        self.telemetry.told_lapsed = false;
-        self.telemetry.told_refused = false;
-        self.raise(Event::Reformed);
-        if id != self.layers.update.latest() {
-            // A newer mission has arrived in the meantime.
-            self.layers.view.asking.ask(now);
-        }
-    }
-
-    /// Sets the mission of the new view, which has the identifier `id`.
-    fn fly(&mut self, now: Instant, mission: Mission, id: MissionId) {
-        if id == self.member.active {
-            // The number of relays may have changed.
-            self.member.mission = mission;
-            return;
-        }
-        self.adopt(mission, id, Some(now));
-        self.raise(Event::Adopted);
-    }
-
-    /// Replaces the active mission by the stored one, `mission`, at time `now`, or after a start if `None`.
-    ///
-    /// With other sites all positions are void: there is no setpoint until the next agreement, and the guard starts again.
-    pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
-        self.member.mission = mission;
-        self.member.interference = *mission.interference();
-        self.member.active = id;
-        if UPLOAD {
-            if self.layers.update.fly_between() {
-                self.layers.round.discard_place();
-                self.steering.leave_line(now);
-            }
-            let fence = self.layers.update.geofence(&self.member);
-            self.steering.set_box(fence);
-        }
-        let common = mission.config().common;
-        let profile = self.member.settings.profile.unwrap_or(common);
-        self.layers.round.load(profile);
-    }
-}
-
-impl Node {
-    pub(crate) fn hear_duplicate(&mut self, now: Instant, sender: Sender) {
-        let settings = self.member.settings;
-        let shown = match sender {
-            Sender::Itself => false,
-            // Without signatures the frame may be this relay's own, which only a claim can tell.
-            Sender::Unknown => settings.auth.is_some(),
-            Sender::Rival(rival) => rival.is_current,
-        };
-        if shown
-            && self
-                .duplicate
-                .should_report(now, Duplicated::Own, &settings)
-        {
-            let node = self.member.node;
-            self.raise_about(About::Index, Side::Upstream, node);
-            if let Sender::Rival(rival) = sender
-                && rival.newer_epoch
-            {
-                // The other node may be this relay itself, before its epoch went back.
-                self.raise_about(About::Epoch, Side::Upstream, node);
-            }
-        }
-        let placed = self.setpoint().is_some();
-        // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
-        let lease = &self.layers.lease;
-        let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
-        let has_lease = placed && leased;
-        if self.duplicate.hear(now, sender, has_lease, &settings) {
-            self.layers.round.discard_place();
-            if placed {
-                self.raise(Event::SetpointChanged);
-            }
-        }
-    }
-
-    /// Repeats a claim to its sender, or compares an echo; returns false if signed frames replace claims.
-    pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
-        if self.member.settings.auth.is_some() {
-            return false;
-        }
-        if claim.echo {
-            let sender = self.duplicate.rival(claim);
-            if sender != Sender::Itself {
-                self.hear_duplicate(now, sender);
-            }
-        } else if !self.is_passive() {
-            let claim = Claim {
-                echo: true,
-                ..claim
-            };
-            self.echo = Some((side, from, claim));
-        }
-        true
-    }
-
-    pub(super) fn next_claim(&mut self) -> Option<(Side, u16, Message)> {
-        if let Some((side, to, claim)) = self.echo.take() {
-            return Some((side, to, Message::Claim(claim)));
-        }
-        let (side, to) = self.poll_claim()?;
-        let claim = Claim {
-            number: self.duplicate.number(),
-            heard: self.duplicate.heard(),
-            passive: self.is_passive(),
-            echo: false,
-        };
-        Some((side, to, Message::Claim(claim)))
-    }
-
-    /// Returns the destination of a due claim, and marks it as sent.
-    ///
-    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
-    pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
-        if !self.duplicate.poll_claim() {
-            return None;
-        }
-        let side = self.claim_side;
-        self.claim_side = side.other();
-        let nodes = [side, side.other()].map(|side| (side, self.layers.neighbours.at(side).node()));
-        let neighbour = nodes.into_iter().find(|(_, node)| *node != 0);
-        neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
-    }
-
-    /// Returns the claim number if all sessions must be started again with it.
-    pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
-        self.duplicate.poll_sessions()
-    }
-
-    pub(crate) const fn claim_number(&self) -> u32 {
-        self.duplicate.number()
-    }
-
-    /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
-    ///
-    /// Another relay with this number then detects this one even if the chain sends nothing else.
-    pub(crate) fn shows_its_nonce(&self, message: &Message) -> bool {
-        let once = match message {
-            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
-            Message::Pulsed(pulsed) => pulsed.done,
-            _ => false,
-        };
-        once && self.member.settings.wiring == Wiring::Shared
-    }
-
-    pub(crate) fn rival(&self, claim: Claim) -> Sender {
-        self.duplicate.rival(claim)
-    }
-
-    /// Returns true while this relay is passive, because another one has its number.
-    pub(crate) const fn is_passive(&self) -> bool {
-        self.duplicate.is_passive()
-    }
-
-    /// Handles the report that the other relay with this number has been removed.
-    pub(crate) fn clear_duplicate(&mut self, now: Instant) {
-        if self.duplicate.clear(now, &self.member.settings) {
-            self.become_active(now);
-        }
-    }
-
-    /// Becomes active as after a restart: view, lease and proposal may be those of the other node by now.
-    pub(super) fn become_active(&mut self, now: Instant) {
-        self.layers.neighbours.leave();
-        self.layers.lease.leave();
-        if !self.layers.round.is_fresh() {
-            self.layers.round.suspend();
-            self.layers.view.leave(now);
         }
     }
 }

@@ -5,8 +5,12 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `incoming` | received messages: checks, choice of the layer, decisions on views, results of handshakes, claims to this node's number |
-//! | `outgoing` | next message, expired timers, and setpoint |
+//! | `incoming` | received messages: checks, side of the sender, choice of the layer; results of handshakes |
+//! | `outgoing` | next message, in order of urgency |
+//! | `timers` | expired timers of all layers |
+//! | `setpoint` | setpoint, and reports of the drone |
+//! | `adoption` | adoption of a decided view and its mission |
+//! | `claims` | claims to this node's number |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
 //!
@@ -17,8 +21,8 @@
 use crate::event::{About, Event, Pending};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
-use crate::node::context::{Context, Effects, Ignored, Member, News, Peer, first_pass};
-use crate::node::duplicate::DuplicateIndex;
+use crate::node::context::{Context, Effects, Ignored, LayerEvent, Member, Peer, first_pass};
+use crate::node::duplicate::IndexClaims;
 use crate::node::lease::Lease;
 use crate::node::mission_update::MissionUpdate;
 use crate::node::neighbour::Neighbours;
@@ -32,12 +36,16 @@ use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
-use crate::wire::message::Claim;
+use crate::wire::message::{Claim, Proposal};
 
+mod adoption;
+mod claims;
 mod hellos;
 mod incoming;
 mod offers;
 mod outgoing;
+mod setpoint;
+mod timers;
 
 #[cfg(feature = "upload")]
 #[cfg(test)]
@@ -51,8 +59,8 @@ pub(crate) struct Node {
     pub(super) member: Member,
     pub(super) layers: Layers,
     pub(super) steering: Steering,
-    pub(super) duplicate: DuplicateIndex,
-    pub(super) adrift: Adrift,
+    pub(super) duplicate: IndexClaims,
+    pub(super) no_quorum_timer: NoQuorumTimer,
     /// Received claim that is to be repeated to its sender.
     pub(super) echo: Option<Echo>,
     /// Side to which the next claim is sent.
@@ -94,8 +102,8 @@ impl Node {
                 round: Round::new(leads, number, profile, settings, seed, now),
             },
             steering: Steering::NONE,
-            duplicate: DuplicateIndex::new(seed.rotate_left(24), now, settings),
-            adrift: Adrift::NONE,
+            duplicate: IndexClaims::new(seed.rotate_left(24), now, settings),
+            no_quorum_timer: NoQuorumTimer::NONE,
             echo: None,
             claim_side: Side::Upstream,
             telemetry: Telemetry::default(),
@@ -143,7 +151,7 @@ impl Node {
                 &mut stats.repeated,
             ),
             (effects.resent, &mut stats.repeats),
-            (effects.began, &mut stats.sweeps),
+            (effects.began, &mut stats.passes_begun),
         ] {
             if happened {
                 bump(counter);
@@ -164,30 +172,31 @@ impl Node {
             self.layers.round.suspend();
         }
         if effects.view_needed {
-            self.layers.view.asking.ask(now);
+            self.layers.view.request.start(now);
         }
         match effects.news {
-            Some(News::Lapsed) if core::mem::replace(&mut self.telemetry.told_lapsed, true) => {}
-            Some(News::Lapsed) => self.raise(Event::LeaseLapsed),
-            Some(News::Ask) => {
+            Some(LayerEvent::Lapsed)
+                if core::mem::replace(&mut self.telemetry.lapse_reported, true) => {}
+            Some(LayerEvent::Lapsed) => self.raise(Event::LeaseLapsed),
+            Some(LayerEvent::RequestView) => {
                 let to = self.layers.neighbours.at(back).node();
-                self.owe_hello(back, to, true);
+                self.schedule_hello(back, to, true);
             }
-            Some(News::Decided(decided)) => {
-                self.decided(now, decided);
-                self.drift(now);
+            Some(LayerEvent::ProposalDecided(decided)) => {
+                self.adopt_view(now, decided);
+                self.update_no_quorum_timer(now);
             }
-            Some(News::Converged) => {
+            Some(LayerEvent::Converged) => {
                 self.raise(Event::Converged);
                 let leads = self.layers.context(now, &self.member).leads();
-                self.layers.lease.begin(now, leads);
+                self.layers.lease.on_agreement(now, leads);
             }
-            Some(News::Infeasible) => self.raise(Event::Infeasible),
+            Some(LayerEvent::Infeasible) => self.raise(Event::Infeasible),
             None => {}
         }
         let sensed = effects.sensed;
-        if cfg!(feature = "sensing") && sensed.believes {
-            self.believe();
+        if cfg!(feature = "sensing") && sensed.new_estimate {
+            self.apply_estimate();
         }
         if sensed.unclear {
             self.raise(Event::InterfererUnclear);
@@ -198,8 +207,8 @@ impl Node {
     }
 
     /// Bases the active mission on the new interference estimate.
-    fn believe(&mut self) {
-        let told = self.layers.round.sensing().told();
+    fn apply_estimate(&mut self) {
+        let told = self.layers.round.sensing().estimate();
         let Member {
             mission,
             interference,
@@ -207,7 +216,7 @@ impl Node {
         } = &self.member;
         if let Ok(mission) = told.belief.mission(mission, *interference) {
             self.member.mission = mission;
-            self.raise(Event::Believed);
+            self.raise(Event::NewEstimate);
         }
     }
 
@@ -223,7 +232,7 @@ impl Node {
     pub(crate) fn phase(&self) -> Phase {
         if self.layers.view.has_no_quorum() {
             Phase::NoQuorum
-        } else if self.layers.view.awaited().is_some() {
+        } else if self.layers.view.outstanding().is_some() {
             Phase::ViewChange
         } else {
             self.layers.round.phase()
@@ -288,7 +297,7 @@ impl Node {
     /// Handles a measurement; counts it if it is rejected.
     pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
         if !self.layers.round.handle_sample(now, &self.member, sample) {
-            bump(&mut self.telemetry.stats.samples_refused);
+            bump(&mut self.telemetry.stats.samples_rejected);
         }
     }
 
@@ -296,7 +305,7 @@ impl Node {
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
-        if may && self.layers.view.awaited().is_none() {
+        if may && self.layers.view.outstanding().is_none() {
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.round.restart(&context);
             self.apply(now, effects);
@@ -322,8 +331,14 @@ impl Layers {
             member,
             latest: self.update.latest(),
             end: self.neighbours.at(onward).has_no_peer(),
-            held: self.lease.held(now),
+            held: self.lease.other_leases(now),
         }
+    }
+
+    /// Returns true if a proposal from `side` leaves relays out that may link at any moment: its sender was linked a moment ago.
+    pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
+        let place = self.view.place_and_count().map_or(0, |(place, _)| place);
+        self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
     /// Schedules outstanding messages again: the next relay can be reached again.
@@ -339,8 +354,8 @@ pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
     /// True once a lease expiry, or a missing quorum, has been reported since the last view.
-    pub(super) told_lapsed: bool,
-    pub(super) told_refused: bool,
+    pub(super) lapse_reported: bool,
+    pub(super) no_quorum_reported: bool,
 }
 
 /// Multiples of `dead_after` for which a part without a quorum keeps its links: first, and later.
@@ -349,13 +364,13 @@ const MOST: u32 = 4;
 
 /// Timer for dropping the links of a part without a quorum.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Adrift {
+pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
     at: Option<Instant>,
     again: bool,
 }
 
-impl Adrift {
+impl NoQuorumTimer {
     pub(super) const NONE: Self = Self {
         at: None,
         again: false,
@@ -368,31 +383,35 @@ impl Adrift {
 
 impl Node {
     /// Starts the timer if this part of the chain has no quorum, and stops it otherwise.
-    pub(super) fn drift(&mut self, now: Instant) {
+    pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
-            self.adrift = Adrift::NONE;
-        } else if self.adrift.at.is_none() {
-            self.adrift.at = Some(now + self.keeps_links_for());
+            self.no_quorum_timer = NoQuorumTimer::NONE;
+        } else if self.no_quorum_timer.at.is_none() {
+            self.no_quorum_timer.at = Some(now + self.link_retention());
         }
     }
 
     /// Returns the time for which links are kept without a quorum.
-    fn keeps_links_for(&self) -> Duration {
+    fn link_retention(&self) -> Duration {
         let settings = &self.member.settings;
-        let times = if self.adrift.again { MOST } else { FIRST };
+        let times = if self.no_quorum_timer.again {
+            MOST
+        } else {
+            FIRST
+        };
         let pass = first_pass(settings, self.member.all);
         settings.dead_after.times(times).max(pass)
     }
 
     /// Drops the links to both neighbours if the timer has expired.
-    pub(super) fn search_anew(&mut self, now: Instant) {
-        if self.adrift.at.is_none_or(|at| now < at) {
+    pub(super) fn drop_links_if_expired(&mut self, now: Instant) {
+        if self.no_quorum_timer.at.is_none_or(|at| now < at) {
             return;
         }
-        self.adrift.again = true;
-        self.adrift.at = Some(now + self.keeps_links_for());
+        self.no_quorum_timer.again = true;
+        self.no_quorum_timer.at = Some(now + self.link_retention());
         for side in [Side::Upstream, Side::Downstream] {
-            self.layers.neighbours.at_mut(side).give_up(now);
+            self.layers.neighbours.at_mut(side).drop_link(now);
         }
     }
 }

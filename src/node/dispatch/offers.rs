@@ -2,7 +2,7 @@
 
 use super::Node;
 use crate::event::Event;
-use crate::node::mission_update::{Offered, takes_uploads};
+use crate::node::mission_update::{Offered, accepts_uploads};
 use crate::node::sample::Sample;
 use crate::side::Side;
 use crate::stats::bump;
@@ -23,20 +23,25 @@ impl Node {
         let base = self.member.digest;
         match message {
             Message::Offer { .. } | Message::Hello(_) | Message::Level { .. }
-                if message.mission() != Some(base) =>
+                if message.digest() != Some(base) =>
             {
                 self.refuse_mission(now, side, from);
             }
-            Message::Offer { upload, answer } => {
-                if self.is_asked(now, *answer) {
-                    self.hold(now, upload);
+            Message::Offer {
+                upload,
+                offer_number,
+            } => {
+                if self.is_asked(now, *offer_number) {
+                    self.store_upload(now, upload);
                 }
                 self.layers.update.answer_ground(side, true, None);
             }
             Message::Hello(hello) => {
-                let is_older = hello.holds < self.layers.update.latest();
-                let asks = is_older.then_some(hello.nonce);
-                self.layers.update.answer_ground(side, hello.ask, asks);
+                let is_older = hello.latest_mission < self.layers.update.latest();
+                let asks = is_older.then_some(hello.offer_number);
+                self.layers
+                    .update
+                    .answer_ground(side, hello.requests_reply, asks);
             }
             Message::Level { power_w, .. } => self.handle_sample(
                 now,
@@ -56,22 +61,31 @@ impl Node {
             Side::Upstream => 0,
             Side::Downstream => self.member.all.saturating_add(1),
         };
-        if !self.layers.update.take_report(side) {
-            let (upload, answer) = self.layers.update.take_requested(side)?;
-            return Some((to, Message::Offer { upload, answer }));
+        if !self.layers.update.poll_report(side) {
+            let (upload, offer_number) = self.layers.update.poll_requested(side)?;
+            return Some((
+                to,
+                Message::Offer {
+                    upload,
+                    offer_number,
+                },
+            ));
         }
-        let nonce = self.layers.update.ask(now, &self.member);
+        let offer_number = self.layers.update.next_offer_number(now, &self.member);
         let hello = Hello {
             neighbour: 0,
-            form: false,
-            ..self.hello(now, side, false, nonce)
+            requests_view: false,
+            ..self.hello(now, side, false, offer_number)
         };
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `answer` is the number of a recent hello; otherwise it counts the offer as stale.
-    fn is_asked(&mut self, now: Instant, answer: u16) -> bool {
-        let asked = self.layers.update.asked(answer, now, &self.member);
+    /// Returns true if `offer_number` is that of a recent hello; otherwise counts the offer as stale.
+    fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
+        let asked = self
+            .layers
+            .update
+            .is_recent_number(offer_number, now, &self.member);
         if !asked {
             bump(&mut self.telemetry.stats.stale);
         }
@@ -88,30 +102,30 @@ impl Node {
         side: Side,
         from: u16,
         upload: &Upload,
-        answer: u16,
+        offer_number: u16,
     ) {
-        if !takes_uploads(&self.member) {
+        if !accepts_uploads(&self.member) {
             return bump(&mut self.telemetry.stats.unsigned);
         }
-        if !self.is_asked(now, answer) {
-            return self.owe_hello(side, from, false);
+        if !self.is_asked(now, offer_number) {
+            return self.schedule_hello(side, from, false);
         }
         let id = upload.id();
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.node() == from {
             neighbour.holds = neighbour.holds.max(Some(id));
         }
-        self.hold(now, upload);
-        let refused = self.layers.update.refused_of(self.member.active);
+        self.store_upload(now, upload);
+        let refused = self.layers.update.refused_mission(self.member.active);
         if self.layers.update.latest() >= id || refused == Some(id) {
-            self.owe_hello(side, from, false);
+            self.schedule_hello(side, from, false);
         }
     }
 
     /// Stores `upload` if it is newer. One without a valid line on earth, or beyond the geofence, is counted and reported once.
-    fn hold(&mut self, now: Instant, upload: &Upload) {
-        match self.layers.update.hold(&self.member, upload) {
-            Offered::Held => self.held(now),
+    fn store_upload(&mut self, now: Instant, upload: &Upload) {
+        match self.layers.update.store_if_newer(&self.member, upload) {
+            Offered::Held => self.on_stored(now),
             Offered::Refused { why, is_new } => {
                 bump(&mut self.telemetry.stats.mission);
                 if is_new {
@@ -123,14 +137,14 @@ impl Node {
     }
 
     /// Reports a newer mission, offers it to the neighbours, and requests a view.
-    fn held(&mut self, now: Instant) {
+    fn on_stored(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
         // The leader needs the mission to propose it, and the other relays before the proposal reaches them.
         for side in [Side::Upstream, Side::Downstream] {
-            self.layers.update.offer(side);
-            self.layers.update.begin_offers(side);
+            self.layers.update.schedule_offer(side);
+            self.layers.update.reset_offers(side);
         }
-        self.layers.view.asking.ask(now);
+        self.layers.view.request.start(now);
     }
 
     pub(crate) fn handle_upload(
@@ -138,8 +152,8 @@ impl Node {
         now: Instant,
         upload: &Upload,
     ) -> Result<(), UploadError> {
-        self.layers.update.hand_in(&self.member, upload)?;
-        self.held(now);
+        self.layers.update.accept_upload(&self.member, upload)?;
+        self.on_stored(now);
         Ok(())
     }
 
@@ -156,24 +170,24 @@ impl Node {
     }
 
     /// Handles the statement of the neighbour at `side` that it, or a relay beyond it, refuses a mission.
-    pub(super) fn hear_refused(&mut self, side: Side, refused: MissionId) {
+    pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
-        if !is_held || !takes_uploads(&self.member) {
+        if !is_held || !accepts_uploads(&self.member) {
             return;
         }
         self.layers.update.stop_offers(side);
-        if self.layers.update.hear_refused(refused) {
+        if self.layers.update.record_refused(refused) {
             let other = side.other();
             let to = self.layers.neighbours.at(other).node();
             if to != 0 {
-                self.owe_hello(other, to, false);
+                self.schedule_hello(other, to, false);
             }
         }
     }
 
     /// Schedules a hello or an offer to the neighbour `from` at `side`, by the mission that it `holds`.
-    pub(super) fn compare(&mut self, side: Side, from: u16, holds: MissionId) {
-        if !takes_uploads(&self.member) {
+    pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
+        if !accepts_uploads(&self.member) {
             return;
         }
         let latest = self.layers.update.latest();
@@ -181,15 +195,15 @@ impl Node {
             self.layers.update.stop_offers(side);
         }
         if holds > latest {
-            self.owe_hello(side, from, false);
+            self.schedule_hello(side, from, false);
         } else if holds < latest {
-            self.layers.update.offer(side);
+            self.layers.update.schedule_offer(side);
         } else if self.layers.neighbours.at(side).holds != Some(latest)
             && side == self.onward()
             && self
                 .layers
                 .view
-                .awaited()
+                .outstanding()
                 .is_some_and(|proposed| proposed.mission_id == latest)
         {
             // The proposal was waiting for that.
@@ -202,12 +216,15 @@ impl Node {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.holds);
         let update = &mut self.layers.update;
-        let (upload, answer) = update.take_offer((side, to), holds, now, &self.member)?;
-        let message = if let Some(answer) = answer {
-            Message::Offer { upload, answer }
+        let (upload, offer_number) = update.poll_offer((side, to), holds, now, &self.member)?;
+        let message = if let Some(offer_number) = offer_number {
+            Message::Offer {
+                upload,
+                offer_number,
+            }
         } else {
-            let nonce = update.ask(now, &self.member);
-            Message::Hello(self.hello(now, side, true, nonce))
+            let offer_number = update.next_offer_number(now, &self.member);
+            Message::Hello(self.hello(now, side, true, offer_number))
         };
         Some((side, to, message))
     }

@@ -82,19 +82,19 @@ pub(super) fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
 pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,
-        newest: ViewId::LOADED,
+        latest_view: ViewId::LOADED,
         neighbour: 2,
-        ask: false,
-        form: false,
+        requests_reply: false,
+        requests_view: false,
         fresh: false,
         ready: true,
         behind: 1,
         hears: 0x0F,
-        holds,
-        flies: true,
-        whole: false,
+        latest_mission: holds,
+        active: true,
+        active_in_view: false,
         refused: false,
-        nonce: 9,
+        offer_number: 9,
     })
 }
 
@@ -106,7 +106,7 @@ const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 fn proposal(mission_id: MissionId) -> Message {
     Message::Proposal(Proposal {
         mission_id,
-        view: FIRST,
+        proposed_view: FIRST,
         place: 1,
         poll: Poll {
             votes: 1,
@@ -121,13 +121,19 @@ fn proposal(mission_id: MissionId) -> Message {
 
 /// Returns an offer that answers a hello sent at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
-    let answer = node.layers.update.ask(NOW, &node.member);
-    Message::Offer { upload, answer }
+    let offer_number = node.layers.update.next_offer_number(NOW, &node.member);
+    Message::Offer {
+        upload,
+        offer_number,
+    }
 }
 
-/// Returns an offer to a node whose last hello had the number `answer`.
-fn offered(upload: Upload, answer: u16) -> Message {
-    Message::Offer { upload, answer }
+/// Returns an offer to a node whose last hello had the number `offer_number`.
+fn offered(upload: Upload, offer_number: u16) -> Message {
+    Message::Offer {
+        upload,
+        offer_number,
+    }
 }
 
 #[test]
@@ -141,7 +147,7 @@ fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
     assert_eq!((node.stats().view, node.stats().mission), (1, 0));
     let said = said(&mut node);
     assert!(
-        matches!(said[..], [(1, Message::Hello(Hello { holds, .. }))] if holds == held),
+        matches!(said[..], [(1, Message::Hello(Hello { latest_mission: holds, .. }))] if holds == held),
         "{said:?}"
     );
 }
@@ -160,8 +166,8 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
         matches!(
             told[..],
             [
-                (1, Message::Hello(Hello { holds, flies: false, .. })),
-                (3, Message::Hello(Hello { ask: true, .. })),
+                (1, Message::Hello(Hello { latest_mission: holds, active: false, .. })),
+                (3, Message::Hello(Hello { requests_reply: true, .. })),
             ] if holds == new.id()
         ),
         "{told:?}"
@@ -190,7 +196,7 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     node.handle_message(NOW, Side::Downstream, 3, &ahead);
     let told = said(&mut node);
     assert!(
-        matches!(told[..], [(3, Message::Hello(Hello { holds, .. }))] if holds == older),
+        matches!(told[..], [(3, Message::Hello(Hello { latest_mission: holds, .. }))] if holds == older),
         "{told:?}"
     );
     let new = upload(1);
@@ -198,7 +204,16 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     // A neighbour without a known mission is at once requested to send a hello, which an offer can answer.
     let told = said(&mut node);
     assert!(
-        matches!(told[..], [(1, Message::Hello(Hello { ask: true, .. }))]),
+        matches!(
+            told[..],
+            [(
+                1,
+                Message::Hello(Hello {
+                    requests_reply: true,
+                    ..
+                })
+            )]
+        ),
         "{told:?}"
     );
     // Without a reply the offer is repeated, less and less often.
@@ -280,7 +295,7 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let hellos = told.iter().filter(|(to, _)| *to == 1);
     let hellos: heapless::Vec<_, 8> = hellos.collect();
     assert!(
-        matches!(hellos[..], [(1, Message::Hello(Hello { holds, .. }))] if *holds == new.id()),
+        matches!(hellos[..], [(1, Message::Hello(Hello { latest_mission: holds, .. }))] if *holds == new.id()),
         "{told:?}"
     );
     let stray = upload_to(&base(), 2);
@@ -306,9 +321,13 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             if hellos {
                 // The relay continues to send hellos, whose number has changed by then.
                 let step = Settings::default().dead_after;
-                node.layers.update.ask(NOW + step, &node.member);
-                node.layers.update.ask(NOW + step.times(2), &node.member);
-                node.layers.update.ask(now, &node.member);
+                node.layers
+                    .update
+                    .next_offer_number(NOW + step, &node.member);
+                node.layers
+                    .update
+                    .next_offer_number(NOW + step.times(2), &node.member);
+                node.layers.update.next_offer_number(now, &node.member);
             }
             let from = u16::from(!ground);
             assert!(node.handle_message(now, Side::Upstream, from, &withheld));
@@ -318,7 +337,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
                 if let Message::Hello(hello) = message
                     && to == from
                 {
-                    answer = Some(hello.nonce);
+                    answer = Some(hello.offer_number);
                 }
             }
             let fresh = offered(upload(1), answer.unwrap());
@@ -354,7 +373,7 @@ fn hello_of(node: &Node, hears: u8) -> Message {
         unreachable!();
     };
     Message::Hello(Hello {
-        ask: true,
+        requests_reply: true,
         hears,
         ..hello
     })

@@ -98,7 +98,7 @@ impl Link {
     }
 
     /// Returns true if the link is held down.
-    fn holds(&self, now: Instant, settings: &Settings) -> bool {
+    fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(FORGIVEN + 1) else {
             return false;
         };
@@ -108,7 +108,7 @@ impl Link {
     }
 
     /// Records a loss after `losses` earlier ones. `counted` is true if the new loss is added to them.
-    fn lose(&mut self, losses: u8, counted: bool, now: Instant) {
+    fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
             back: None,
@@ -158,18 +158,24 @@ impl Damping {
     /// Records the loss of the node `distance` places away. `counts` is false if many frames are lost on the channel: the loss is
     /// then added only if the link has flapped before. If another link on this side flaps, this link inherits its losses, because
     /// both cross the same gap.
-    pub(super) fn lose(&mut self, distance: u16, counts: bool, now: Instant, settings: &Settings) {
+    pub(super) fn record_loss(
+        &mut self,
+        distance: u16,
+        counts: bool,
+        now: Instant,
+        settings: &Settings,
+    ) {
         let most = self.links.iter().map(|link| link.recent(now, settings));
         let most = most.max().filter(|most| *most > FORGIVEN).unwrap_or(0);
         if let Some(link) = self.link_mut(distance) {
             let known = link.recent(now, settings).max(most);
-            link.lose(known, counts || known > FORGIVEN, now);
+            link.record_loss(known, counts || known > FORGIVEN, now);
         }
     }
 
     /// Records a frame from the node `distance` places away. `asks` is the start of the search while the side has no neighbour: a
     /// candidate that has answered the search and is then silent for longer than `dead_after` counts as lost.
-    pub(super) fn hear(
+    pub(super) fn record_hello(
         &mut self,
         distance: u16,
         asks: Option<Instant>,
@@ -185,7 +191,7 @@ impl Damping {
         let last = link.back.map_or(link.lost_at, |back| back.last);
         if now.since(last) > settings.dead_after {
             if link.back.is_some() && asks.is_some_and(|asks| last >= asks) {
-                link.lose(link.recent(now, settings), true, now);
+                link.record_loss(link.recent(now, settings), true, now);
                 link.was_down = true;
             } else if link.back.is_none() && (link.losses > 0 || link.excused) {
                 link.was_down = true;
@@ -217,9 +223,9 @@ impl Damping {
     }
 
     /// Returns true if the link to the node `distance` places away is held down.
-    pub(super) fn holds(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
+    pub(super) fn is_held_down(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let link = self.link(distance);
-        link.is_some_and(|link| link.holds(now, settings))
+        link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
     /// Returns true if a link on this side flaps slowly: then it is worth noticing its next loss early. Such a link has been lost
@@ -236,9 +242,9 @@ impl Damping {
     }
 
     /// Returns the nodes whose links are held down, as a bit mask: bit 0 is the nearest one.
-    pub(super) fn held(&self, now: Instant, settings: &Settings) -> u8 {
+    pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
-            .filter(|distance| self.holds(*distance, now, settings))
+            .filter(|distance| self.is_held_down(*distance, now, settings))
             .fold(0, |held, distance| held | mask(distance))
     }
 
@@ -248,7 +254,7 @@ impl Damping {
     }
 
     /// Returns true if the candidate has been heard for `probe_after`, and for `more` if that is longer. It is heard now.
-    pub(super) fn passes(
+    pub(super) fn has_waited(
         &mut self,
         distance: u16,
         more: Duration,
@@ -287,14 +293,14 @@ mod tests {
     /// Simulates an outage of 40 s of the link to the nearest node; the nodes at `heard` answer the search.
     fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
         let search = *now;
-        side.lose(1, true, search, settings);
+        side.record_loss(1, true, search, settings);
         for _ in 0..40 {
             *now = *now + seconds(1);
             for distance in heard {
-                side.hear(*distance, Some(search), *now, settings);
+                side.record_hello(*distance, Some(search), *now, settings);
             }
         }
-        side.hear(1, Some(search), *now, settings);
+        side.record_hello(1, Some(search), *now, settings);
     }
 
     #[test]
@@ -302,24 +308,24 @@ mod tests {
         let (mut side, mut now, settings) = begun();
         for losses in 1..=3 {
             outage(&mut side, &mut now, &[], &settings);
-            assert_eq!(side.holds(1, now, &settings), losses > 2, "{losses}");
+            assert_eq!(side.is_held_down(1, now, &settings), losses > 2, "{losses}");
         }
         for _ in 0..15 {
-            assert!(side.holds(1, now, &settings));
+            assert!(side.is_held_down(1, now, &settings));
             now = now + seconds(1);
-            side.hear(1, None, now, &settings);
+            side.record_hello(1, None, now, &settings);
         }
-        assert!(!side.holds(1, now, &settings));
+        assert!(!side.is_held_down(1, now, &settings));
     }
 
     #[test]
     fn a_partition_holds_all_links_down() {
         let (mut side, mut now, settings) = begun();
         for losses in 1..=3 {
-            assert_eq!(side.held(now, &settings), 0, "{losses}");
+            assert_eq!(side.held_down_nodes(now, &settings), 0, "{losses}");
             outage(&mut side, &mut now, &[], &settings);
         }
-        assert_eq!(side.held(now, &settings), 0b1111);
+        assert_eq!(side.held_down_nodes(now, &settings), 0b1111);
     }
 
     #[test]
@@ -328,7 +334,7 @@ mod tests {
         for _ in 0..3 {
             outage(&mut side, &mut now, &[2, 3, 4], &settings);
         }
-        assert_eq!(side.held(now, &settings), 0b0001);
+        assert_eq!(side.held_down_nodes(now, &settings), 0b0001);
     }
 
     #[test]
@@ -337,17 +343,17 @@ mod tests {
         let search = now;
         for second in 0..180 {
             now = now + seconds(1);
-            side.hear(2, Some(search), now, &settings);
+            side.record_hello(2, Some(search), now, &settings);
             // The nearest node answers for 20 s and is silent for 40 s.
             if second % 60 < 20 {
-                side.hear(1, Some(search), now, &settings);
+                side.record_hello(1, Some(search), now, &settings);
             }
         }
-        assert!(!side.holds(1, now, &settings));
+        assert!(!side.is_held_down(1, now, &settings));
         now = now + seconds(1);
-        side.hear(1, Some(search), now, &settings);
-        assert!(side.holds(1, now, &settings));
-        assert!(!side.holds(2, now, &settings));
+        side.record_hello(1, Some(search), now, &settings);
+        assert!(side.is_held_down(1, now, &settings));
+        assert!(!side.is_held_down(2, now, &settings));
     }
 
     #[test]
@@ -355,29 +361,29 @@ mod tests {
         let (mut side, mut now, settings) = begun();
         for _ in 0..5 {
             now = now + seconds(60);
-            side.hear(1, None, now, &settings);
+            side.record_hello(1, None, now, &settings);
         }
-        assert_eq!(side.held(now, &settings), 0);
+        assert_eq!(side.held_down_nodes(now, &settings), 0);
     }
 
     #[test]
     fn a_loss_is_an_outage_after_a_silence_of_more_than_dead_after() {
         let (mut side, now, settings) = begun();
-        side.lose(1, false, now, &settings);
-        side.hear(1, Some(now), now + seconds(15), &settings);
+        side.record_loss(1, false, now, &settings);
+        side.record_hello(1, Some(now), now + seconds(15), &settings);
         assert!(!side.was_down(1));
-        side.lose(1, false, now + seconds(20), &settings);
+        side.record_loss(1, false, now + seconds(20), &settings);
         let again = now + seconds(36);
-        side.hear(1, Some(now + seconds(20)), again, &settings);
+        side.record_hello(1, Some(now + seconds(20)), again, &settings);
         assert!(side.was_down(1));
     }
 
     #[test]
     fn a_link_that_was_never_lost_was_not_down() {
         let (mut side, now, settings) = begun();
-        side.hear(1, Some(now), now + seconds(100), &settings);
+        side.record_hello(1, Some(now), now + seconds(100), &settings);
         assert!(!side.was_down(1));
-        side.hear(2, None, now + seconds(200), &settings);
+        side.record_hello(2, None, now + seconds(200), &settings);
         assert!(!side.was_down(2));
     }
 }

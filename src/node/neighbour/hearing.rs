@@ -11,9 +11,9 @@ const MINUTE: Duration = Duration::from_millis(60_000);
 
 /// Consecutive occurrences of an event for each of the nearest nodes, nearest first.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct InRow([u8; CANDIDATES as usize]);
+pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
-impl InRow {
+impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
     /// Counts the event `so` for the node `distance` places away. Returns true if it is exactly the `most`-th in a row.
@@ -42,19 +42,19 @@ pub(super) struct Hearing {
 
 /// Nodes on one side that were reported recently: each once a minute.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ToldOf {
+pub(super) struct ReportLimiter {
     since: Instant,
     nodes: u8,
 }
 
-impl ToldOf {
+impl ReportLimiter {
     pub(super) const NONE: Self = Self {
         since: Instant::ZERO,
         nodes: 0,
     };
 
     /// Returns true if the node `distance` places away has not been reported in this minute. Marks it as reported.
-    pub(super) fn tell(&mut self, distance: u16, now: Instant) -> bool {
+    pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {
                 since: now,
@@ -120,7 +120,7 @@ impl Hellos {
     pub(super) const NONE: Self = Self { owed: 0, asks: 0 };
 
     /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
-    pub(super) const fn owe(&mut self, distance: u16, ask: bool) {
+    pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.owed |= bit;
         if ask {
@@ -129,13 +129,13 @@ impl Hellos {
     }
 
     /// Schedules hellos that request an answer to all candidates.
-    pub(super) const fn owe_all(&mut self) {
+    pub(super) const fn schedule_all(&mut self) {
         self.owed = 0x0F;
         self.asks = 0x0F;
     }
 
     /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
-    pub(super) fn take(&mut self) -> Option<(u16, bool)> {
+    pub(super) fn poll(&mut self) -> Option<(u16, bool)> {
         let distance = (1..=CANDIDATES).find(|distance| self.owed & mask(*distance) != 0)?;
         let bit = mask(distance);
         self.owed &= !bit;

@@ -124,12 +124,12 @@ impl Liveness {
         };
     }
 
-    pub(crate) const fn heard(&self) -> Instant {
+    pub(crate) const fn last_sign_of_life(&self) -> Instant {
         self.heard
     }
 
     /// Returns true if the neighbour has been heard and is not lost.
-    pub(crate) const fn is_there(&self) -> bool {
+    pub(crate) const fn is_present(&self) -> bool {
         self.met && !self.lost
     }
 
@@ -139,22 +139,22 @@ impl Liveness {
     }
 
     /// Returns the longest plausible run of lost frames on this channel.
-    pub(crate) fn run(&self, tick: Duration) -> Duration {
+    pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
 
     /// Returns true if few frames were lost on the channel recently.
-    pub(crate) const fn is_clear(&self) -> bool {
+    pub(crate) const fn loses_few_frames(&self) -> bool {
         self.longest <= QUESTIONS
     }
 
     /// Records a received frame.
-    pub(crate) const fn met(&mut self) {
+    pub(crate) const fn record_frame(&mut self) {
         self.met = true;
     }
 
     /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
-    pub(crate) fn confirmed(&mut self, at: Instant) -> bool {
+    pub(crate) fn record_sign_of_life(&mut self, at: Instant) -> bool {
         self.heard = self.heard.max(at);
         self.met = true;
         let lately = self.longest.saturating_sub(self.longest.div_ceil(8));
@@ -164,7 +164,7 @@ impl Liveness {
     }
 
     /// Returns the number of a new question.
-    pub(crate) const fn ask(&mut self, now: Instant) -> u16 {
+    pub(crate) const fn next_request(&mut self, now: Instant) -> u16 {
         self.question = match self.question.wrapping_add(1) {
             0 => 1,
             number => number,
@@ -176,7 +176,7 @@ impl Liveness {
     }
 
     /// Returns the time at which question `number` was sent, if it is one of the last few.
-    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
+    pub(crate) fn requested_at(&self, number: u16) -> Option<Instant> {
         if number == 0 || self.question == 0 {
             return None;
         }
@@ -185,7 +185,7 @@ impl Liveness {
     }
 
     /// Excuses the silence so far; returns true if the neighbour is not lost.
-    pub(crate) const fn excuse(&mut self, now: Instant) -> bool {
+    pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.heard = now;
         }
@@ -193,7 +193,7 @@ impl Liveness {
     }
 
     /// Checks a silence; the neighbour is not lost before `dead`.
-    pub(crate) fn silent(
+    pub(crate) fn review_silence(
         &mut self,
         now: Instant,
         dead: Duration,

@@ -88,11 +88,11 @@ impl Neighbours {
     }
 
     /// Returns the next pending heartbeat. Its side, node, question number, and number of the question that it answers.
-    pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
+    pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()
             .find_map(|side| {
-                let (to, ask, answer) = self.at_mut(side).take_heartbeat(now)?;
+                let (to, ask, answer) = self.at_mut(side).poll_heartbeat(now)?;
                 Some((side, to, ask, answer))
             })
     }

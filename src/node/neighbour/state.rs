@@ -14,7 +14,8 @@
 //!
 //! *Better* is a nearer node that is heard by the node beyond it. A farther node is better if it leads to more relays than the
 //! neighbour, or to all relays that the last view had beyond the neighbour: then the link on the neighbour's other side is
-//! missing, and the neighbour is left out. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
+//! missing, and the neighbour is left out. One that the neighbour has replaced is selected again at once: it needs no further
+//! proof. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
 //! neither part of the chain could go on. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
 //!
 //! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, the selected one among
@@ -22,10 +23,11 @@
 //! for that time; of several nodes the nearest one counts. Links that were lost repeatedly are held down (see
 //! [`damping`](super::damping)). On wires, only questions are sent to a lost neighbour until it answers. A node that returns
 //! causes a request for a new view `probe_after` later, because the node on its other side may be about to select it, too.
+//! During this grace period, proposals from the returned node that would leave relays out are dropped, and retransmitted later.
 
 use super::damping::Damping;
 use super::hearing::Hellos;
-use super::hearing::{CANDIDATES, Hearing, InRow, ToldOf, mask};
+use super::hearing::{CANDIDATES, ConsecutiveCounts, Hearing, ReportLimiter, mask};
 use super::liveness::{Liveness, patience, tick};
 use crate::node::context::Proposer;
 use crate::node::context::{first_pass, longest_lease};
@@ -60,6 +62,8 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Selected node at the time the links were given up; 0 for none.
     given_up: u16,
+    /// Farther node that the selected one has replaced; 0 for none.
+    replaced: u16,
     /// Start of the last search.
     searches_since: Instant,
     /// Distance to the selected node, in places.
@@ -73,13 +77,13 @@ pub(crate) struct Neighbour {
     /// Nodes that were heard recently.
     pub(super) hearing: Hearing,
     /// Consecutive reports of each node that it does not hear this relay.
-    pub(super) unheard: InRow,
+    pub(super) unheard: ConsecutiveCounts,
     /// Nodes reported as found since another node was linked or lost: bit 0 is the nearest one.
     found: u8,
     /// Nodes of another mission.
-    pub(super) strangers: ToldOf,
+    pub(super) mismatches: ReportLimiter,
     /// Consecutive handshakes with each node's index that were signed with another key.
-    pub(super) forged: InRow,
+    pub(super) forged: ConsecutiveCounts,
     /// Interval between questions.
     tick: Duration,
     /// Silence after which a sign of life is requested.
@@ -103,16 +107,17 @@ impl Neighbour {
         liveness: Liveness::NONE,
         damping: Damping::new(Instant::ZERO),
         given_up: 0,
+        replaced: 0,
         searches_since: Instant::ZERO,
         distance: 0,
         both_ways: Hearing::new(Instant::ZERO),
         taken_by: [0; CANDIDATES as usize],
         near: None,
         hearing: Hearing::new(Instant::ZERO),
-        unheard: InRow::NONE,
+        unheard: ConsecutiveCounts::NONE,
         found: 0,
-        strangers: ToldOf::NONE,
-        forged: InRow::NONE,
+        mismatches: ReportLimiter::NONE,
+        forged: ConsecutiveCounts::NONE,
         tick: Duration::from_micros(0),
         patience: Duration::from_micros(0),
         jitter: Jitter::NONE,
@@ -173,8 +178,8 @@ impl Neighbour {
     }
 
     /// Returns true if the selected node has been heard and is not lost.
-    pub(crate) const fn is_there(&self) -> bool {
-        self.liveness.is_there()
+    pub(crate) const fn is_present(&self) -> bool {
+        self.liveness.is_present()
     }
 
     /// Returns true if the selected node is lost, and nothing has been received from it since.
@@ -183,10 +188,10 @@ impl Neighbour {
     }
 
     /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
-    pub(crate) fn confirmed(&mut self, now: Instant, at: Instant) -> bool {
-        let back = self.liveness.confirmed(at);
+    pub(crate) fn record_sign_of_life(&mut self, now: Instant, at: Instant) -> bool {
+        let back = self.liveness.record_sign_of_life(at);
         if self.is_mutual() {
-            let next = (self.liveness.heard() + self.patience).max(now + self.tick);
+            let next = (self.liveness.last_sign_of_life() + self.patience).max(now + self.tick);
             // An answer to an old message does not advance the next check.
             let next = self.look_at.map_or(next, |at| at.max(next));
             // A new neighbour triggers a view request at the end of its grace period.
@@ -202,7 +207,7 @@ impl Neighbour {
     }
 
     /// Records whether the neighbour has selected this relay; returns true if that is a change.
-    pub(crate) fn told(&mut self, mutual: bool, now: Instant) -> bool {
+    pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
             (NeighbourState::Linked, false) => (NeighbourState::Pairing { since: now }, self.tick),
@@ -217,16 +222,17 @@ impl Neighbour {
     }
 
     /// Returns true if the selected node is to be reported as found, and marks it as reported.
-    pub(crate) const fn tells_found(&mut self) -> bool {
+    pub(crate) const fn should_report_found(&mut self) -> bool {
         let told = self.found;
         self.found |= mask(self.distance);
         self.found != told
     }
 
     /// Excuses the silence of a neighbour in the same view. Returns true if there is one and it is not lost.
-    pub(crate) fn excuse(&mut self, now: Instant, settings: &Settings) -> bool {
-        let excused =
-            self.state == NeighbourState::Linked && self.is_agreed() && self.liveness.excuse(now);
+    pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
+        let excused = self.state == NeighbourState::Linked
+            && self.is_agreed()
+            && self.liveness.excuse_silence(now);
         if excused {
             self.look_at = Some(now + settings.probe_after);
         }
@@ -257,19 +263,23 @@ impl Neighbour {
             .dead_after
             .as_micros()
             .saturating_sub(settings.probe_after.as_micros());
-        let run = self.liveness.run(self.tick).min(longest_lease(settings));
+        let run = self
+            .liveness
+            .longest_gap(self.tick)
+            .min(longest_lease(settings));
         let span = run.max(Duration::from_micros(span));
         let is_over = |since: Instant| now.since(since) >= span;
         let mut lost = false;
         let mut look_again = now + step;
         match self.state {
             NeighbourState::Linked => {
-                let silence = self.liveness.silent(now, dead, step, settings);
+                let silence = self.liveness.review_silence(now, dead, step, settings);
                 lost = silence.lost;
                 self.signs.ask = true;
                 if lost && searches {
-                    let counts = self.liveness.is_clear();
-                    self.damping.lose(self.distance, counts, now, settings);
+                    let counts = self.liveness.loses_few_frames();
+                    self.damping
+                        .record_loss(self.distance, counts, now, settings);
                     self.search(now);
                 } else {
                     look_again = silence.look_again;
@@ -278,21 +288,21 @@ impl Neighbour {
             NeighbourState::Pairing { since } => {
                 lost = self
                     .liveness
-                    .silent(now, settings.dead_after, step, settings)
+                    .review_silence(now, settings.dead_after, step, settings)
                     .lost;
-                self.hellos.owe_all();
+                self.hellos.schedule_all();
                 if lost || is_over(since) {
                     self.search(now);
                 }
             }
             NeighbourState::Searching { since } => {
-                self.hellos.owe_all();
+                self.hellos.schedule_all();
                 if is_over(since) {
                     self.state = NeighbourState::NoPeer;
                 }
             }
             NeighbourState::NoPeer => {
-                self.hellos.owe_all();
+                self.hellos.schedule_all();
                 let often = Duration::from_micros((settings.probe_after.as_micros() / 2).max(1));
                 let wait = if self.is_near(now, settings) {
                     often
@@ -315,7 +325,7 @@ impl Neighbour {
     }
 
     /// Records a frame of a node that is not selected. If the chain has ended here, the next check is soon.
-    pub(crate) fn notice(&mut self, now: Instant, settings: &Settings) {
+    pub(crate) fn record_unselected(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.is_near(now, settings) {
             self.look_at = Some(now + self.tick);
         }
@@ -323,7 +333,7 @@ impl Neighbour {
     }
 
     /// Returns the start of the search while this side has no neighbour. It then sends requests to all candidates.
-    pub(super) const fn asks_all(&self) -> Option<Instant> {
+    pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
             NeighbourState::Linked | NeighbourState::Pairing { .. } => None,
@@ -335,16 +345,16 @@ impl Neighbour {
         self.searches_since = now;
         self.state = NeighbourState::Searching { since: now };
         self.damping.clear();
-        self.hellos.owe_all();
+        self.hellos.schedule_all();
     }
 
     /// Returns true if `node` was given up for want of a quorum and no other node has been selected since.
-    const fn was_given_up(&self, node: u16) -> bool {
+    const fn was_dropped(&self, node: u16) -> bool {
         node != 0 && self.given_up == node
     }
 
     /// Releases the selected node and searches again, because the linked part of the chain has no quorum.
-    pub(crate) fn give_up(&mut self, now: Instant) {
+    pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
             NeighbourState::Linked | NeighbourState::Pairing { .. }
@@ -357,7 +367,7 @@ impl Neighbour {
 
     /// Considers a node that has sent a hello and is not selected. Returns true if it is selected from now on. The candidate hears
     /// this relay, and has selected this relay or none.
-    pub(crate) fn consider(
+    pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
         now: Instant,
@@ -367,13 +377,13 @@ impl Neighbour {
         let none = Duration::from_micros(0);
         let distance = candidate.distance;
         // A flapping link must first stay up for a while.
-        if self.damping.holds(distance, now, settings) {
+        if self.damping.is_held_down(distance, now, settings) {
             return false;
         }
         let takes = match self.state {
             NeighbourState::Searching { since } => {
                 // A nearer node may be heard soon, or any other node than the one that was given up.
-                let wait = if self.was_given_up(node) {
+                let wait = if self.was_dropped(node) {
                     settings.probe_after
                 } else {
                     self.tick.times(u32::from(candidate.beyond()) * 2)
@@ -381,7 +391,7 @@ impl Neighbour {
                 now.since(since) >= wait
             }
             NeighbourState::NoPeer => {
-                candidate.pairs || self.damping.passes(distance, none, now, settings)
+                candidate.pairs || self.damping.has_waited(distance, none, now, settings)
             }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
                 // If two relays could each leave out a node, the one nearer to Rx does, unless that takes long.
@@ -391,7 +401,9 @@ impl Neighbour {
                 } else {
                     none
                 };
-                candidate.is_better() && self.damping.passes(distance, more, now, settings)
+                let is_known = node == self.replaced && !candidate.nearer && !waits;
+                candidate.is_better()
+                    && (is_known || self.damping.has_waited(distance, more, now, settings))
             }
         };
         if !takes {
@@ -402,6 +414,7 @@ impl Neighbour {
         }
         self.signs = Signs::NONE;
         self.given_up = 0;
+        self.replaced = if candidate.nearer { self.node } else { 0 };
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
@@ -561,25 +574,28 @@ const FORGED: u8 = 3;
 impl Neighbour {
     /// Returns true if the node `distance` places away and this relay hear each other. The link is not held down.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
-        let held = self.damping.held(now, settings);
-        let known = mask(distance) & self.both_ways.recent(now, settings) & !held != 0;
-        known || self.is_mutual() && self.distance == distance && self.liveness.is_there()
+        let held = self.damping.held_down_nodes(now, settings);
+        let is_in = |nodes: u8| mask(distance) & nodes != 0;
+        // A linked neighbour that is silent may be about to be lost.
+        let is_linked = self.is_mutual() && self.distance == distance;
+        is_in(self.both_ways.recent(now, settings) & !held)
+            || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
     /// Returns true if the neighbour here is linked, and less than `distance` places away.
-    pub(crate) fn comes_along(&self, distance: u16) -> bool {
-        self.is_mutual() && self.liveness.is_there() && self.distance < distance
+    pub(crate) fn joins_with(&self, distance: u16) -> bool {
+        self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
     /// Returns true if the neighbour here is linked, and more than `distance` places away.
-    pub(crate) fn goes_past(&self, distance: u16) -> bool {
-        self.is_mutual() && self.liveness.is_there() && self.distance > distance
+    pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
+        self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }
 
     /// Records a hello of the node `distance` places away.
     ///
     /// `neighbour` is the one that it has selected toward this relay. `hears` is true if it receives this one.
-    pub(crate) fn says(
+    pub(crate) fn record_hello(
         &mut self,
         distance: u16,
         neighbour: u16,
@@ -596,77 +612,88 @@ impl Neighbour {
     }
 
     /// Returns the neighbour that the node `distance` places away has selected toward this relay. 0 for none.
-    pub(crate) fn taken_by(&self, distance: u16) -> u16 {
+    pub(crate) fn selected_by(&self, distance: u16) -> u16 {
         let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
     /// Records an intact frame of the node `distance` places away. `taken` is true if that is the selected node.
-    pub(crate) fn heard(&mut self, distance: u16, taken: bool, now: Instant, settings: &Settings) {
+    pub(crate) fn record_frame(
+        &mut self,
+        distance: u16,
+        taken: bool,
+        now: Instant,
+        settings: &Settings,
+    ) {
         self.hearing.add(distance, now, settings);
-        self.damping.hear(distance, self.asks_all(), now, settings);
+        self.damping
+            .record_hello(distance, self.searching_since(), now, settings);
         if taken {
-            self.liveness.met();
+            self.liveness.record_frame();
         }
     }
 
     /// Returns the nodes heard recently whose links are not held down, as a bit mask. Bit 0 is the nearest one.
-    pub(crate) fn hears(&self, now: Instant, settings: &Settings) -> u8 {
-        let held = self.damping.held(now, settings);
+    pub(crate) fn received_nodes(&self, now: Instant, settings: &Settings) -> u8 {
+        let held = self.damping.held_down_nodes(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
     /// Counts the reports of a node that it does not hear this relay. Returns true at the last of [`UNHEARD`] in a row.
-    pub(crate) fn says_it_hears(&mut self, distance: u16, heard: bool) -> bool {
+    pub(crate) fn record_reception(&mut self, distance: u16, heard: bool) -> bool {
         self.unheard.count(distance, !heard, UNHEARD)
     }
 
     /// Returns true if the node `distance` places away, which has another mission, is to be reported.
-    pub(crate) fn is_stranger(&mut self, distance: u16, now: Instant) -> bool {
-        self.strangers.tell(distance, now)
+    pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
+        self.mismatches.should_report(distance, now)
     }
 
     /// Counts a handshake that was signed with another key. Returns true at the last of [`FORGED`] in a row.
-    pub(crate) fn is_forged(&mut self, distance: u16) -> bool {
+    pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
 
     /// Resets the count: the node `distance` places away has the key.
-    pub(crate) fn is_signed_right(&mut self, distance: u16) {
+    pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }
 }
 
 impl Neighbour {
     /// Records the neighbour's question with this number.
-    pub(crate) const fn asked(&mut self, number: u16) {
+    pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.signs.answer = number;
         }
     }
 
     /// Returns the time at which the answered question `number` was sent.
-    pub(crate) fn answered(&self, number: u16) -> Option<Instant> {
-        self.liveness.answered(number)
+    pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
+        self.liveness.requested_at(number)
     }
 
     /// Returns the pending heartbeat. Its node, question number, and number of the question that it answers.
-    pub(crate) fn take_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
+    pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let Signs { ask, answer } = core::mem::take(&mut self.signs);
         if !(ask || answer != 0) || self.node == 0 {
             return None;
         }
-        let question = if ask { self.liveness.ask(now) } else { 0 };
+        let question = if ask {
+            self.liveness.next_request(now)
+        } else {
+            0
+        };
         Some((self.node, question, answer))
     }
 
     /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
-    pub(crate) const fn owe(&mut self, distance: u16, ask: bool) {
-        self.hellos.owe(distance, ask);
+    pub(crate) const fn schedule_hello(&mut self, distance: u16, ask: bool) {
+        self.hellos.schedule(distance, ask);
     }
 
     /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
-    pub(crate) fn take_hello(&mut self) -> Option<(u16, bool)> {
-        self.hellos.take()
+    pub(crate) fn poll_hello(&mut self) -> Option<(u16, bool)> {
+        self.hellos.poll()
     }
 }

@@ -6,8 +6,8 @@
 use super::gathering::Seats;
 use super::sense::{SENSING, Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
-use super::sweep::Sweeping;
-use super::turn::Turning;
+use super::sweep::SweepPass;
+use super::turn::TurnPass;
 use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
@@ -32,15 +32,15 @@ pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 /// Current pass with its data.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
-    Sweep(Sweeping),
+    Sweep(SweepPass),
     Gather(Roster),
     Sense(Sense),
-    Turn(Turning),
+    Turn(TurnPass),
 }
 
 /// Solution of the joint method for this relay.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Chosen {
+pub(super) struct JointPlace {
     /// Cross-section: position across the line.
     pub(super) at: CrossSection,
     /// Maximum x, m.
@@ -62,13 +62,13 @@ pub(crate) struct Computation {
     /// Profiles of the relays of this view.
     pub(super) seats: Seats,
     /// Solution of the joint method in this view, once it is computed.
-    pub(super) chosen: Option<Chosen>,
-    /// Cross-section of the setpoint.
+    pub(super) chosen: Option<JointPlace>,
+    /// Cross-section of the agreed position.
     pub(super) at: CrossSection,
     /// Last reported position of the neighbour toward Rx.
     pub(super) after: Option<Placement>,
-    pub(super) setpoint: Option<Placement>,
-    /// Measured interference at the setpoint, in a field.
+    pub(super) agreed_place: Option<Placement>,
+    /// Measured interference at the agreed position, in a field.
     pub(super) meter: Meter,
     /// Measurements of the interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
@@ -88,15 +88,15 @@ impl Computation {
     ) -> Self {
         Self {
             state: RoundState::new(if leader { Phase::Planning } else { Phase::Idle }, number),
-            pass: PassKind::Sweep(Sweeping::new(Ladder::single(1.0))),
-            task: LeaderTask::No,
+            pass: PassKind::Sweep(SweepPass::new(Ladder::single(1.0))),
+            task: LeaderTask::Idle,
             began: false,
             profile,
             seats: Seats::UNKNOWN,
             chosen: None,
             at: profile.on_line().at,
             after: None,
-            setpoint: None,
+            agreed_place: None,
             meter: Meter::new(settings.measure),
             sensing: Sensing::new(settings.listen, now),
             target: None,
@@ -104,10 +104,10 @@ impl Computation {
         }
     }
 
-    /// Returns true until the first task, pass or setpoint.
+    /// Returns true until the first task, pass or agreed position.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
-        at_first && matches!(self.task, LeaderTask::No) && self.setpoint.is_none()
+        at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
     }
 
     pub(crate) fn load(&mut self, profile: Profile) {
@@ -115,33 +115,33 @@ impl Computation {
         self.chosen = None;
         self.seats = Seats::UNKNOWN;
         self.sensing.load();
-        if self.setpoint.is_none() {
+        if self.agreed_place.is_none() {
             self.at = profile.on_line().at;
         }
     }
 
-    pub(crate) const fn discard_place(&mut self) {
-        self.setpoint = None;
+    pub(crate) const fn discard_agreed_place(&mut self) {
+        self.agreed_place = None;
         self.after = None;
     }
 
     /// Starts the leader's search again: Algorithm 1 or 4 at the configured altitudes.
     pub(crate) fn restart(&mut self) {
-        self.task.rest();
+        self.task.clear();
         // A new solution makes the leader try the same targets as the first time.
         self.chosen = None;
         self.state.plan();
     }
 
     pub(crate) fn suspend(&mut self) {
-        self.task.rest();
-        self.pass = PassKind::Sweep(Sweeping::new(Ladder::single(1.0)));
+        self.task.clear();
+        self.pass = PassKind::Sweep(SweepPass::new(Ladder::single(1.0)));
         self.state.answer();
     }
 
     /// Starts a new view, in which no pass has been received yet.
     pub(crate) fn renew(&mut self, leads: bool) {
-        self.task.rest();
+        self.task.clear();
         self.after = None;
         self.chosen = None;
         self.seats = Seats::UNKNOWN;
@@ -149,10 +149,10 @@ impl Computation {
         self.state.renew(leads);
     }
 
-    /// Sets the setpoint to `place` and the cross-section to `at`.
+    /// Sets the agreed position to `place` and the cross-section to `at`.
     #[inline(never)]
-    pub(super) fn stand_at(&mut self, place: Placement, at: CrossSection) {
-        self.setpoint = Some(place);
+    pub(super) fn agree_on(&mut self, place: Placement, at: CrossSection) {
+        self.agreed_place = Some(place);
         self.at = at;
         // Samples of the previous position do not count.
         self.meter.restart();
@@ -170,19 +170,19 @@ impl Computation {
     pub(crate) fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {
-                PassKind::Sweep(sweeping) if !sweeping.is_done() => {
-                    let unknown = ALTITUDE && sweeping.chosen && self.chosen.is_none();
+                PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => {
+                    let unknown = ALTITUDE && sweep_pass.chosen && self.chosen.is_none();
                     if unknown && self.solve(context).is_none() {
                         return Action::Work;
                     }
-                    return self.go_on_with_sweep(context);
+                    return self.continue_sweep(context);
                 }
-                PassKind::Turn(_) if ADJUST => return self.go_on_with_turn(context),
+                PassKind::Turn(_) if ADJUST => return self.continue_turn(context),
                 _ => {}
             }
         }
         if context.index() != context.mission().leader() || self.state.phase() == Phase::Waiting {
-            return self.think(context);
+            return self.solve_ahead(context);
         }
         match self.plan(context) {
             Ok(true) => self.begin_pass(context),
@@ -198,27 +198,27 @@ impl Computation {
         }
         let (number, mission) = (self.state.number(), context.digest());
         match &self.pass {
-            PassKind::Sweep(sweeping) if !sweeping.is_done() => None,
-            PassKind::Sweep(sweeping) => Some(Message::Sweep(Sweep {
+            PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => None,
+            PassKind::Sweep(sweep_pass) => Some(Message::Sweep(Sweep {
                 number,
-                mission,
-                ladder: sweeping.ladder,
-                relay: self.station_for(sweeping.chosen),
-                chosen: sweeping.chosen,
+                view_digest: mission,
+                ladder: sweep_pass.ladder,
+                relay: self.station_for(sweep_pass.chosen),
+                chosen: sweep_pass.chosen,
                 measured_per_w: self.meter.published(),
-                reaches: sweeping.reaches.clone(),
+                reaches: sweep_pass.reaches.clone(),
             })),
             PassKind::Gather(roster) if ALTITUDE => Some(Message::Gather(roster.clone())),
             PassKind::Sense(sense) if SENSING => Some(Message::Sense(sense.hearing)),
-            PassKind::Turn(turning) if turning.is_searching() => None,
-            PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
+            PassKind::Turn(turn_pass) if turn_pass.is_searching() => None,
+            PassKind::Turn(turn_pass) if ADJUST => self.agreed_place.map(|place| {
                 Message::Token(Token {
                     number,
-                    mission,
+                    view_digest: mission,
                     place,
                     power_w: self.profile.power_w,
-                    turn: turning.turn,
-                    sir: turning.sir,
+                    turn: turn_pass.turn,
+                    sir: turn_pass.sir,
                 })
             }),
             _ => None,
@@ -229,7 +229,7 @@ impl Computation {
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
-            PassKind::Sweep(sweeping) => sweeping.chosen,
+            PassKind::Sweep(sweep_pass) => sweep_pass.chosen,
             PassKind::Gather(_) | PassKind::Sense(_) => false,
         }
     }
@@ -241,22 +241,22 @@ impl Computation {
         }
         let (number, mission) = (self.state.number(), context.digest());
         match &self.pass {
-            PassKind::Sweep(sweeping) => Some(Message::Verdict(Answer {
+            PassKind::Sweep(sweep_pass) => Some(Message::Verdict(Answer {
                 number,
-                mission,
-                verdict: sweeping.verdict.clone(),
-                stand: sweeping.stand(),
-                own: sweeping.own || self.differs(context),
+                view_digest: mission,
+                verdict: sweep_pass.verdict.clone(),
+                required_x_m: sweep_pass.required_x_m(),
+                own: sweep_pass.own || self.has_own_profile(context),
             })),
             PassKind::Gather(roster) if ALTITUDE => Some(Message::Gathered(roster.clone())),
             PassKind::Sense(sense) if SENSING => Some(Message::Sensed(sense.hearing)),
-            PassKind::Turn(turning) if ADJUST => self.setpoint.map(|place| {
+            PassKind::Turn(turn_pass) if ADJUST => self.agreed_place.map(|place| {
                 Message::Moved(Moved {
                     number,
-                    mission,
+                    view_digest: mission,
                     place,
-                    any: turning.any,
-                    worst: turning.worst,
+                    any_moved: turn_pass.any,
+                    worst_sir: turn_pass.worst,
                 })
             }),
             _ => None,
@@ -282,7 +282,7 @@ impl Computation {
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
-            Some(Chosen { at, .. }) if chosen => Station { at, ..given },
+            Some(JointPlace { at, .. }) if chosen => Station { at, ..given },
             _ => given,
         }
     }
@@ -310,7 +310,7 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 #[derive(Clone, Debug)]
 pub(crate) enum LeaderTask {
     /// Idle: not the leader, not started, or finished.
-    No,
+    Idle,
     /// Prediction of the chain's solution from the mission.
     Predicting(Planner),
     /// Solution of the chain by the joint method; all relays compute it, not only the leader.
@@ -380,8 +380,8 @@ impl Rounds {
 }
 
 impl LeaderTask {
-    pub(crate) fn rest(&mut self) {
-        *self = Self::No;
+    pub(crate) fn clear(&mut self) {
+        *self = Self::Idle;
     }
 
     pub(crate) fn predict(&mut self, planner: Planner) {
@@ -415,7 +415,7 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Computation {
     /// Continues the leader's computation; returns true if the next pass can start.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
-        if self.has_to_tell(context) || self.gathers(context) {
+        if self.must_distribute(context) || self.must_gather(context) {
             return Ok(true);
         }
         if self.is_solving(context) {
@@ -427,7 +427,7 @@ impl Computation {
         }
         let (mission, profile) = (context.mission(), self.profile);
         match &mut self.task {
-            LeaderTask::No => {
+            LeaderTask::Idle => {
                 self.begin_task(context)?;
                 Ok(false)
             }
@@ -489,7 +489,7 @@ impl Computation {
     }
 
     /// Starts the search at the configured cross-sections, because the joint method's are infeasible.
-    pub(super) fn search_given(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
+    pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
 
@@ -513,10 +513,10 @@ impl Computation {
     /// Starts the pass that the leader has planned.
     pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
-        if self.has_to_tell(context) {
+        if self.must_distribute(context) {
             return self.begin_sense(context);
         }
-        if self.gathers(context) {
+        if self.must_gather(context) {
             self.begin();
             return self.begin_gathering(context);
         }
@@ -534,7 +534,7 @@ impl Computation {
                     place: Placement::default(),
                     apart_m: 0.0,
                 };
-                self.take_turn(context, Turning::new(turn, sir, tx, mission.tx_gain()))
+                self.take_turn(context, TurnPass::new(turn, sir, tx, mission.tx_gain()))
             }
             _ => Action::Work,
         }

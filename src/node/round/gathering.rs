@@ -6,7 +6,7 @@
 //! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
 
 use super::computation::{ChainSolver, LeaderTask};
-use super::computation::{Chosen, Computation, PassKind};
+use super::computation::{Computation, JointPlace, PassKind};
 use super::state::Action;
 use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
@@ -25,18 +25,18 @@ impl Computation {
     }
 
     /// Returns true if this relay's profile differs from the mission's common one.
-    pub(super) fn differs(&self, context: &Context<'_>) -> bool {
+    pub(super) fn has_own_profile(&self, context: &Context<'_>) -> bool {
         self.seat(context) != Seat::common(context.mission())
     }
 
     /// Returns true at a leader whose next pass collects profiles: some differ, and not all are known.
-    pub(super) fn gathers(&self, context: &Context<'_>) -> bool {
-        let told = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.own);
+    pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
+        let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
         leads
             && context.joins()
             && match self.seats.known {
-                None => told || self.differs(context),
+                None => told || self.has_own_profile(context),
                 Some(known) => known < context.mission().relays(),
             }
     }
@@ -64,7 +64,7 @@ impl Computation {
             // This relay missed the pass with the earlier profiles.
             return Action::Foreign;
         }
-        self.state.take(roster.number);
+        self.state.accept(roster.number);
         self.gather(context, roster.after, roster.seats.clone())
     }
 
@@ -75,7 +75,7 @@ impl Computation {
             self.seats = Seats::UNKNOWN;
             self.seats.known = Some(0);
         }
-        if index > after && self.differs(context) {
+        if index > after && self.has_own_profile(context) {
             let holds = context.settings().hold_altitude;
             // If the roster is full, the next pass continues with this relay.
             _ = seats.push(OwnSeat {
@@ -86,7 +86,7 @@ impl Computation {
         }
         self.pass = PassKind::Gather(Roster {
             number: self.state.number(),
-            mission: context.digest(),
+            view_digest: context.digest(),
             after,
             seats,
         });
@@ -101,7 +101,7 @@ impl Computation {
     pub(crate) fn on_gathered(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let relays = context.mission().relays();
         if let PassKind::Gather(known) = &mut self.pass
-            && self.state.awaits(roster.number)
+            && self.state.is_awaited(roster.number)
             && roster.after == known.after
             && roster.seats.starts_with(&known.seats)
             && roster.seats.last().is_none_or(|seat| seat.index <= relays)
@@ -117,9 +117,9 @@ impl Computation {
             return Action::Stale;
         };
         self.state.answer();
-        if self.seats.take(roster, context.mission().relays()) {
+        if self.seats.adopt(roster, context.mission().relays()) {
             // The chain has to be solved again with the complete profiles.
-            self.task.rest();
+            self.task.clear();
             self.chosen = None;
         }
         if context.index() == context.mission().leader() {
@@ -166,7 +166,7 @@ impl Seats {
     }
 
     /// Stores the result of a pass along `relays`; returns true if all profiles are known.
-    pub(super) fn take(&mut self, roster: &Roster, relays: u16) -> bool {
+    pub(super) fn adopt(&mut self, roster: &Roster, relays: u16) -> bool {
         for seat in &roster.seats {
             let at = usize::from(seat.index).wrapping_sub(1);
             if let Some(own) = self.own.get_mut(at) {
@@ -187,7 +187,7 @@ impl Computation {
     }
 
     /// Continues the joint solution while nothing else is to be done.
-    pub(super) fn think(&mut self, context: &Context<'_>) -> Action {
+    pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
             return Action::Think;
@@ -215,7 +215,7 @@ impl Computation {
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
         if !matches!(self.task, LeaderTask::Solving(_)) && !self.begin_solving(mission) {
-            self.choose_given(context);
+            self.choose_configured(context);
             return Some(0.0);
         }
         let LeaderTask::Solving(chain) = &mut self.task else {
@@ -232,13 +232,13 @@ impl Computation {
             let (at, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
             // The solver used the common profile, if this relay's own has not been collected yet.
             let at = self.seat(context).room.nearest(at);
-            self.chosen = Some(Chosen { at, end_m, plain });
+            self.chosen = Some(JointPlace { at, end_m, plain });
             target
         } else {
-            self.choose_given(context);
+            self.choose_configured(context);
             0.0
         };
-        self.task.rest();
+        self.task.clear();
         Some(target)
     }
 
@@ -252,8 +252,8 @@ impl Computation {
         true
     }
 
-    fn choose_given(&mut self, context: &Context<'_>) {
-        self.chosen = Some(Chosen {
+    fn choose_configured(&mut self, context: &Context<'_>) {
+        self.chosen = Some(JointPlace {
             at: self.seat(context).room.nearest(self.profile.on_line().at),
             end_m: context.mission().end_for(context.index(), 0.0),
             plain: true,

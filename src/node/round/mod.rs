@@ -24,7 +24,7 @@ mod tests;
 mod turn;
 
 use super::circulation::{Circulation, Path, Reply};
-use super::context::{Context, Effects, Member, News, Peer};
+use super::context::{Context, Effects, LayerEvent, Member, Peer};
 use super::context::{PAUSE, earliest};
 use super::sample::{Meter, Sample};
 use crate::mission::Profile;
@@ -69,7 +69,7 @@ impl Round {
             self.circulation.started_at(),
             self.circulation.completed_at(),
         );
-        let found = computation.sensing.found();
+        let found = computation.sensing.findings();
         let next = match message {
             Message::Sweep(sweep) => computation.on_sweep(context, sweep),
             Message::Verdict(answer) => computation.on_verdict(context, answer),
@@ -79,7 +79,7 @@ impl Round {
             Message::Sensed(hearing) if SENSING => computation.on_sensed(context, hearing),
             Message::Token(token) if ADJUST => computation.on_token(context, token),
             Message::Moved(moved) if ADJUST => computation.on_moved(context, moved),
-            Message::Busy { sweep } => {
+            Message::Busy { number: sweep } => {
                 if computation.phase() == Phase::Waiting && *sweep == computation.number() {
                     let path = self.path(context);
                     self.circulation.on_in_progress(context.now, path);
@@ -106,9 +106,9 @@ impl Round {
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
-        let found = self.computation.sensing.found();
+        let found = self.computation.sensing.findings();
         let next = if SENSING
-            && self.computation.sensing.take_due(context.now)
+            && self.computation.sensing.poll_due(context.now)
             && self.computation.may_sense(context)
         {
             self.computation.begin_sense(context)
@@ -134,8 +134,8 @@ impl Round {
         if !SENSING {
             return effects;
         }
-        self.computation.plan_to_sense(context);
-        let found = self.computation.sensing.found();
+        self.computation.schedule_sensing(context);
+        let found = self.computation.sensing.findings();
         Effects {
             sensed: found.since(&before, context.member),
             ..effects
@@ -175,7 +175,7 @@ impl Round {
                     self.work_soon(context.now);
                 }
                 if agreed {
-                    Effects::of(News::Converged)
+                    Effects::of(LayerEvent::Converged)
                 } else {
                     Effects::NONE
                 }
@@ -186,7 +186,7 @@ impl Round {
             }
             Action::Infeasible => {
                 self.circulation.close();
-                Effects::of(News::Infeasible)
+                Effects::of(LayerEvent::Infeasible)
             }
         }
     }
@@ -196,9 +196,9 @@ impl Round {
         if sample.is_heard() {
             return SENSING
                 && member.settings.listen.is_some()
-                && self.computation.sensing.take(now, member, sample);
+                && self.computation.sensing.add_sample(now, member, sample);
         }
-        let at = self.computation.setpoint.filter(|_| member.index == 1);
+        let at = self.computation.agreed_place.filter(|_| member.index == 1);
         self.computation.meter.take(&member.mission, at, sample)
     }
 
@@ -227,14 +227,14 @@ impl Round {
         }
     }
 
-    /// Loads another mission, in which this relay has `profile`. The setpoint stays.
+    /// Loads another mission, in which this relay has `profile`. The agreed position stays.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.computation.load(profile);
     }
 
     /// Discards the agreed position until the next agreement.
-    pub(crate) const fn discard_place(&mut self) {
-        self.computation.discard_place();
+    pub(crate) const fn discard_agreed_place(&mut self) {
+        self.computation.discard_agreed_place();
     }
 
     /// Schedules an outstanding pass once more: the next relay can be reached again.
@@ -243,7 +243,7 @@ impl Round {
     }
 
     /// Returns the pending pass and starts its retransmission timer. `None` if the next relay is not `reachable`.
-    pub(crate) fn take_onward(
+    pub(crate) fn poll_onward(
         &mut self,
         context: &Context<'_>,
         reachable: bool,
@@ -256,11 +256,11 @@ impl Round {
     }
 
     /// Returns the pending reply and marks it as sent; `None` if the previous relay is not `reachable`.
-    pub(crate) fn take_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
+    pub(crate) fn poll_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),
             Reply::InProgress => Some(Message::Busy {
-                sweep: self.computation.number(),
+                number: self.computation.number(),
             }),
         }
     }
@@ -295,8 +295,8 @@ impl Round {
     }
 
     /// Returns the agreed position, before the guard limits it.
-    pub(crate) const fn setpoint(&self) -> Option<Placement> {
-        self.computation.setpoint
+    pub(crate) const fn agreed_place(&self) -> Option<Placement> {
+        self.computation.agreed_place
     }
 
     pub(crate) const fn meter(&self) -> &Meter {

@@ -42,50 +42,53 @@ const SILENT: u8 = 8;
 
 impl Computation {
     /// Returns true if the relays estimate the interference by measurements.
-    pub(super) fn senses(context: &Context<'_>) -> bool {
+    pub(super) fn is_sensing_enabled(context: &Context<'_>) -> bool {
         SENSING && context.settings().listen.is_some() && context.mission().field().is_none()
     }
 
     /// Returns true if the leader must distribute its estimate before any other pass.
-    pub(super) fn has_to_tell(&self, context: &Context<'_>) -> bool {
-        Self::senses(context)
+    pub(super) fn must_distribute(&self, context: &Context<'_>) -> bool {
+        Self::is_sensing_enabled(context)
             && context.leads()
-            && self.sensing.ear().is_some_and(|ear| !ear.has_told)
+            && self
+                .sensing
+                .sensor()
+                .is_some_and(|sensor| !sensor.is_distributed)
     }
 
     /// Returns true at a leader that may start a sensing pass: no other pass is due.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
-        Self::senses(context) && context.leads() && settled
+        Self::is_sensing_enabled(context) && context.leads() && settled
     }
 
     /// Starts the timer of the next sensing pass, if one may follow.
-    pub(super) fn plan_to_sense(&mut self, context: &Context<'_>) {
+    pub(super) fn schedule_sensing(&mut self, context: &Context<'_>) {
         if let Some(listen) = context.settings().listen
             && self.may_sense(context)
-            && let Some(ear) = self.sensing.ear_mut()
-            && ear.at.is_none()
+            && let Some(sensor) = self.sensing.sensor_mut()
+            && sensor.at.is_none()
         {
-            ear.at = Some(context.now + listen.every.times(ear.wait));
+            sensor.at = Some(context.now + listen.every.times(sensor.wait));
         }
     }
 
     /// Starts a sensing pass at the leader.
     pub(super) fn begin_sense(&mut self, context: &Context<'_>) -> Action {
-        let Some(ear) = self.sensing.ear_mut() else {
+        let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Nothing;
         };
-        let has_told = core::mem::replace(&mut ear.has_told, true);
-        let left_out = ear.trial.left_out();
-        let holds = has_told && self.state.phase() == Phase::Holding;
+        let is_distributed = core::mem::replace(&mut sensor.is_distributed, true);
+        let left_out = sensor.trial.left_out();
+        let holds = is_distributed && self.state.phase() == Phase::Holding;
         self.begin();
         let hearing = Heard {
             number: self.state.number(),
-            mission: context.digest(),
-            told: self.sensing.told(),
+            view_digest: context.digest(),
+            estimate: self.sensing.estimate(),
             sums: Sums::NONE,
             receiver: Level::default(),
-            off: if holds { left_out } else { 0 },
+            excluded: if holds { left_out } else { 0 },
         };
         self.sense(context, hearing, holds)
     }
@@ -93,48 +96,50 @@ impl Computation {
     /// Handles a sensing pass from the previous relay.
     pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         let same = matches!(&self.pass, PassKind::Sense(known)
-            if known.hearing.told == hearing.told && known.from == hearing.sums);
+            if known.hearing.estimate == hearing.estimate && known.from == hearing.sums);
         let arrival = self.state.arrival(hearing.number, same);
         if let Some(next) = arrival.refused() {
             return next;
         }
-        if !Self::senses(context) {
+        if !Self::is_sensing_enabled(context) {
             return Action::Stale;
         }
-        let holds = self.state.phase() == Phase::Holding && hearing.told == self.sensing.told();
-        self.state.take(hearing.number);
+        let holds =
+            self.state.phase() == Phase::Holding && hearing.estimate == self.sensing.estimate();
+        self.state.accept(hearing.number);
         self.sense(context, *hearing, holds)
     }
 
     fn sense(&mut self, context: &Context<'_>, hearing: Heard, holds: bool) -> Action {
-        let Some(ear) = self.sensing.ear_mut() else {
+        let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Stale;
         };
-        if hearing.told != ear.told || !holds {
+        if hearing.estimate != sensor.told || !holds {
             // Another estimate means other positions.
-            ear.told = hearing.told;
-            self.task.rest();
+            sensor.told = hearing.estimate;
+            self.task.clear();
             self.chosen = None;
         }
         let mission = context.mission();
         // The second exclusion in a row is final.
-        let twice = hearing.off == ear.left_out;
-        ear.named = if twice { hearing.off } else { 0 };
-        ear.left_out = hearing.off;
-        let is_out = hearing.off == context.member.node;
-        ear.off |= twice && is_out;
-        let own = if ear.off || is_out {
+        let twice = hearing.excluded == sensor.left_out;
+        sensor.named = if twice { hearing.excluded } else { 0 };
+        sensor.left_out = hearing.excluded;
+        let is_out = hearing.excluded == context.member.node;
+        sensor.off |= twice && is_out;
+        let own = if sensor.off || is_out {
             Sums::NONE
         } else {
             let distance_m = mission.config().distance_m;
-            ear.listener
+            sensor
+                .listener
                 .sums(context.now, distance_m, expected_at(mission))
         };
         let from = hearing.sums;
         let mut hearing = hearing;
         hearing.sums.merge(&own);
         if context.is_last() {
-            hearing.receiver = ear.level(&ear.receiver, context.now);
+            hearing.receiver = sensor.level(&sensor.receiver, context.now);
         }
         self.pass = PassKind::Sense(Sense {
             hearing,
@@ -154,15 +159,15 @@ impl Computation {
 
     /// Handles the result of a sensing pass from the next relay.
     pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
-        if let (PassKind::Sense(known), Some(ear)) = (&mut self.pass, self.sensing.ear_mut())
-            && self.state.awaits(hearing.number)
-            && hearing.told == known.hearing.told
+        if let (PassKind::Sense(known), Some(sensor)) = (&mut self.pass, self.sensing.sensor_mut())
+            && self.state.is_awaited(hearing.number)
+            && hearing.estimate == known.hearing.estimate
         {
             known.hearing.sums = hearing.sums;
             known.hearing.receiver = hearing.receiver;
-            if hearing.off != known.hearing.off {
-                known.hearing.off = hearing.off;
-                ear.named = hearing.off;
+            if hearing.excluded != known.hearing.excluded {
+                known.hearing.excluded = hearing.excluded;
+                sensor.named = hearing.excluded;
             }
             return self.conclude_sense(context);
         }
@@ -170,26 +175,26 @@ impl Computation {
     }
 
     fn conclude_sense(&mut self, context: &Context<'_>) -> Action {
-        self.doubt(context);
+        self.check_receiver(context);
         let PassKind::Sense(Sense { hearing, holds, .. }) = self.pass else {
             return Action::Stale;
         };
         if holds {
-            self.state.hold();
+            self.state.settle();
         } else {
             self.state.answer();
         }
         if !context.leads() {
             return Action::Answer { agreed: false };
         }
-        if holds && self.tries(context, &hearing) {
+        if holds && self.continue_trial(context, &hearing) {
             return Action::Settled;
         }
-        if holds && !self.reconsiders(context, &hearing) {
-            if let Some(ear) = self.sensing.ear_mut() {
-                ear.kept = (ear.kept + 1) % PATIENCE;
-                if ear.kept == 0 {
-                    ear.wait = (2 * ear.wait).min(RAREST);
+        if holds && !self.review_estimate(context, &hearing) {
+            if let Some(sensor) = self.sensing.sensor_mut() {
+                sensor.kept = (sensor.kept + 1) % PATIENCE;
+                if sensor.kept == 0 {
+                    sensor.wait = (2 * sensor.wait).min(RAREST);
                 }
             }
             return Action::Settled;
@@ -199,63 +204,65 @@ impl Computation {
     }
 
     /// Continues the search for a faulty relay with a pass; returns true if the pass has no other use.
-    fn tries(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
-        let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
+    fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
+        let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
+        else {
             return false;
         };
         let (relays, nodes) = (context.mission().relays(), context.member.all);
-        let next = ear
+        let next = sensor
             .trial
-            .take(&hearing.sums, listen.relative_error, relays, nodes);
-        ear.contradicted = next == Next::Unknown;
+            .update(&hearing.sums, listen.relative_error, relays, nodes);
+        sensor.contradicted = next == Next::Unknown;
         if next == Next::Again {
             let pause = Duration::from_micros(listen.every.as_micros() / TRIALS_A_PERIOD);
-            ear.at = Some(context.now + PAUSE.max(pause));
+            sensor.at = Some(context.now + PAUSE.max(pause));
         }
         next == Next::Again
     }
 
     /// Reviews the estimate with the result of a pass; returns true if it has changed.
-    fn reconsiders(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
-        let (Some(listen), Some(ear)) = (context.settings().listen, self.sensing.ear_mut()) else {
+    fn review_estimate(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
+        let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
+        else {
             return false;
         };
         let levels = Levels {
-            transmitter: ear.level(&ear.transmitter, context.now),
+            transmitter: sensor.level(&sensor.transmitter, context.now),
             receiver: hearing.receiver,
-            off: ear.ends,
+            off: sensor.ends,
         };
         let review = review(
             context.mission(),
-            &ear.told.belief,
+            &sensor.told.belief,
             &hearing.sums,
             &levels,
             &listen,
-            ear.known,
+            sensor.known,
             context.now,
         );
-        ear.unfit = match review.unfit {
-            None if ear.contradicted => Some(Unfit::Contradiction),
+        sensor.unfit = match review.unfit {
+            None if sensor.contradicted => Some(Unfit::Contradiction),
             unfit => unfit,
         };
-        ear.ends = review.ends;
-        ear.known = review.known;
+        sensor.ends = review.ends;
+        sensor.known = review.known;
         let Some(belief) = review.adopt else {
             return false;
         };
-        ear.told = Told {
-            number: ear.told.number.wrapping_add(1),
+        sensor.told = Told {
+            number: sensor.told.number.wrapping_add(1),
             belief,
         };
-        ear.has_told = false;
-        ear.kept = 0;
-        ear.wait = match belief {
+        sensor.is_distributed = false;
+        sensor.kept = 0;
+        sensor.wait = match belief {
             // All three spreads have failed; relays that learn nothing shall move less and less often.
-            Belief::Unknown(Spread::Even) => (2 * ear.wait).min(RAREST),
-            Belief::Unknown(_) => ear.wait,
+            Belief::Unknown(Spread::Even) => (2 * sensor.wait).min(RAREST),
+            Belief::Unknown(_) => sensor.wait,
             _ => 1,
         };
-        self.task.rest();
+        self.task.clear();
         self.chosen = None;
         true
     }
@@ -264,10 +271,10 @@ impl Computation {
     ///
     /// A relay that is excluded checks if it fits again. One whose measurement is absurd excludes itself; one that measures
     /// nothing where the others measure much reports itself.
-    fn doubt(&mut self, context: &Context<'_>) {
-        let (Some(listen), Some(ear), PassKind::Sense(sense)) = (
+    fn check_receiver(&mut self, context: &Context<'_>) {
+        let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,
-            self.sensing.ear_mut(),
+            self.sensing.sensor_mut(),
             &mut self.pass,
         ) else {
             return;
@@ -276,20 +283,20 @@ impl Computation {
         let distance_m = mission.config().distance_m;
         let mut others = sense.from;
         others.merge(&sense.hearing.sums);
-        let place = ear.listener.place(distance_m);
+        let place = sensor.listener.place(distance_m);
         let expected = place.and_then(|place| expected_at(mission)(&place.terms));
         let error = listen.relative_error;
-        if ear.off {
+        if sensor.off {
             // Measurements at earlier positions may be faulty too.
-            ear.listener.forget_past();
-            ear.off = place.is_some_and(|place| is_off(&others, &place, expected, error));
+            sensor.listener.forget_past();
+            sensor.off = place.is_some_and(|place| is_off(&others, &place, expected, error));
         } else if place.is_some_and(|place| is_absurd(&others, &place, expected, error)) {
-            ear.off = true;
-            ear.named = context.member.node;
-            sense.hearing.off = context.member.node;
+            sensor.off = true;
+            sensor.named = context.member.node;
+            sense.hearing.excluded = context.member.node;
             return;
-        } else if ear.silent >= SILENT {
-            let there = terms(distance_m, ear.silent_at);
+        } else if sensor.silent >= SILENT {
+            let there = terms(distance_m, sensor.silent_at);
             if place.is_none()
                 && is_deaf(
                     &others,
@@ -298,7 +305,7 @@ impl Computation {
                     listen.relative_error,
                 )
             {
-                ear.deaf = true;
+                sensor.deaf = true;
             }
         }
         sense.hearing.sums.merge(&sense.own);
@@ -313,12 +320,12 @@ const FARTHEST: f32 = 100.0;
 
 /// Sensing state of a relay; empty without the feature `sensing`.
 #[derive(Clone, Debug)]
-pub(crate) struct Sensing([Ear; SENSING as usize]);
+pub(crate) struct Sensing([SensorState; SENSING as usize]);
 
 /// Measurements of a relay, its interference estimate, and its knowledge of faulty receivers.
 #[expect(clippy::struct_excessive_bools, reason = "each for itself")]
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ear {
+pub(super) struct SensorState {
     pub(super) listener: Listener,
     pub(super) told: Told,
     /// Levels that the ground transmitter and receiver have reported to this relay.
@@ -342,7 +349,7 @@ pub(super) struct Ear {
     pub(super) silent: u8,
     pub(super) silent_at: Placement,
     /// Leader only: true if the relays of the view have received the estimate.
-    pub(super) has_told: bool,
+    pub(super) is_distributed: bool,
     /// Information at the time at which the estimate was adopted.
     pub(super) known: Knowledge,
     /// Reason why the last sums gave no estimate.
@@ -365,7 +372,7 @@ impl Sensing {
             Some(listen) => listen.half_life,
             None => Duration::from_micros(0),
         };
-        let ear = Ear {
+        let sensor = SensorState {
             listener: Listener::new(half_life, now),
             told: AS_LOADED,
             transmitter: Average::NONE,
@@ -379,101 +386,101 @@ impl Sensing {
             deaf: false,
             silent: 0,
             silent_at: Placement::on_line(0.0, 0.0),
-            has_told: false,
+            is_distributed: false,
             known: Knowledge::NOTHING,
             unfit: None,
             wait: 1,
             kept: 0,
             at: None,
         };
-        Self([ear; SENSING as usize])
+        Self([sensor; SENSING as usize])
     }
 
-    pub(super) const fn ear(&self) -> Option<&Ear> {
-        let ears: &[Ear] = &self.0;
-        ears.first()
+    pub(super) const fn sensor(&self) -> Option<&SensorState> {
+        let sensors: &[SensorState] = &self.0;
+        sensors.first()
     }
 
-    pub(super) const fn ear_mut(&mut self) -> Option<&mut Ear> {
-        let ears: &mut [Ear] = &mut self.0;
-        ears.first_mut()
+    pub(super) const fn sensor_mut(&mut self) -> Option<&mut SensorState> {
+        let sensors: &mut [SensorState] = &mut self.0;
+        sensors.first_mut()
     }
 
     /// Starts a new view: the leader distributes its estimate before the first agreement.
     pub(super) const fn renew(&mut self) {
-        if let Some(ear) = self.ear_mut() {
-            ear.has_told = false;
-            ear.at = None;
-            ear.trial = Trial::NONE;
+        if let Some(sensor) = self.sensor_mut() {
+            sensor.is_distributed = false;
+            sensor.at = None;
+            sensor.trial = Trial::NONE;
         }
     }
 
     /// Loads another mission, and uses its interference.
     pub(super) const fn load(&mut self) {
-        if let Some(ear) = self.ear_mut() {
-            ear.told.belief = Belief::Mission;
-            ear.told.number = ear.told.number.wrapping_add(1);
+        if let Some(sensor) = self.sensor_mut() {
+            sensor.told.belief = Belief::Mission;
+            sensor.told.number = sensor.told.number.wrapping_add(1);
             // Its ground ends may be at other places.
-            ear.transmitter = Average::NONE;
-            ear.receiver = Average::NONE;
-            ear.known = Knowledge::NOTHING;
-            ear.ends = EndsOff::NONE;
-            ear.wait = 1;
+            sensor.transmitter = Average::NONE;
+            sensor.receiver = Average::NONE;
+            sensor.known = Knowledge::NOTHING;
+            sensor.ends = EndsOff::NONE;
+            sensor.wait = 1;
         }
     }
 
     pub(super) fn next_timeout(&self) -> Option<Instant> {
-        self.ear()?.at
+        self.sensor()?.at
     }
 
     /// Returns true once when the timer has expired.
-    pub(super) fn take_due(&mut self, now: Instant) -> bool {
-        self.ear_mut()
-            .is_some_and(|ear| ear.at.take_if(|at| *at <= now).is_some())
+    pub(super) fn poll_due(&mut self, now: Instant) -> bool {
+        self.sensor_mut()
+            .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
     }
 
-    pub(crate) const fn told(&self) -> Told {
-        match self.ear() {
-            Some(ear) => ear.told,
+    pub(crate) const fn estimate(&self) -> Told {
+        match self.sensor() {
+            Some(sensor) => sensor.told,
             None => AS_LOADED,
         }
     }
 
     /// Returns the reason why the last sums gave no estimate; leader only.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
-        match self.ear() {
-            Some(ear) => ear.unfit,
+        match self.sensor() {
+            Some(sensor) => sensor.unfit,
             None => None,
         }
     }
 
     /// Returns the level that the ground end at `side` has reported, W; `None` without a report.
     pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
-        let ear = self.ear()?;
+        let sensor = self.sensor()?;
         let level_w = match side {
-            Side::Upstream => ear.transmitter.mean,
-            Side::Downstream => ear.receiver.mean,
+            Side::Upstream => sensor.transmitter.mean,
+            Side::Downstream => sensor.receiver.mean,
         };
         (level_w > 0.0).then_some(level_w)
     }
 
-    pub(super) fn found(&self) -> Findings {
+    pub(super) fn findings(&self) -> Findings {
         Findings {
-            told: self.told(),
+            told: self.estimate(),
             unfit: self.unfit(),
-            off: self.ear().map_or(0, |ear| ear.named),
-            ends: self.ear().map_or(EndsOff::NONE, |ear| ear.ends),
-            deaf: self.ear().is_some_and(|ear| ear.deaf),
+            off: self.sensor().map_or(0, |sensor| sensor.named),
+            ends: self.sensor().map_or(EndsOff::NONE, |sensor| sensor.ends),
+            deaf: self.sensor().is_some_and(|sensor| sensor.deaf),
         }
     }
 
-    pub(super) fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
-        self.ear_mut()
-            .is_some_and(|ear| ear.take(now, member, sample))
+    pub(super) fn add_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+        self.sensor_mut()
+            .is_some_and(|sensor| sensor.add_sample(now, member, sample))
     }
 }
 
-impl Ear {
+impl SensorState {
     /// Returns the level of a ground end from its `average`, with its weight faded to `now`.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
@@ -483,7 +490,7 @@ impl Ear {
         }
     }
 
-    fn take(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+    fn add_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         let noise_w = member.mission.config().noise_w;
         // Subtracts the receiver's noise; `None` if the rest is out of range.
         let heard = |power_w: f32| {
@@ -504,7 +511,7 @@ impl Ear {
                 let distance_m = member.mission.config().distance_m;
                 let expected = expected_at(&member.mission);
                 self.listener
-                    .take(now, distance_m, at, heard_w / UNIT_W, expected);
+                    .add(now, distance_m, at, heard_w / UNIT_W, expected);
                 true
             }
             Sample::Transmitter { power_w } => {
@@ -553,7 +560,7 @@ impl Findings {
             (self.ends.transmitter && !before.ends.transmitter).then_some(0)
         };
         Sensed {
-            believes: self.told != before.told,
+            new_estimate: self.told != before.told,
             unclear: self.unfit.is_some() && self.unfit != before.unfit,
             off,
         }
@@ -568,7 +575,7 @@ fn take_level(
     heard_w: Option<f32>,
 ) -> bool {
     if let Some(heard_w) = heard_w {
-        average.take(now, half_life, heard_w);
+        average.add(now, half_life, heard_w);
     }
     heard_w.is_some()
 }

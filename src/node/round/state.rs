@@ -7,16 +7,16 @@
 //! | --- | --- | --- | --- | --- |
 //! | `Idle` | compute, forward; `Waiting` | - | ignore as stale | - |
 //! | `Planning` (leader) | - | - | ignore as stale | compute; then start a pass; `Waiting` |
-//! | `Waiting` | compute, forward | reply that it is in progress | agreement: set the setpoint, reply; `Holding`. Else reply; `Answered` | continue, then forward |
+//! | `Waiting` | compute, forward | reply that it is in progress | agreement: set the agreed position, reply; `Holding`. Else reply; `Answered` | continue, then forward |
 //! | `Answered` | compute, forward; `Waiting` | reply again | ignore as stale | leader: start a pass; `Waiting` |
 //! | `Holding` | compute, forward; `Waiting` | reply again | ignore as stale | - |
 //! | `Infeasible` (leader) | - | - | ignore as stale | - |
 //!
 //! The last relay is `Waiting` only while it computes its own part. The leader has no previous relay to reply to, and without an
 //! agreement it has work to do. A pass with a number just below the current one is stale in every phase. Only an agreement or a
-//! turn of Algorithm 2 changes the setpoint. In `Holding` and `Infeasible` the leader may still start a sensing pass.
+//! turn of Algorithm 2 changes the agreed position. In `Holding` and `Infeasible` the leader may still start a sensing pass.
 
-use crate::node::circulation::Stragglers;
+use crate::node::circulation::LateMessages;
 
 /// State of a relay in the protocol.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -102,7 +102,7 @@ pub(crate) struct RoundState {
     number: u16,
     /// True once a pass was started or received in this view, or since the start.
     begun: bool,
-    stragglers: Stragglers,
+    late_messages: LateMessages,
 }
 
 impl RoundState {
@@ -111,7 +111,7 @@ impl RoundState {
             phase,
             number,
             begun: false,
-            stragglers: Stragglers::NONE,
+            late_messages: LateMessages::NONE,
         }
     }
 
@@ -136,7 +136,7 @@ impl RoundState {
         self.phase = Phase::Answered;
     }
 
-    pub(crate) const fn hold(&mut self) {
+    pub(crate) const fn settle(&mut self) {
         self.phase = Phase::Holding;
     }
 
@@ -151,7 +151,7 @@ impl RoundState {
             self.answer();
         }
         self.begun = false;
-        self.stragglers = Stragglers::NONE;
+        self.late_messages = LateMessages::NONE;
     }
 
     /// Increments the number for a new pass of the leader.
@@ -174,10 +174,10 @@ impl RoundState {
     }
 
     /// Accepts a new pass with `number`.
-    pub(crate) const fn take(&mut self, number: u16) {
+    pub(crate) const fn accept(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
-        self.stragglers = Stragglers::NONE;
+        self.late_messages = LateMessages::NONE;
     }
 
     /// Classifies a pass with `number`; `same` is true if its content equals that of the current pass.
@@ -201,7 +201,7 @@ impl RoundState {
 
     /// Counts a late pass; too many in a row are foreign.
     const fn straggler(&mut self) -> Arrival {
-        if self.stragglers.one_more() {
+        if self.late_messages.count_one() {
             Arrival::Foreign
         } else {
             Arrival::Straggler
@@ -209,7 +209,7 @@ impl RoundState {
     }
 
     /// Returns true if the result of pass `number` is outstanding.
-    pub(crate) fn awaits(self, number: u16) -> bool {
+    pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
 
@@ -238,7 +238,7 @@ mod tests {
     /// Returns a state after pass 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
-        state.take(200);
+        state.accept(200);
         state
     }
 
@@ -274,7 +274,7 @@ mod tests {
                     Arrival::Foreign
                 };
                 let mut state = begun();
-                state.take(last);
+                state.accept(last);
                 assert_eq!(
                     state.arrival(number, false),
                     expected,

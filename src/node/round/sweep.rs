@@ -20,10 +20,10 @@ impl Computation {
             measured_per_w: sweep.measured_per_w,
         };
         let print = fingerprint(Some(behind), &sweep.reaches);
-        let same = matches!(&self.pass, PassKind::Sweep(sweeping)
-            if sweeping.ladder == sweep.ladder
-                && sweeping.chosen == sweep.chosen
-                && sweeping.fingerprint == print);
+        let same = matches!(&self.pass, PassKind::Sweep(sweep_pass)
+            if sweep_pass.ladder == sweep.ladder
+                && sweep_pass.chosen == sweep.chosen
+                && sweep_pass.fingerprint == print);
         let arrival = self.state.arrival(sweep.number, same);
         if let Some(next) = arrival.refused() {
             return next;
@@ -35,7 +35,7 @@ impl Computation {
             // This relay missed the pass with the profiles.
             return Action::Foreign;
         }
-        self.state.take(sweep.number);
+        self.state.accept(sweep.number);
         self.sweep_on(
             context,
             sweep.ladder,
@@ -55,30 +55,30 @@ impl Computation {
         from: &PerTarget,
     ) -> Action {
         if !matches!(self.pass, PassKind::Sweep(_)) {
-            self.pass = PassKind::Sweep(Sweeping::new(ladder));
+            self.pass = PassKind::Sweep(SweepPass::new(ladder));
         }
-        let PassKind::Sweep(sweeping) = &mut self.pass else {
+        let PassKind::Sweep(sweep_pass) = &mut self.pass else {
             return Action::Stale;
         };
-        sweeping.ladder = ladder;
-        sweeping.chosen = chosen;
-        sweeping.begin(behind, from);
+        sweep_pass.ladder = ladder;
+        sweep_pass.chosen = chosen;
+        sweep_pass.begin(behind, from);
         self.state.wait();
-        self.go_on_with_sweep(context)
+        self.continue_sweep(context)
     }
 
     /// Continues this relay's part in a sweep by one portion.
-    pub(super) fn go_on_with_sweep(&mut self, context: &Context<'_>) -> Action {
-        let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
+    pub(super) fn continue_sweep(&mut self, context: &Context<'_>) -> Action {
+        let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
             // The relay first needs its joint solution.
             return Action::Work;
         }
         let link = self.link(context, is_chosen);
-        let PassKind::Sweep(sweeping) = &mut self.pass else {
+        let PassKind::Sweep(sweep_pass) = &mut self.pass else {
             return Action::Stale;
         };
-        if !sweeping.go_on(link) {
+        if !sweep_pass.advance(link) {
             return Action::Work;
         }
         if context.is_last() {
@@ -90,31 +90,31 @@ impl Computation {
 
     /// Handles a verdict from the next relay.
     pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &Answer) -> Action {
-        let is_chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
+        let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         let link = self.link(context, is_chosen);
-        if let PassKind::Sweep(sweeping) = &mut self.pass
-            && self.state.awaits(answer.number)
-            && sweeping.take(link, answer)
+        if let PassKind::Sweep(sweep_pass) = &mut self.pass
+            && self.state.is_awaited(answer.number)
+            && sweep_pass.apply_verdict(link, answer)
         {
             return self.conclude_sweep(context);
         }
         Action::Stale
     }
 
-    /// Handles the known verdict: sets the setpoint if a target is committed, else continues the search.
+    /// Handles the known verdict: agrees on the position of a committed target, else continues the search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
-        let PassKind::Sweep(sweeping) = &self.pass else {
+        let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
         };
-        if let Some((x_m, target)) = sweeping.agreed() {
-            let chosen = sweeping.chosen;
+        if let Some((x_m, target)) = sweep_pass.agreed() {
+            let chosen = sweep_pass.chosen;
             if let LeaderTask::Searching { search, given, .. } = &self.task {
                 // A sweep at some cross-sections is no bound for chains with other ones.
-                let most = search.most(&sweeping.verdict.slacks);
+                let most = search.most(&sweep_pass.verdict.slacks);
                 self.bound = most.filter(|_| !chosen && !given);
             }
             let at = self.station_for(chosen).at;
-            self.stand_at(at.at(x_m), at);
+            self.agree_on(at.at(x_m), at);
             self.target = Some(target);
             if let LeaderTask::Searching { search, .. } = &mut self.task
                 && !search.accept(target)
@@ -125,13 +125,13 @@ impl Computation {
             return self.agree(context);
         }
         self.state.answer();
-        if self.gathers(context) {
+        if self.must_gather(context) {
             return Action::Work;
         }
         let LeaderTask::Searching { search, .. } = &mut self.task else {
             return Action::Answer { agreed: false };
         };
-        let verdict = &sweeping.verdict;
+        let verdict = &sweep_pass.verdict;
         let next = match search.refused(context.mission(), verdict) {
             Some(target) => {
                 let most = search.most(&verdict.slacks);
@@ -140,8 +140,8 @@ impl Computation {
             None => search.advance(&verdict.slacks),
         };
         if next.is_err() {
-            let chosen = matches!(&self.pass, PassKind::Sweep(sweeping) if sweeping.chosen);
-            if !chosen || self.search_given(context).is_err() {
+            let chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
+            if !chosen || self.search_configured(context).is_err() {
                 return self.give_up();
             }
         }
@@ -150,7 +150,7 @@ impl Computation {
 
     /// Completes the agreement on a target, unless another algorithm of the leader follows.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
-        self.state.hold();
+        self.state.settle();
         if let LeaderTask::Searching { last: false, .. } = self.task {
             match context.settings().method {
                 Method::Adjust(adjust) if ADJUST => {
@@ -158,21 +158,21 @@ impl Computation {
                     self.state.answer();
                     return Action::Work;
                 }
-                Method::Joint if self.gathers(context) => {
+                Method::Joint if self.must_gather(context) => {
                     self.state.answer();
                     return Action::Work;
                 }
                 _ => {}
             }
         }
-        self.task.rest();
+        self.task.clear();
         Action::Answer { agreed: true }
     }
 }
 
 /// State of a sweep at one relay.
 #[derive(Clone, Debug)]
-pub(crate) struct Sweeping {
+pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
     /// Checksum of the received sweep, see [`fingerprint`].
     pub(crate) fingerprint: u32,
@@ -194,7 +194,7 @@ pub(crate) struct Sweeping {
     stand: Option<f32>,
 }
 
-impl Sweeping {
+impl SweepPass {
     pub(crate) const fn new(ladder: Ladder) -> Self {
         Self {
             ladder,
@@ -229,7 +229,7 @@ impl Sweeping {
     /// Computes a portion of the reaches, and at the last relay the verdict. Returns true when all are computed.
     ///
     /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
-    pub(crate) fn go_on(&mut self, link: Link<'_>) -> bool {
+    pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
         let link = self.link(link);
         let targets = self.ladder.targets();
         self.done = link.go_on(&targets, &self.from, &mut self.reaches);
@@ -244,7 +244,7 @@ impl Sweeping {
     }
 
     /// Accepts a verdict, and returns true, if its target is met and this relay can take a position for it.
-    pub(crate) fn take(&mut self, link: Link<'_>, answer: &Answer) -> bool {
+    pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &Answer) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
         let met = |target: u8| {
@@ -256,7 +256,7 @@ impl Sweeping {
         if !(self.done && fits) {
             return false;
         }
-        let stand = |(_, reach): (f32, f32)| match (answer.stand, link.mission.heading()) {
+        let stand = |(_, reach): (f32, f32)| match (answer.required_x_m, link.mission.heading()) {
             (None, _) => Some(reach),
             (Some(x_m), Heading::TowardRx) => (x_m <= reach).then_some(x_m),
             (Some(x_m), Heading::TowardTx) => (reach..=link.mission.config().distance_m)
@@ -306,7 +306,7 @@ impl Sweeping {
         Some((self.place?, self.committed()?.0))
     }
 
-    pub(crate) const fn stand(&self) -> Option<f32> {
+    pub(crate) const fn required_x_m(&self) -> Option<f32> {
         self.stand
     }
 

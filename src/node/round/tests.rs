@@ -73,7 +73,7 @@ impl Line {
 
     fn onward(&mut self, at: usize) -> Message {
         loop {
-            if let Some(message) = self.step(at, |round, context| round.take_onward(context, true))
+            if let Some(message) = self.step(at, |round, context| round.poll_onward(context, true))
             {
                 return message;
             }
@@ -82,7 +82,7 @@ impl Line {
     }
 
     fn back(&mut self, at: usize) -> Message {
-        self.step(at, |round, context| round.take_back(context, true))
+        self.step(at, |round, context| round.poll_back(context, true))
             .unwrap()
     }
 }
@@ -93,8 +93,8 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     for _ in 0..100_000 {
         for at in 0..usize::from(RELAYS) {
             line.step(at, Round::handle_timeout);
-            let onward = line.step(at, |round, context| round.take_onward(context, true));
-            let back = line.step(at, |round, context| round.take_back(context, true));
+            let onward = line.step(at, |round, context| round.poll_onward(context, true));
+            let back = line.step(at, |round, context| round.poll_back(context, true));
             for (message, to) in [(onward, at + 1), (back, at.wrapping_sub(1))] {
                 if let Some(message) = message.filter(|_| to < usize::from(RELAYS)) {
                     line.hear(to, &message);
@@ -137,11 +137,11 @@ fn a_relay_that_still_searches_hands_on_no_token() {
     });
     exchange(&mut line, |line, message| {
         let pass = &line.rounds[1].computation.pass;
-        let searches = matches!(pass, PassKind::Turn(turning) if turning.is_searching());
+        let searches = matches!(pass, PassKind::Turn(turn_pass) if turn_pass.is_searching());
         matches!(message, Message::Token(_)) && searches
     });
     line.step(1, |round, _| round.resend());
-    let message = line.step(1, |round, context| round.take_onward(context, true));
+    let message = line.step(1, |round, context| round.poll_onward(context, true));
     assert_eq!(message, None);
 }
 

@@ -18,12 +18,12 @@ use core::task::Poll;
 impl Computation {
     /// Handles the token from the previous relay.
     pub(crate) fn on_token(&mut self, context: &Context<'_>, token: &Token) -> Action {
-        let same = matches!(&self.pass, PassKind::Turn(turning) if turning.turn == token.turn);
+        let same = matches!(&self.pass, PassKind::Turn(turn_pass) if turn_pass.turn == token.turn);
         let arrival = self.state.arrival(token.number, same);
         if let Some(next) = arrival.refused() {
             return next;
         }
-        if self.setpoint.is_none() {
+        if self.agreed_place.is_none() {
             // This relay missed the agreement on positions, so it has none to report.
             return Action::Foreign;
         }
@@ -31,56 +31,56 @@ impl Computation {
             // No relay is beyond Tx or Rx.
             return Action::Stale;
         }
-        self.state.take(token.number);
+        self.state.accept(token.number);
         let before = HopEnd {
             place: token.place,
             apart_m: context.mission().config().min_separation_m,
         };
         let gain = context.mission().relay_gain(token.power_w);
-        self.take_turn(context, Turning::new(token.turn, token.sir, before, gain))
+        self.take_turn(context, TurnPass::new(token.turn, token.sir, before, gain))
     }
 
     /// Starts this relay's turn.
-    pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turning: Turning) -> Action {
+    pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turn_pass: TurnPass) -> Action {
         self.state.wait();
         let mut searching = false;
-        if let Some(at) = self.setpoint
+        if let Some(at) = self.agreed_place
             && let Some(interferer) = context.mission().interferer()
             && (context.is_last() || self.after.is_some())
         {
             let band = context.band(at.altitude_m);
-            let hops = turning.hops(
+            let hops = turn_pass.hops(
                 context.mission(),
                 interferer,
                 self.profile.power_w,
                 self.after,
             );
-            searching = turning.begin(hops, at, (band.least_m, band.most_m));
+            searching = turn_pass.begin(hops, at, (band.least_m, band.most_m));
         }
-        self.pass = PassKind::Turn(turning);
+        self.pass = PassKind::Turn(turn_pass);
         if searching {
             Action::Work
         } else {
-            self.pass_on_turn(context)
+            self.forward_turn(context)
         }
     }
 
     /// Continues the search of this relay's turn by one portion.
-    pub(super) fn go_on_with_turn(&mut self, context: &Context<'_>) -> Action {
-        let PassKind::Turn(turning) = &mut self.pass else {
+    pub(super) fn continue_turn(&mut self, context: &Context<'_>) -> Action {
+        let PassKind::Turn(turn_pass) = &mut self.pass else {
             return Action::Stale;
         };
-        match turning.step(PLACES_AT_ONCE) {
+        match turn_pass.step(PLACES_AT_ONCE) {
             Poll::Pending => Action::Work,
-            Poll::Ready(None) => self.pass_on_turn(context),
+            Poll::Ready(None) => self.forward_turn(context),
             Poll::Ready(Some(place)) => {
-                self.stand_at(place, place.cross_section());
-                self.pass_on_turn(context)
+                self.agree_on(place, place.cross_section());
+                self.forward_turn(context)
             }
         }
     }
 
-    pub(super) fn pass_on_turn(&mut self, context: &Context<'_>) -> Action {
+    pub(super) fn forward_turn(&mut self, context: &Context<'_>) -> Action {
         if !context.is_last() {
             return Action::Forward;
         }
@@ -89,49 +89,49 @@ impl Computation {
 
     /// Handles the result of a turn from the next relay.
     pub(crate) fn on_moved(&mut self, context: &Context<'_>, moved: &Moved) -> Action {
-        if let PassKind::Turn(turning) = &mut self.pass
-            && !turning.is_searching()
-            && self.state.awaits(moved.number)
+        if let PassKind::Turn(turn_pass) = &mut self.pass
+            && !turn_pass.is_searching()
+            && self.state.is_awaited(moved.number)
             && context.is_between(moved.place)
         {
-            turning.any |= moved.any;
+            turn_pass.any |= moved.any_moved;
             self.after = Some(moved.place);
-            return self.conclude_turn(context, moved.worst);
+            return self.conclude_turn(context, moved.worst_sir);
         }
         Action::Stale
     }
 
     /// Completes the current turn; `worst` is the worst SIR beyond the next hop.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
-        let (PassKind::Turn(turning), Some(at), Some(interferer)) = (
+        let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,
-            self.setpoint,
+            self.agreed_place,
             context.mission().interferer(),
         ) else {
             return Action::Stale;
         };
-        let hops = turning.hops(
+        let hops = turn_pass.hops(
             context.mission(),
             interferer,
             self.profile.power_w,
             self.after,
         );
         let (incoming, outgoing) = hops.both(at);
-        turning.worst = worst.min(outgoing).min(f32::MAX);
-        let stop = turning.turn == AdjustStep::Stop;
+        turn_pass.worst = worst.min(outgoing).min(f32::MAX);
+        let stop = turn_pass.turn == AdjustStep::Stop;
         if stop {
-            self.target = Some(turning.sir);
+            self.target = Some(turn_pass.sir);
         }
         if stop {
-            self.state.hold();
+            self.state.settle();
         } else {
             self.state.answer();
         }
         if let LeaderTask::Adjusting(rounds) = &mut self.task {
-            if !rounds.advance(turning.any, turning.worst.min(incoming)) {
+            if !rounds.advance(turn_pass.any, turn_pass.worst.min(incoming)) {
                 return Action::Work;
             }
-            self.task.rest();
+            self.task.clear();
         }
         Action::Answer { agreed: stop }
     }
@@ -139,7 +139,7 @@ impl Computation {
 
 /// State of the token at one relay.
 #[derive(Clone, Debug)]
-pub(crate) struct Turning {
+pub(crate) struct TurnPass {
     /// Action of this pass, and the SIR of the chain before it.
     pub(crate) turn: AdjustStep,
     pub(crate) sir: f32,
@@ -152,7 +152,7 @@ pub(crate) struct Turning {
     pub(crate) worst: f32,
 }
 
-impl Turning {
+impl TurnPass {
     pub(crate) const fn new(
         turn: AdjustStep,
         sir: f32,

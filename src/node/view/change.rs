@@ -9,16 +9,18 @@
 //! | `Completed` | vote, forward it: `Outstanding` | stale | - |
 //!
 //! No pass is forwarded while a proposal is outstanding. A refused proposal leaves the positions unchanged; its leader proposes
-//! again after `probe_after` or later ([`Asking`]), and a leader without neighbours only if its own vote would suffice. A
+//! again after `probe_after` or later ([`ViewRequest`]), and a leader without neighbours only if its own vote would suffice. A
 //! proposal is bound to the node that it was forwarded to: if that neighbour is lost or replaced, this relay requests a later
 //! view.
 //!
 //! A view is requested at once at first, then less and less often.
 
-use crate::node::circulation::{Circulation, Reply, Stragglers};
-use crate::node::context::{Context, Decided, Effects, Member, News, PAUSE, Proposer, earliest};
+use crate::node::circulation::{Circulation, LateMessages, Reply};
+use crate::node::context::{
+    Context, Effects, LayerEvent, Member, PAUSE, ProposalOutcome, Proposer, earliest,
+};
 use crate::node::view::electorate;
-use crate::node::view::electorate::{Electorate, Outcome};
+use crate::node::view::electorate::Electorate;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant, Jitter};
@@ -38,23 +40,23 @@ pub(crate) struct ViewChange {
     pub(super) electorate: Electorate,
     /// Latest known view.
     pub(super) newest: ViewId,
-    pub(crate) asking: Asking,
+    pub(crate) request: ViewRequest,
     /// True if the last decision was that there is no quorum.
     pub(super) refused: bool,
-    pub(super) stragglers: Stragglers,
+    pub(super) late_messages: LateMessages,
 }
 
 impl ViewChange {
-    /// Creates the state for a chain of `relays` relays whose initial leader is node `elder`.
-    pub(crate) const fn new(relays: u16, elder: u16, seed: u32) -> Self {
+    /// Creates the state for a chain of `relays` relays whose initial leader is node `initial_leader`.
+    pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
-            electorate: Electorate::new(relays, elder),
+            electorate: Electorate::new(relays, initial_leader),
             circulation: Circulation::new(seed),
             proposed: None,
             newest: ViewId::LOADED,
-            asking: Asking::new(seed),
+            request: ViewRequest::new(seed),
             refused: false,
-            stragglers: Stragglers::NONE,
+            late_messages: LateMessages::NONE,
         }
     }
 
@@ -77,29 +79,29 @@ impl ViewChange {
         record: &ViewRecord,
         untouched: bool,
     ) -> Result<(), RecordError> {
-        let elder = self.electorate.elder;
+        let initial_leader = self.electorate.initial_leader;
         let electorate = record
-            .electorate(member.digest, member.all, elder)
+            .electorate(member.digest, member.all, initial_leader)
             .ok_or(RecordError::Base)?;
-        let new = self.electorate == Electorate::new(member.all, elder);
+        let new = self.electorate == Electorate::new(member.all, initial_leader);
         if !(new && untouched && self.is_untouched()) {
             return Err(RecordError::Begun);
         }
         self.electorate = electorate;
         self.newest = electorate.promised();
         if self.newest > ViewId::LOADED {
-            self.asking.ask_anew(now);
+            self.request.request_now(now);
         }
         Ok(())
     }
 
-    pub(crate) const fn newest(&self) -> ViewId {
+    pub(crate) const fn latest_view(&self) -> ViewId {
         self.newest
     }
 
     /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message. One message could otherwise
     /// use up all view numbers; a relay that was away for long repeats its view often enough.
-    pub(crate) fn heard_of(&mut self, view: ViewId) {
+    pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
             self.newest = self.newest.toward(view, LEAP);
         }
@@ -113,7 +115,7 @@ impl ViewChange {
     }
 
     /// Returns the outstanding proposal.
-    pub(crate) fn awaited(&self) -> Option<Proposed> {
+    pub(crate) fn outstanding(&self) -> Option<Proposed> {
         self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
@@ -123,9 +125,9 @@ impl ViewChange {
     }
 
     /// Returns this relay's place and the number of relays, as of the last proposal. Places count from 1 at the leader.
-    pub(crate) fn counted(&self) -> Option<(u16, u16)> {
+    pub(crate) fn place_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
-        Some((proposed.place, proposed.there.max(proposed.place)))
+        Some((proposed.place, proposed.reached.max(proposed.place)))
     }
 
     /// Returns true while this relay's part of the chain has no quorum.
@@ -134,20 +136,20 @@ impl ViewChange {
     }
 
     /// Requests a view later than `proposal`, whose decision cannot arrive because the next relay is lost.
-    pub(super) fn abandon(&mut self, context: &Context<'_>, proposal: ViewId) {
+    pub(super) fn request_later_view(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
         {
-            self.heard_of(later);
+            self.observe_view(later);
         }
-        self.asking.ask_anew(context.now);
+        self.request.request_now(context.now);
     }
 
     /// Drops the outstanding proposal and requests a view, as after a restart with the record.
     pub(crate) fn leave(&mut self, now: Instant) {
         self.proposed = None;
         self.circulation.withdraw();
-        self.asking.ask_anew(now);
+        self.request.request_now(now);
     }
 
     /// Handles a proposal or decision from a neighbour, for a mission that this relay holds.
@@ -160,9 +162,9 @@ impl ViewChange {
             }
             // The decided view follows its base, and this relay has made no later proposal.
             Message::Decision(decision)
-                if decision.view.is_none_or(|view| {
+                if decision.accepted.is_none_or(|view| {
                     let is_own = view.id.proposer() == context.member.node;
-                    let is_known = !is_own || view.id <= decision.proposal;
+                    let is_known = !is_own || view.id <= decision.proposed_view;
                     decision.base.id < view.id && is_known && view.relays <= all
                 }) =>
             {
@@ -173,9 +175,9 @@ impl ViewChange {
     }
 
     fn on_proposal(&mut self, context: &Context<'_>, proposal: &Proposal) -> Effects {
-        self.heard_of(proposal.view);
+        self.observe_view(proposal.proposed_view);
         let again = self.proposed.is_some_and(|known| {
-            known.view == proposal.view
+            known.view == proposal.proposed_view
                 && known.mission_id == proposal.mission_id
                 && known.place == proposal.place.saturating_add(1)
         });
@@ -187,7 +189,7 @@ impl ViewChange {
         let told = Some(proposal.poll);
         let effects = self.propose(
             context,
-            proposal.view,
+            proposal.proposed_view,
             proposal.mission_id,
             proposal.place,
             told,
@@ -196,10 +198,10 @@ impl ViewChange {
             return effects.by(Proposer::Neighbour);
         }
         // The proposal is late, or its leader has missed a later one.
-        if self.stragglers.one_more() {
+        if self.late_messages.count_one() {
             // The proposer must use a later number.
             if let Some(later) = self.newest.next_by(context.member.node) {
-                self.heard_of(later);
+                self.observe_view(later);
             }
             return Effects::FOREIGN.by(Proposer::Neighbour);
         }
@@ -219,17 +221,17 @@ impl ViewChange {
         let poll = self.electorate.vote(node, view, told, context.held)?;
         // No limit on the advance here, because this relay has voted on the view.
         self.newest = self.newest.max(view);
-        self.stragglers = Stragglers::NONE;
+        self.late_messages = LateMessages::NONE;
         self.proposed = Some(Proposed {
             view,
             mission_id,
             place: place.saturating_add(1),
             poll,
-            handed_to: None,
+            forwarded_to: None,
             base: poll.agreed,
-            there: 0,
-            decided: None,
-            lease_left: 0,
+            reached: 0,
+            accepted: None,
+            usable_in: 0,
         });
         self.circulation.start(context.now);
         let effects = if context.end {
@@ -245,78 +247,74 @@ impl ViewChange {
 
     /// Decides the outstanding proposal: the chain ends here, so every reachable relay has voted.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
-        let Some(proposed) = self.awaited() else {
+        let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
         };
-        if proposed.handed_to.is_some() {
-            self.abandon(context, proposed.view);
+        if proposed.forwarded_to.is_some() {
+            self.request_later_view(context, proposed.view);
             return Effects::NONE;
         }
         let Proposed {
             view, place, poll, ..
         } = proposed;
-        let outcome = if context.member.settings.quorum {
+        let accepted = if context.member.settings.quorum {
             electorate::decide(&poll, view, place, context.member.all)
         } else {
-            Outcome::View(View {
+            Some(View {
                 id: view,
                 relays: place,
             })
         };
-        let lease_left = if place == context.member.all {
+        let usable_in = if place == context.member.all {
             0
         } else {
             electorate::rest(&poll, context.longest_lease())
         };
-        let decided = match outcome {
-            Outcome::Refused => None,
-            Outcome::View(view) => Some(view),
-        };
-        let conclusion = Conclusion {
-            there: place,
+        let verdict = ViewVerdict {
+            reached: place,
             base: poll.agreed,
-            view: decided,
-            lease_left,
+            accepted,
+            usable_in,
         };
-        self.conclude(context, conclusion)
+        self.apply_verdict(context, verdict)
     }
 
     /// Schedules a proposal after a refusal, because unreachable relays may return.
-    pub(super) fn wait_after_refusal(&mut self, context: &Context<'_>) {
+    pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
-        self.asking.ask_after_refusal(context.now, wait);
+        self.request.request_after_refusal(context.now, wait);
     }
 
     fn on_decision(&mut self, context: &Context<'_>, decision: &Decision) -> Effects {
-        match self.awaited() {
+        match self.outstanding() {
             Some(proposed)
-                if proposed.view == decision.proposal
+                if proposed.view == decision.proposed_view
                     && proposed.mission_id == decision.mission_id
                     && proposed.place.saturating_add(1) == decision.place
-                    && decision.there > proposed.place
-                    && decision.view.is_none_or(|view| {
+                    && decision.reached > proposed.place
+                    && decision.accepted.is_none_or(|view| {
                         view.id != proposed.view || view.relays > proposed.place
                     }) =>
             {
-                let conclusion = Conclusion {
-                    there: decision.there,
+                let verdict = ViewVerdict {
+                    reached: decision.reached,
                     base: decision.base,
-                    view: decision.view,
-                    lease_left: decision.lease_left,
+                    accepted: decision.accepted,
+                    usable_in: decision.usable_in,
                 };
-                self.conclude(context, conclusion)
+                self.apply_verdict(context, verdict)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn conclude(&mut self, context: &Context<'_>, conclusion: Conclusion) -> Effects {
-        let Conclusion {
-            there,
+    fn apply_verdict(&mut self, context: &Context<'_>, verdict: ViewVerdict) -> Effects {
+        let ViewVerdict {
+            reached,
             base,
-            view: decided,
-            lease_left,
-        } = conclusion;
+            accepted,
+            usable_in,
+        } = verdict;
         let Some(proposed) = &mut self.proposed else {
             return Effects::NONE;
         };
@@ -326,40 +324,40 @@ impl ViewChange {
             return Effects::FOREIGN;
         }
         let proposal = proposed.view;
-        if !self.electorate.accept(proposal, base, decided) {
+        if !self.electorate.accept(proposal, base, accepted) {
             // Decision on a proposal with the same identifier, made by another node that uses the proposer's index.
-            self.abandon(context, proposal);
+            self.request_later_view(context, proposal);
             return Effects::STALE;
         }
         let taught = base.id > proposed.poll.agreed.id;
         proposed.base = base;
-        proposed.there = there;
-        proposed.decided = decided;
-        proposed.lease_left = lease_left;
+        proposed.reached = reached;
+        proposed.accepted = accepted;
+        proposed.usable_in = usable_in;
         let leads = proposed.place == 1;
-        if leads && decided.is_some() {
+        if leads && accepted.is_some() {
             // All other members have accepted it before.
             self.electorate.commit();
         }
-        self.refused = decided.is_none();
+        self.refused = accepted.is_none();
         let path = context.path(proposed.place.saturating_sub(1));
         self.circulation.complete(context.now, path);
-        self.asking.stop();
-        if leads && decided.is_none() {
+        self.request.stop();
+        if leads && accepted.is_none() {
             // Relays that have learned of a newer view by this decision can vote on the next proposal at once.
             if taught {
-                self.asking.ask_anew(context.now);
+                self.request.request_now(context.now);
             } else {
-                self.wait_after_refusal(context);
+                self.retry_after_refusal(context);
             }
         }
-        Effects::of(News::Decided(match decided {
-            Some(view) if view.id == proposal => Decided::Granted {
+        Effects::of(LayerEvent::ProposalDecided(match accepted {
+            Some(view) if view.id == proposal => ProposalOutcome::Granted {
                 relays: view.relays,
-                lease_left,
+                usable_in,
             },
-            Some(_) => Decided::Earlier,
-            None => Decided::Refused,
+            Some(_) => ProposalOutcome::Superseded,
+            None => ProposalOutcome::NoQuorum,
         }))
     }
 }
@@ -371,14 +369,14 @@ impl ViewChange {
     }
 
     /// Returns the proposal to forward to node `to`, if one is pending, and marks it as sent.
-    pub(crate) fn take_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
-        let proposal = self.awaited()?.view;
+    pub(crate) fn poll_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
+        let proposal = self.outstanding()?.view;
         if !self.circulation.poll_forward() {
             return None;
         }
         let proposed = self.proposed.as_mut()?;
-        if *proposed.handed_to.get_or_insert(to) != to {
-            self.abandon(context, proposal);
+        if *proposed.forwarded_to.get_or_insert(to) != to {
+            self.request_later_view(context, proposal);
             return None;
         }
         let proposed = *proposed;
@@ -386,27 +384,27 @@ impl ViewChange {
         self.circulation.await_result(context.now, path);
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,
-            view: proposed.view,
+            proposed_view: proposed.view,
             place: proposed.place,
             poll: proposed.poll,
         }))
     }
 
     /// Returns the reply to the proposal, if one is pending, and marks it as sent.
-    pub(crate) fn take_back(&mut self) -> Option<Message> {
+    pub(crate) fn poll_back(&mut self) -> Option<Message> {
         let proposed = self.proposed?;
         Some(match self.circulation.poll_reply()? {
             Reply::Result => Message::Decision(Decision {
                 mission_id: proposed.mission_id,
-                proposal: proposed.view,
+                proposed_view: proposed.view,
                 place: proposed.place,
-                there: proposed.there,
+                reached: proposed.reached,
                 base: proposed.base,
-                view: proposed.decided,
-                lease_left: proposed.lease_left,
+                accepted: proposed.accepted,
+                usable_in: proposed.usable_in,
             }),
             Reply::InProgress => Message::Busy {
-                sweep: proposed.view.mark(),
+                number: proposed.view.mark(),
             },
         })
     }
@@ -414,7 +412,7 @@ impl ViewChange {
     /// Handles an "in progress" reply; returns true if message `number` is the outstanding proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
-            .awaited()
+            .outstanding()
             .is_some_and(|proposed| proposed.view.mark() == number);
         if known {
             let path = context.path(context.member.all);
@@ -434,8 +432,8 @@ impl ViewChange {
     ) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
-        let effects = if self.asking.is_due(context.now) {
-            self.ask_again(context, leads, fresh)
+        let effects = if self.request.is_due(context.now) {
+            self.request_again(context, leads, fresh)
         } else {
             Effects::NONE
         };
@@ -443,15 +441,15 @@ impl ViewChange {
     }
 
     /// Requests a view from the neighbour toward the leader, or proposes one if this relay leads.
-    fn ask_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
+    fn request_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
-        if !self.asking.take_due(context.now, fresh, settings) {
+        if !self.request.poll_due(context.now, fresh, settings) {
             return Effects::NONE;
         }
         if !leads {
-            return Effects::of(News::Ask);
+            return Effects::of(LayerEvent::RequestView);
         }
-        let under_way = self.awaited().is_some_and(|proposed| {
+        let under_way = self.outstanding().is_some_and(|proposed| {
             proposed.view >= self.newest && proposed.mission_id == context.latest
         });
         let newest = self.newest.max(self.electorate.promised());
@@ -467,10 +465,10 @@ impl ViewChange {
                 .electorate
                 .is_refused_alone(node, view, all, context.held)
         {
-            self.wait_after_refusal(context);
+            self.retry_after_refusal(context);
             return Effects::NONE;
         }
-        self.heard_of(view);
+        self.observe_view(view);
         let Some(effects) = self.propose(context, view, context.latest, 0, None) else {
             return Effects::NONE;
         };
@@ -481,7 +479,7 @@ impl ViewChange {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        earliest(self.asking.next_timeout(), self.circulation.next_timeout())
+        earliest(self.request.next_timeout(), self.circulation.next_timeout())
     }
 }
 
@@ -496,28 +494,28 @@ pub(crate) struct Proposed {
     /// Poll including this relay's vote.
     pub(super) poll: Poll,
     /// Node that the proposal was forwarded to. With a second one, two views with the same identifier would be possible.
-    pub(super) handed_to: Option<u16>,
+    pub(super) forwarded_to: Option<u16>,
     /// View that the decision follows, once decided.
     pub(crate) base: View,
     /// Number of relays that the proposal has reached, once decided.
-    pub(super) there: u16,
-    /// Decided view; `None` before the decision and without a quorum.
-    pub(super) decided: Option<View>,
-    pub(super) lease_left: u16,
+    pub(super) reached: u16,
+    /// Accepted view; `None` before the decision and without a quorum.
+    pub(super) accepted: Option<View>,
+    pub(super) usable_in: u16,
 }
 
 /// Decision on a proposal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Conclusion {
-    pub(super) there: u16,
+pub(super) struct ViewVerdict {
+    pub(super) reached: u16,
     pub(super) base: View,
-    pub(super) view: Option<View>,
-    pub(super) lease_left: u16,
+    pub(super) accepted: Option<View>,
+    pub(super) usable_in: u16,
 }
 
 /// State of this relay's view request, and the time of the next one.
 #[derive(Clone, Debug)]
-pub(crate) struct Asking {
+pub(crate) struct ViewRequest {
     asks: bool,
     /// Number of requests so far.
     tries: u8,
@@ -532,7 +530,7 @@ pub(crate) struct Asking {
 /// Maximum doublings of the wait after consecutive refusals.
 const DOUBLINGS: u8 = 3;
 
-impl Asking {
+impl ViewRequest {
     pub(super) const fn new(seed: u32) -> Self {
         Self {
             asks: false,
@@ -544,14 +542,14 @@ impl Asking {
         }
     }
 
-    pub(crate) const fn asks(&self) -> bool {
+    pub(crate) const fn is_pending(&self) -> bool {
         self.asks
     }
 
     /// Requests a view until it comes. After a refusal, a change shortens the wait.
-    pub(crate) fn ask(&mut self, now: Instant) {
+    pub(crate) fn start(&mut self, now: Instant) {
         if !self.asks {
-            self.ask_anew(now);
+            self.request_now(now);
         } else if let Some(soon) = self.soon.take() {
             self.refusals = 0;
             let soon = soon.max(now + PAUSE);
@@ -561,7 +559,7 @@ impl Asking {
 
     /// Requests a view at once and resets all waits, because new information is available.
     #[inline(never)] // called from many places
-    pub(crate) fn ask_anew(&mut self, now: Instant) {
+    pub(crate) fn request_now(&mut self, now: Instant) {
         self.asks = true;
         self.tries = 0;
         self.refusals = 0;
@@ -570,16 +568,16 @@ impl Asking {
     }
 
     /// Repeats a pending request at once, because the neighbours are now certain.
-    pub(crate) fn hasten(&mut self, now: Instant) {
+    pub(crate) fn repeat_now(&mut self, now: Instant) {
         if self.asks {
-            self.ask_anew(now);
+            self.request_now(now);
         }
     }
 
     /// Requests a view after about `wait`, which consecutive refusals double up to three times.
     ///
-    /// [`ask_anew`](Self::ask_anew) ends the doubling.
-    pub(super) fn ask_after_refusal(&mut self, now: Instant, wait: Duration) {
+    /// [`request_now`](Self::request_now) ends the doubling.
+    pub(super) fn request_after_refusal(&mut self, now: Instant, wait: Duration) {
         self.asks = true;
         let wait = self.jitter.spread(wait);
         self.soon = Some(now + wait);
@@ -605,7 +603,7 @@ impl Asking {
     }
 
     /// Handles the expired timer; returns true if a request is due. `fresh`: nothing was received since start-up, so one is due.
-    pub(super) fn take_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
+    pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.asks {
             if !fresh {

@@ -57,19 +57,12 @@ pub(crate) struct Electorate {
     /// Proposals voted on that may become views with this relay as a member, latest first.
     pub(super) voted: [ViewId; VOTES],
     /// Leader of the initial view; the half of the initial chain with this node counts as the larger one.
-    pub(super) elder: u16,
-}
-
-/// Decision of the last relay.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Outcome {
-    Refused,
-    View(View),
+    pub(super) initial_leader: u16,
 }
 
 impl Electorate {
-    /// Creates the initial state for a chain of `relays` relays whose initial leader is node `elder`.
-    pub(crate) const fn new(relays: u16, elder: u16) -> Self {
+    /// Creates the initial state for a chain of `relays` relays with this initial leader.
+    pub(crate) const fn new(relays: u16, initial_leader: u16) -> Self {
         Self {
             agreed: View {
                 id: ViewId::LOADED,
@@ -79,7 +72,7 @@ impl Electorate {
             promised: ViewId::LOADED,
             accepted: None,
             voted: [ViewId::LOADED; VOTES],
-            elder,
+            initial_leader,
         }
     }
 
@@ -124,7 +117,7 @@ impl Electorate {
             (told, own) => own.or(told),
         };
         let proposer = match self.agreed.id {
-            ViewId::LOADED => self.elder,
+            ViewId::LOADED => self.initial_leader,
             view => view.proposer(),
         };
         let mut poll = Poll {
@@ -136,7 +129,7 @@ impl Electorate {
             poll.votes = poll.votes.saturating_add(1).min(poll.agreed.relays);
             poll.proposer |= proposer == node;
             poll.lease_left = poll.lease_left.min(tenths(held.lease_left));
-            poll.rest = poll.rest.min(held.rest_of(self.agreed.id));
+            poll.earlier_lease_left = poll.earlier_lease_left.min(held.rest_of(self.agreed.id));
         }
         Some(poll)
     }
@@ -151,7 +144,7 @@ impl Electorate {
     ) -> bool {
         let mut asked = *self;
         let poll = asked.vote(node, proposal, None, held);
-        poll.is_some_and(|poll| decide(&poll, proposal, 1, all) == Outcome::Refused)
+        poll.is_some_and(|poll| decide(&poll, proposal, 1, all) == None)
     }
 
     /// Records the vote on `proposal`. If the list is full, its earlier half is kept: once relays have accepted a view, later
@@ -221,25 +214,25 @@ impl Electorate {
 pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
-    poll.rest.max(lease_left).min(most)
+    poll.earlier_lease_left.max(lease_left).min(most)
 }
 
 /// Returns the decision on `proposal`, which has reached `relays` of `all` relays with this `poll`.
-pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Outcome {
+pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,
         relays,
     };
     if relays == all {
-        return Outcome::View(whole);
+        return Some(whole);
     }
     // Of two equal halves, the one with the view's proposer counts as the larger.
     let there = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
     if there <= u32::from(poll.agreed.relays) {
-        return Outcome::Refused;
+        return None;
     }
     let successor = poll.successor.map(|successor| successor.view);
-    Outcome::View(successor.unwrap_or(whole))
+    Some(successor.unwrap_or(whole))
 }
 
 #[cfg(test)]

@@ -28,10 +28,10 @@ use std::{format, println, vec};
 
 use crate::mission::Mission;
 use crate::mission::tests::paper;
-use crate::node::circulation::{Circulation, Stage, Stragglers};
+use crate::node::circulation::{Circulation, LateMessages, Stage};
 use crate::node::context::Held;
-use crate::node::context::{Context, Decided, Effects, Member, News};
-use crate::node::view::change::{Asking, ViewChange};
+use crate::node::context::{Context, Effects, LayerEvent, Member, ProposalOutcome};
+use crate::node::view::change::{ViewChange, ViewRequest};
 use crate::settings::Settings;
 use crate::time::Instant;
 use crate::view::{View, ViewId};
@@ -98,7 +98,7 @@ pub(super) type Sized = (ViewId, u16);
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) enum Body {
     Proposal {
-        view: ViewId,
+        proposed_view: ViewId,
         place: u16,
         agreed: Sized,
         votes: u16,
@@ -106,11 +106,11 @@ pub(super) enum Body {
         successor: Option<(ViewId, Sized)>,
     },
     Decision {
-        proposal: ViewId,
+        proposed_view: ViewId,
         place: u16,
-        there: u16,
+        reached: u16,
         base: Sized,
-        view: Option<Sized>,
+        accepted: Option<Sized>,
     },
 }
 
@@ -217,7 +217,7 @@ impl Body {
         let view = |(id, relays)| View { id, relays };
         match self {
             Self::Proposal {
-                view: id,
+                proposed_view: id,
                 place,
                 agreed,
                 votes,
@@ -225,14 +225,14 @@ impl Body {
                 successor,
             } => Message::Proposal(Proposal {
                 mission_id,
-                view: id,
+                proposed_view: id,
                 place,
                 poll: Poll {
                     agreed: view(agreed),
                     votes,
                     proposer,
                     lease_left: 0,
-                    rest: 0,
+                    earlier_lease_left: 0,
                     successor: successor.map(|(proposal, of)| Successor {
                         proposal,
                         view: view(of),
@@ -240,19 +240,19 @@ impl Body {
                 },
             }),
             Self::Decision {
-                proposal,
+                proposed_view: proposal,
                 place,
-                there,
+                reached: there,
                 base,
-                view: of,
+                accepted: of,
             } => Message::Decision(Decision {
                 mission_id,
-                proposal,
+                proposed_view: proposal,
                 place,
-                there,
+                reached: there,
                 base: view(base),
-                view: of.map(view),
-                lease_left: 0,
+                accepted: of.map(view),
+                usable_in: 0,
             }),
         }
     }
@@ -261,7 +261,7 @@ impl Body {
         let sized = |view: View| (view.id, view.relays);
         match message {
             Message::Proposal(proposal) => Some(Self::Proposal {
-                view: proposal.view,
+                proposed_view: proposal.proposed_view,
                 place: proposal.place,
                 agreed: sized(proposal.poll.agreed),
                 votes: proposal.poll.votes,
@@ -272,11 +272,11 @@ impl Body {
                     .map(|successor| (successor.proposal, sized(successor.view))),
             }),
             Message::Decision(decision) => Some(Self::Decision {
-                proposal: decision.proposal,
+                proposed_view: decision.proposed_view,
                 place: decision.place,
-                there: decision.there,
+                reached: decision.reached,
                 base: sized(decision.base),
-                view: decision.view.map(sized),
+                accepted: decision.accepted.map(sized),
             }),
             _ => None,
         }
@@ -369,7 +369,7 @@ impl Check {
         let handed = chain
             .air
             .iter()
-            .filter(|frame| matches!(frame.body, Body::Proposal { view, .. } if view == proposal));
+            .filter(|frame| matches!(frame.body, Body::Proposal { proposed_view: view, .. } if view == proposal));
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
@@ -394,22 +394,22 @@ impl Check {
             }
         };
         if let Some(to) = after
-            && let Some(message) = unit.change.take_onward(&context, to as u16 + 1)
+            && let Some(message) = unit.change.poll_onward(&context, to as u16 + 1)
         {
             send(to, &message);
         }
         if let Some(to) = before {
-            while let Some(message) = unit.change.take_back() {
+            while let Some(message) = unit.change.poll_back() {
                 send(to, &message);
             }
         }
         if let Some(proposed) = unit.change.proposed
-            && let Some(News::Decided(decided)) = effects.news
+            && let Some(LayerEvent::ProposalDecided(decided)) = effects.news
         {
-            if let Decided::Granted { relays, .. } = decided {
+            if let ProposalOutcome::Granted { relays, .. } = decided {
                 unit.flies = (proposed.view, proposed.place, relays);
             }
-            if let Some(view) = proposed.decided {
+            if let Some(view) = proposed.accepted {
                 if view.id == proposed.view && view.relays == proposed.place {
                     put(
                         decrees,
@@ -431,9 +431,9 @@ impl Check {
         }
         // Resets timers and everything that only repairs late messages, to reduce the number of states.
         change.newest = ViewId::LOADED;
-        change.asking = Asking::new(1);
+        change.request = ViewRequest::new(1);
         change.refused = false;
-        change.stragglers = Stragglers::NONE;
+        change.late_messages = LateMessages::NONE;
         change.circulation = Circulation::at_stage(change.circulation.stage());
     }
 
@@ -445,11 +445,11 @@ impl Check {
             .unwrap();
         let context = self.context(chain, at);
         let change = &mut chain.units[at].change;
-        change.heard_of(newest);
-        if change.awaited().is_some() {
-            change.heard_of(newest.next_by(self.members[at].node).unwrap());
+        change.observe_view(newest);
+        if change.outstanding().is_some() {
+            change.observe_view(newest.next_by(self.members[at].node).unwrap());
         }
-        change.asking = Asking::due(Instant::ZERO);
+        change.request = ViewRequest::due(Instant::ZERO);
         let effects = change.handle_timeout(&context, true, false);
         self.settle(chain, at, effects);
     }
@@ -488,10 +488,10 @@ impl Check {
         };
         let Unit { change, flies } = &chain.units[at];
         let (view, place, _) = *flies;
-        let knows = change.electorate.agreed().id == view && change.awaited().is_none();
+        let knows = change.electorate.agreed().id == view && change.outstanding().is_none();
         let next = &mut chain.units[to];
         if knows
-            && next.change.awaited().is_none()
+            && next.change.outstanding().is_none()
             && next.flies.0 == view
             && next.flies.1 == place + 1
         {

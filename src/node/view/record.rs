@@ -24,7 +24,7 @@ const FORMAT: u32 = 1;
 pub struct ViewRecord {
     /// Digest of the mission that was loaded before flight.
     base: u16,
-    /// Checked acceptor state; its `elder` is not stored.
+    /// Checked acceptor state; its `initial_leader` is not stored.
     electorate: Electorate,
 }
 
@@ -114,18 +114,23 @@ impl ViewRecord {
         Self {
             base,
             electorate: Electorate {
-                elder: 0,
+                initial_leader: 0,
                 ..electorate
             },
         }
     }
 
-    /// Returns the acceptor state, if the record is of the mission with digest `base` and `relays` relays. Node `elder` leads it.
-    pub(super) fn electorate(&self, base: u16, relays: u16, elder: u16) -> Option<Electorate> {
+    /// Returns the acceptor state, if the record is of the mission with digest `base` and `relays` relays. Node `initial_leader` leads it.
+    pub(super) fn electorate(
+        &self,
+        base: u16,
+        relays: u16,
+        initial_leader: u16,
+    ) -> Option<Electorate> {
         let Electorate { agreed, .. } = self.electorate;
         let fits = agreed.relays == relays || agreed.id > ViewId::LOADED && agreed.relays < relays;
         (self.base == base && fits).then_some(Electorate {
-            elder,
+            initial_leader,
             ..self.electorate
         })
     }
@@ -176,7 +181,7 @@ impl ViewRecord {
             promised,
             accepted: known.then_some(accepted),
             voted,
-            elder: 0,
+            initial_leader: 0,
         };
         let sound = (known || accepted == nothing_after(agreed)) && is_sound(&electorate);
         sound.then_some(Self { base, electorate })

@@ -4,7 +4,7 @@ use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::circulation::{SUSPICIOUS, Stage};
 use crate::node::context::Held;
-use crate::node::context::{Context, Decided, Effects, Member, News, Proposer};
+use crate::node::context::{Context, Effects, LayerEvent, Member, ProposalOutcome, Proposer};
 use crate::node::view::change::{Proposed, ViewChange};
 use crate::node::view::electorate::Electorate;
 use crate::settings::Settings;
@@ -66,22 +66,22 @@ impl Relay {
 
     /// Lets the relay lead: no relay precedes it, and its request timer expires.
     pub(super) fn leads(&mut self) -> Effects {
-        self.view.asking.ask(self.now);
-        self.now = self.view.asking.next_timeout().unwrap();
+        self.view.request.start(self.now);
+        self.now = self.view.request.next_timeout().unwrap();
         let context = context(&self.member, self.latest, self.end, self.now);
         self.view.handle_timeout(&context, true, false)
     }
 
     pub(super) fn onward(&mut self, to: u16) -> Option<Message> {
         let context = context(&self.member, self.latest, self.end, self.now);
-        self.view.take_onward(&context, to)
+        self.view.poll_onward(&context, to)
     }
 
     /// Returns a proposal of relay 1.
     pub(super) fn proposal(&self, view: ViewId) -> Message {
         Message::Proposal(Proposal {
             mission_id: self.latest,
-            view,
+            proposed_view: view,
             place: 1,
             poll: Poll {
                 votes: 1,
@@ -98,15 +98,15 @@ impl Relay {
     pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
         Message::Decision(Decision {
             mission_id: self.latest,
-            proposal,
+            proposed_view: proposal,
             place: self.member.node + 1,
-            there: 4,
+            reached: 4,
             base: View {
                 id: ViewId::LOADED,
                 relays: 4,
             },
-            view,
-            lease_left: 0,
+            accepted: view,
+            usable_in: 0,
         })
     }
 }
@@ -125,8 +125,8 @@ pub(super) const fn all(id: ViewId) -> View {
     View { id, relays: 4 }
 }
 
-pub(super) const fn came(decided: Decided) -> Effects {
-    Effects::of(News::Decided(decided))
+pub(super) const fn came(decided: ProposalOutcome) -> Effects {
+    Effects::of(LayerEvent::ProposalDecided(decided))
 }
 
 pub(super) const PROPOSED: Effects = Effects {
@@ -146,10 +146,10 @@ fn a_proposal_is_handed_on_with_one_voice_more() {
     let Some(Message::Proposal(handed)) = relay.onward(3) else {
         panic!("nothing is handed on")
     };
-    assert_eq!((handed.view, handed.place), (id(1, 1), 2));
+    assert_eq!((handed.proposed_view, handed.place), (id(1, 1), 2));
     assert_eq!((handed.poll.votes, handed.poll.proposer), (2, true));
     assert_eq!(relay.onward(3), None, "once");
-    assert_eq!(relay.view.take_back(), None);
+    assert_eq!(relay.view.poll_back(), None);
 }
 
 #[test]
@@ -159,23 +159,23 @@ fn the_same_again_is_answered_by_what_is_known_of_it() {
     relay.handle(&proposal);
     assert_eq!(relay.handle(&proposal), REPEATED);
     let busy = Message::Busy {
-        sweep: id(1, 1).mark(),
+        number: id(1, 1).mark(),
     };
-    assert_eq!(relay.view.take_back(), Some(busy));
+    assert_eq!(relay.view.poll_back(), Some(busy));
     let decision = relay.decision(id(1, 1), Some(all(id(1, 1))));
-    let granted = came(Decided::Granted {
+    let granted = came(ProposalOutcome::Granted {
         relays: 4,
-        lease_left: 0,
+        usable_in: 0,
     });
     assert_eq!(relay.handle(&decision), granted);
     for again in [false, true] {
         if again {
             assert_eq!(relay.handle(&proposal), REPEATED);
         }
-        let Some(Message::Decision(back)) = relay.view.take_back() else {
+        let Some(Message::Decision(back)) = relay.view.poll_back() else {
             panic!("nothing is handed back")
         };
-        assert_eq!((back.place, back.view), (2, Some(all(id(1, 1)))));
+        assert_eq!((back.place, back.accepted), (2, Some(all(id(1, 1)))));
     }
     assert_eq!(relay.handle(&decision), Effects::STALE);
 }
@@ -238,11 +238,11 @@ fn a_decision_is_of_the_relay_that_the_proposal_went_on_to() {
             ..decision
         },
         Decision {
-            proposal: id(1, 3),
+            proposed_view: id(1, 3),
             ..decision
         },
         Decision {
-            view: Some(small),
+            accepted: Some(small),
             ..decision
         },
     ];
@@ -262,9 +262,9 @@ fn the_last_one_decides() {
     proposal.place = 3;
     proposal.poll.votes = 3;
     let granted = Effects {
-        news: Some(News::Decided(Decided::Granted {
+        news: Some(LayerEvent::ProposalDecided(ProposalOutcome::Granted {
             relays: 4,
-            lease_left: 0,
+            usable_in: 0,
         })),
         ..PROPOSED
     };
@@ -289,16 +289,16 @@ fn an_earlier_view_is_accepted_and_the_leader_proposes_anew_from_there() {
     // This relay has proposed the view itself and has not received the decision.
     let first = relay.view.electorate.promised();
     assert_eq!(first, earlier.id);
-    relay.view.heard_of(id(2, 3));
-    relay.now = relay.view.asking.next_timeout().unwrap();
+    relay.view.observe_view(id(2, 3));
+    relay.now = relay.view.request.next_timeout().unwrap();
     assert!(relay.leads().began);
     let second = relay.view.electorate.promised();
     assert!(second > id(2, 3));
     let decision = relay.decision(second, Some(earlier));
-    assert_eq!(relay.handle(&decision), came(Decided::Earlier));
+    assert_eq!(relay.handle(&decision), came(ProposalOutcome::Superseded));
     assert_eq!(relay.view.electorate.agreed(), earlier);
     assert!(relay.view.electorate.member);
-    assert_eq!(relay.view.take_back(), None, "nobody is before it");
+    assert_eq!(relay.view.poll_back(), None, "nobody is before it");
     assert!(relay.leads().began);
 }
 
@@ -320,28 +320,34 @@ fn a_refusal_says_which_view_was_agreed_on() {
     third.view.electorate = voted(third.view.electorate, 3);
     third.view.commit(view.id);
     third.end = true;
-    second.view.heard_of(view.id);
+    second.view.observe_view(view.id);
     let mut refused = 0;
     for round in 0..2 {
         assert!(second.leads().began);
         let proposal = second.onward(3).unwrap();
         let effects = third.handle(&proposal);
-        let Some(Message::Decision(back)) = third.view.take_back() else {
+        let Some(Message::Decision(back)) = third.view.poll_back() else {
             panic!("nothing is handed back")
         };
-        if effects.news == Some(News::Decided(Decided::Refused)) {
+        if effects.news == Some(LayerEvent::ProposalDecided(ProposalOutcome::NoQuorum)) {
             refused += 1;
-            assert_eq!((back.base, back.view), (view, None));
+            assert_eq!((back.base, back.accepted), (view, None));
         }
         let decided = second.handle(&Message::Decision(back)).news;
         if round == 0 {
-            assert_eq!(decided, Some(News::Decided(Decided::Refused)));
+            assert_eq!(
+                decided,
+                Some(LayerEvent::ProposalDecided(ProposalOutcome::NoQuorum))
+            );
             assert_eq!(second.view.electorate.agreed(), view);
         } else {
             // Two of its three members are polled, now that both know the view.
             assert!(matches!(
                 decided,
-                Some(News::Decided(Decided::Granted { relays: 2, .. }))
+                Some(LayerEvent::ProposalDecided(ProposalOutcome::Granted {
+                    relays: 2,
+                    ..
+                }))
             ));
         }
     }
@@ -359,9 +365,9 @@ fn a_decision_is_of_the_mission_that_was_proposed() {
     };
     other.mission_id.version = 5;
     assert_eq!(relay.handle(&Message::Decision(other)), Effects::STALE);
-    let granted = came(Decided::Granted {
+    let granted = came(ProposalOutcome::Granted {
         relays: 4,
-        lease_left: 0,
+        usable_in: 0,
     });
     assert_eq!(relay.handle(&decision), granted);
 }
@@ -378,7 +384,7 @@ fn who_has_lost_the_mission_has_no_part_in_its_view() {
     assert_eq!(relay.view.circulation.stage(), Stage::Outstanding);
     assert!(matches!(
         relay.view.proposed,
-        Some(Proposed { decided: None, .. })
+        Some(Proposed { accepted: None, .. })
     ));
     assert!(!relay.view.electorate.awaits(id(1, 1)));
 }
@@ -400,7 +406,10 @@ fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
     proposal.place = 2;
     proposal.poll.votes = 2;
     let decided = relay.handle(&Message::Proposal(proposal)).news;
-    assert_eq!(decided, Some(News::Decided(Decided::Earlier)));
+    assert_eq!(
+        decided,
+        Some(LayerEvent::ProposalDecided(ProposalOutcome::Superseded))
+    );
     let poll = relay.view.proposed.unwrap().poll;
     assert_eq!(
         poll.successor,
@@ -417,9 +426,9 @@ fn who_has_lost_the_one_after_it_decides_what_nobody_was_handed() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
-    let granted = came(Decided::Granted {
+    let granted = came(ProposalOutcome::Granted {
         relays: 2,
-        lease_left: 0,
+        usable_in: 0,
     });
     assert_eq!(relay.ends(), granted);
     assert_eq!(relay.ends(), Effects::NONE, "once");
@@ -433,8 +442,8 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
     relay.onward(3).unwrap();
     for _ in 0..3 {
         assert_eq!(relay.ends(), Effects::NONE);
-        assert!(relay.view.asking.asks());
-        assert_eq!(relay.view.newest(), id(2, 2), "one number more, once");
+        assert!(relay.view.request.is_pending());
+        assert_eq!(relay.view.latest_view(), id(2, 2), "one number more, once");
     }
     // A later proposal may end here.
     let later = relay.proposal(id(3, 1));
@@ -452,7 +461,7 @@ fn a_proposal_is_handed_to_one_node_alone() {
     relay.onward(2).unwrap();
     relay.view.resend();
     assert_eq!(relay.onward(4), None);
-    assert!(relay.view.asking.asks());
+    assert!(relay.view.request.is_pending());
     relay.view.resend();
     assert!(relay.onward(2).is_some(), "it may be back");
     // A later proposal may be forwarded to the other node.
@@ -465,7 +474,7 @@ fn a_proposal_is_handed_to_one_node_alone() {
     }
     assert!(later.began);
     assert!(
-        matches!(relay.onward(4), Some(Message::Proposal(Proposal { view, .. })) if view > id(1, 1))
+        matches!(relay.onward(4), Some(Message::Proposal(Proposal { proposed_view: view, .. })) if view > id(1, 1))
     );
 }
 
@@ -473,27 +482,27 @@ fn a_proposal_is_handed_to_one_node_alone() {
 fn a_leader_that_is_refused_stays_and_asks_again_later() {
     let mut relay = Relay::second();
     relay.end = true;
-    assert_eq!(relay.leads().news, came(Decided::Refused).news);
-    assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
-    assert!(!relay.view.electorate.has_voted(relay.view.newest()));
-    let again = relay.view.asking.next_timeout().unwrap();
+    assert_eq!(relay.leads().news, came(ProposalOutcome::NoQuorum).news);
+    assert!(relay.view.has_no_quorum() && relay.view.request.is_pending());
+    assert!(!relay.view.electorate.has_voted(relay.view.latest_view()));
+    let again = relay.view.request.next_timeout().unwrap();
     assert!(again >= relay.now + relay.member.settings.probe_after);
 }
 
 #[test]
 fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
     let mut relay = Relay::new(1);
-    relay.view.heard_of(id(7, 3));
+    relay.view.observe_view(id(7, 3));
     assert!(relay.leads().began);
-    assert_eq!(relay.view.newest(), id(8, 1));
+    assert_eq!(relay.view.latest_view(), id(8, 1));
     assert!(!relay.leads().began, "it is under way");
-    relay.view.heard_of(id(8, 2));
+    relay.view.observe_view(id(8, 2));
     assert!(relay.leads().began);
-    assert_eq!(relay.view.newest(), id(9, 1));
+    assert_eq!(relay.view.latest_view(), id(9, 1));
     // A view far ahead is approached in steps.
     for number in [265, 521, 777, 1000, 1000] {
-        relay.view.heard_of(id(1000, 3));
-        assert_eq!(relay.view.newest(), id(number, 3));
+        relay.view.observe_view(id(1000, 3));
+        assert_eq!(relay.view.latest_view(), id(number, 3));
     }
 }
 
@@ -502,17 +511,17 @@ fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
 fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
     let mut relay = Relay::second();
     relay.end = true;
-    assert_eq!(relay.leads().news, came(Decided::Refused).news);
-    let newest = relay.view.newest();
+    assert_eq!(relay.leads().news, came(ProposalOutcome::NoQuorum).news);
+    let newest = relay.view.latest_view();
     for _ in 0..1_000 {
         assert_eq!(relay.leads(), Effects::NONE);
-        assert!(relay.view.has_no_quorum() && relay.view.asking.asks());
+        assert!(relay.view.has_no_quorum() && relay.view.request.is_pending());
     }
-    assert_eq!(relay.view.newest(), newest);
+    assert_eq!(relay.view.latest_view(), newest);
     // With a successor the poll may have another result.
     relay.end = false;
     let began = (0..8).any(|_| relay.leads().began);
-    assert!(began && relay.view.newest() > newest);
+    assert!(began && relay.view.latest_view() > newest);
 }
 
 #[test]
@@ -526,5 +535,5 @@ fn who_has_missed_something_is_told_after_some_late_proposals() {
     }
     let foreign = Effects::FOREIGN.by(Proposer::Neighbour);
     assert_eq!(relay.handle(&late), foreign);
-    assert_eq!(relay.view.newest(), id(4, 2));
+    assert_eq!(relay.view.latest_view(), id(4, 2));
 }

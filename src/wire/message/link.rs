@@ -18,13 +18,13 @@ pub struct Hello {
     /// [`digest`](crate::wire::digest::digest) of the sender's mission as loaded before flight.
     pub mission: u16,
     /// Latest view known to the sender.
-    pub newest: ViewId,
+    pub latest_view: ViewId,
     /// The sender's neighbour on this side; 0 for none.
     pub neighbour: u16,
     /// True to request a hello in return.
-    pub ask: bool,
+    pub requests_reply: bool,
     /// True to request a new view.
-    pub form: bool,
+    pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in anything yet.
     pub fresh: bool,
     /// True if the sender could join between the destination and the destination's neighbour. These two receive each other.
@@ -34,15 +34,15 @@ pub struct Hello {
     /// Nodes on this side that the sender receives, bit 0 for the nearest: 0 to 15.
     pub hears: u8,
     /// Newest mission that the sender has.
-    pub holds: MissionId,
+    pub latest_mission: MissionId,
     /// True if the sender flies that mission.
-    pub flies: bool,
+    pub active: bool,
     /// True if all relays of the sender's view fly that mission, an upload.
-    pub whole: bool,
+    pub active_in_view: bool,
     /// True if a relay refuses that mission. The sender itself, which then flies another one, or one beyond it.
     pub refused: bool,
     /// Number for the offer that answers this hello; 0 if the sender accepts none.
-    pub nonce: u16,
+    pub offer_number: u16,
 }
 
 impl Hello {
@@ -56,22 +56,30 @@ impl Hello {
     /// nonce, `hears`, and flags from bit 0: `ask`, `form`, `fresh`, `ready`, `flies`, `whole`, `refused`.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
-            ask, form, fresh, ..
+            requests_reply: ask,
+            requests_view: form,
+            fresh,
+            ..
         } = *self;
         let flags = [
             ask,
             form,
             fresh,
             self.ready,
-            self.flies,
-            self.whole,
+            self.active,
+            self.active_in_view,
             self.refused,
         ]
         .into_iter()
         .rev()
         .fold(0_u8, |flags, flag| flags << 1 | u8::from(flag));
-        let last = [self.holds.digest, self.holds.version, self.nonce].map(Word::new);
-        let newest = self.newest.bits().to_le_bytes();
+        let last = [
+            self.latest_mission.digest,
+            self.latest_mission.version,
+            self.offer_number,
+        ]
+        .map(Word::new);
+        let newest = self.latest_view.bits().to_le_bytes();
         let near = [self.mission, self.neighbour, self.behind].map(Word::new);
         write(
             &(tag::HELLO, near, newest, last, [self.hears, flags]),
@@ -94,19 +102,19 @@ impl Hello {
         }
         Ok(Self {
             mission: mission.number(),
-            newest: ViewId::from_bits(u32::from_le_bytes(newest)),
+            latest_view: ViewId::from_bits(u32::from_le_bytes(newest)),
             neighbour,
-            ask: flags & 1 != 0,
-            form: flags & 2 != 0,
+            requests_reply: flags & 1 != 0,
+            requests_view: flags & 2 != 0,
             fresh: flags & 4 != 0,
             ready: flags & 8 != 0,
             behind,
-            flies: flags & 16 != 0,
-            whole: flags & 32 != 0,
+            active: flags & 16 != 0,
+            active_in_view: flags & 32 != 0,
             refused: flags & 64 != 0,
             hears,
-            nonce: nonce.number(),
-            holds: MissionId {
+            offer_number: nonce.number(),
+            latest_mission: MissionId {
                 version: version.number(),
                 digest: digest.number(),
             },
@@ -121,7 +129,7 @@ pub struct Claim {
     /// Claim number of the node: drawn at its start, raised at most once while it is active.
     pub number: u32,
     /// Last claim number received under the node's own number from another node; 0 for none.
-    pub heard: u32,
+    pub other_number: u32,
     /// True if the node is passive because another node uses its number.
     pub passive: bool,
     /// True if the sender repeats what it received under the destination's number.
@@ -132,7 +140,7 @@ impl Claim {
     /// Encodes the claim; flags from bit 0: passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
-        let numbers = [self.number, self.heard].map(u32::to_le_bytes);
+        let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
         write(&(tag::CLAIM, numbers, flags), buffer)
     }
 
@@ -143,7 +151,7 @@ impl Claim {
         }
         Ok(Self {
             number: u32::from_le_bytes(number),
-            heard: u32::from_le_bytes(heard),
+            other_number: u32::from_le_bytes(heard),
             passive: flags & 1 != 0,
             echo: flags & 2 != 0,
         })
@@ -174,7 +182,7 @@ pub(super) fn decode_fence(body: &[u8]) -> Result<(u16, Fence), MessageError> {
         flags,
     };
     if fence.is_valid() {
-        Ok((pass.mission(), fence))
+        Ok((pass.digest(), fence))
     } else {
         Err(MessageError::Value)
     }

@@ -57,16 +57,16 @@ pub enum Message {
     /// Reply to a repeated pass: the pass of this number has arrived, but has no result yet.
     Busy {
         /// Number of the pass.
-        sweep: u16,
+        number: u16,
     },
     /// Either direction: heartbeat request, reply, or both.
     Heartbeat {
         /// Digest of the sender's mission, so that a wrong configuration is detected before take-off.
         mission: u16,
         /// Number of the sender's request, 0 for none.
-        ask: u16,
+        request: u16,
         /// Number of the answered request, 0 for none.
-        answer: u16,
+        reply: u16,
     },
     /// Onward message: profiles of the relays up to the sender.
     Gather(Roster),
@@ -94,7 +94,7 @@ pub enum Message {
     Fence {
         /// Digest of the sender's mission as loaded before flight, combined with its upload's sites. See
         /// [`digest`](super::digest::digest).
-        mission: u16,
+        line_digest: u16,
         /// State of the fence at the sender.
         fence: Fence,
     },
@@ -103,7 +103,7 @@ pub enum Message {
         /// Uploaded mission.
         upload: Upload,
         /// Number of the destination's hello that it answers, 0 for none.
-        answer: u16,
+        offer_number: u16,
     },
     /// Ground to relay: interference level at that end of the chain.
     Level {
@@ -117,30 +117,33 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest of the sender's mission; `None` for [`Message::Busy`] and [`Message::Claim`].
-    pub const fn mission(&self) -> Option<u16> {
+    /// Returns the digest of the sender's mission, view or line; `None` for a message without one.
+    pub const fn digest(&self) -> Option<u16> {
         match self {
-            Self::Sweep(sweep) => Some(sweep.mission),
-            Self::Verdict(answer) => Some(answer.mission),
+            Self::Sweep(sweep) => Some(sweep.view_digest),
+            Self::Verdict(answer) => Some(answer.view_digest),
             Self::Busy { .. } | Self::Claim(_) => None,
             Self::Heartbeat { mission, .. }
-            | Self::Fence { mission, .. }
+            | Self::Fence {
+                line_digest: mission,
+                ..
+            }
             | Self::Level { mission, .. } => Some(*mission),
-            Self::Pulse(pulse) => Some(pulse.mission),
-            Self::Pulsed(pulsed) => Some(pulsed.mission),
-            Self::Gather(roster) | Self::Gathered(roster) => Some(roster.mission),
-            Self::Sense(hearing) | Self::Sensed(hearing) => Some(hearing.mission),
-            Self::Token(token) => Some(token.mission),
-            Self::Moved(moved) => Some(moved.mission),
+            Self::Pulse(pulse) => Some(pulse.view_digest),
+            Self::Pulsed(pulsed) => Some(pulsed.view_digest),
+            Self::Gather(roster) | Self::Gathered(roster) => Some(roster.view_digest),
+            Self::Sense(hearing) | Self::Sensed(hearing) => Some(hearing.view_digest),
+            Self::Token(token) => Some(token.view_digest),
+            Self::Moved(moved) => Some(moved.view_digest),
             Self::Hello(hello) => Some(hello.mission),
             Self::Proposal(proposal) => Some(proposal.mission_id.digest),
-            Self::Decision(count) => Some(count.mission_id.digest),
+            Self::Decision(decision) => Some(decision.mission_id.digest),
             Self::Offer { upload, .. } => Some(upload.base()),
         }
     }
 
     /// Returns true for messages of a round, whose digest is that of mission and view.
-    pub(crate) const fn is_of_a_view(&self) -> bool {
+    pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,
             Self::Sweep(_)
@@ -157,7 +160,7 @@ impl Message {
     }
 
     /// Returns true for messages of a view change, whose digest is that of the proposed mission.
-    pub(crate) const fn is_of_a_proposal(&self) -> bool {
+    pub(crate) const fn is_view_change(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
@@ -189,11 +192,11 @@ impl Message {
             Self::Fence { .. } if !cfg!(feature = "guard") => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
             Self::Verdict(answer) => answer.encode(buffer),
-            Self::Busy { sweep } => write(&(tag::BUSY, Word::new(*sweep)), buffer),
+            Self::Busy { number: sweep } => write(&(tag::BUSY, Word::new(*sweep)), buffer),
             Self::Heartbeat {
                 mission,
-                ask,
-                answer,
+                request: ask,
+                reply: answer,
             } => {
                 let numbers = [*mission, *ask, *answer].map(Word::new);
                 write(&(tag::HEARTBEAT, numbers), buffer)
@@ -209,9 +212,12 @@ impl Message {
             Self::Hello(hello) => hello.encode(buffer),
             Self::Proposal(proposal) => proposal.encode(buffer),
             Self::Decision(decision) => decision.encode(buffer),
-            Self::Fence { mission, fence } => link::encode_fence(*mission, fence, buffer),
+            Self::Fence { line_digest, fence } => link::encode_fence(*line_digest, fence, buffer),
             #[cfg(feature = "upload")]
-            Self::Offer { upload, answer } => offer::encode(upload, *answer, buffer),
+            Self::Offer {
+                upload,
+                offer_number,
+            } => offer::encode(upload, *offer_number, buffer),
             #[cfg(not(feature = "upload"))]
             Self::Offer { upload, .. } => match *upload {},
             Self::Level { mission, power_w } => round::encode_level(*mission, *power_w, buffer),
@@ -241,14 +247,14 @@ impl Message {
             }
             tag::VERDICT => Answer::decode(body).map(Self::Verdict),
             tag::BUSY => Ok(Self::Busy {
-                sweep: read::<Word>(body)?.number(),
+                number: read::<Word>(body)?.number(),
             }),
             tag::HEARTBEAT => {
-                let [mission, ask, answer]: [Word; 3] = read(body)?;
+                let [mission, request, reply]: [Word; 3] = read(body)?;
                 Ok(Self::Heartbeat {
                     mission: mission.number(),
-                    ask: ask.number(),
-                    answer: answer.number(),
+                    request: request.number(),
+                    reply: reply.number(),
                 })
             }
             tag::PULSE => Pulse::decode(body).map(Self::Pulse),
@@ -263,13 +269,16 @@ impl Message {
             tag::PROPOSAL => Proposal::decode(body).map(Self::Proposal),
             tag::DECISION => Decision::decode(body).map(Self::Decision),
             tag::FENCE => {
-                let (mission, fence) = link::decode_fence(body)?;
-                Ok(Self::Fence { mission, fence })
+                let (line_digest, fence) = link::decode_fence(body)?;
+                Ok(Self::Fence { line_digest, fence })
             }
             #[cfg(feature = "upload")]
             tag::OFFER => {
-                let (upload, answer) = offer::decode(body)?;
-                Ok(Self::Offer { upload, answer })
+                let (upload, offer_number) = offer::decode(body)?;
+                Ok(Self::Offer {
+                    upload,
+                    offer_number,
+                })
             }
             tag::LEVEL if UPLOAD => {
                 let (mission, power_w) = round::decode_level(body)?;

@@ -142,6 +142,6 @@ impl OfferBody {
         if sites.is_some_and(|sites| !sites.are_valid()) {
             return None;
         }
-        Upload::checked(pass.number(), pass.mission(), config, sites).ok()
+        Upload::checked(pass.number(), pass.digest(), config, sites).ok()
     }
 }

@@ -106,7 +106,7 @@ impl PassId {
         self.number.number()
     }
 
-    pub(super) const fn mission(self) -> u16 {
+    pub(super) const fn digest(self) -> u16 {
         self.mission.number()
     }
 }

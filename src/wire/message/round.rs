@@ -24,7 +24,7 @@ pub struct Sweep {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
-    pub mission: u16,
+    pub view_digest: u16,
     /// Targets.
     pub ladder: Ladder,
     /// Cross-section and power of the sender.
@@ -53,7 +53,7 @@ impl SweepHead {
     fn of(sweep: &Sweep) -> Self {
         let (anchor, gap, growth) = sweep.ladder.parts();
         Self {
-            pass: PassId::new(sweep.number, sweep.mission),
+            pass: PassId::new(sweep.number, sweep.view_digest),
             anchor: if sweep.ladder.is_plain() {
                 -anchor
             } else {
@@ -108,7 +108,7 @@ fn checked(
     let own = profile(head.altitude_m, head.power_w)?;
     (fits && measured && beside).then_some(Sweep {
         number: head.pass.number(),
-        mission: head.pass.mission(),
+        view_digest: head.pass.digest(),
         ladder,
         relay: Station {
             at: CrossSection {
@@ -129,20 +129,27 @@ pub struct Answer {
     /// Number of the sweep.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
-    pub mission: u16,
+    pub view_digest: u16,
     /// Results of the targets.
     pub verdict: Verdict,
     /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
-    pub stand: Option<f32>,
+    pub required_x_m: Option<f32>,
     /// True if the sender or a relay after it has a profile of its own.
     pub own: bool,
 }
 
 impl Answer {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         let Verdict { commit, slacks } = &self.verdict;
-        let body = (tag::VERDICT, pass, self.own, commit, slacks, self.stand);
+        let body = (
+            tag::VERDICT,
+            pass,
+            self.own,
+            commit,
+            slacks,
+            self.required_x_m,
+        );
         write(&body, buffer)
     }
 
@@ -157,10 +164,10 @@ impl Answer {
         }
         Ok(Self {
             number: pass.number(),
-            mission: pass.mission(),
+            view_digest: pass.digest(),
             verdict: Verdict { commit, slacks },
             own,
-            stand,
+            required_x_m: stand,
         })
     }
 }
@@ -188,7 +195,7 @@ pub struct Roster {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
-    pub mission: u16,
+    pub view_digest: u16,
     /// Index of the last relay in earlier passes; 0 in the first pass.
     pub after: u16,
     /// Profiles of the relays after that one. If the roster is full, the next pass collects the rest.
@@ -200,7 +207,7 @@ type SeatsBody = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         let mut parts = SeatsBody::new();
         for seat in &self.seats {
             _ = parts.push((Word::new(seat.index), seat.held_m, seat.power_w));
@@ -216,7 +223,7 @@ impl Roster {
         }
         let mut roster = Self {
             number: pass.number(),
-            mission: pass.mission(),
+            view_digest: pass.digest(),
             after: after.number(),
             seats: OwnSeats::new(),
         };
@@ -246,7 +253,7 @@ pub struct Token {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
-    pub mission: u16,
+    pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
     /// Transmit power of the sender, W.
@@ -259,7 +266,7 @@ pub struct Token {
 
 impl Token {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         let at = PlaceBody::of(self.place);
         let turn = StepBody::of(self.turn);
         write(
@@ -283,7 +290,7 @@ impl Token {
         let place = at.checked()?;
         Some(Self {
             number: pass.number(),
-            mission: pass.mission(),
+            view_digest: pass.digest(),
             place,
             power_w: profile(place.altitude_m, power_w)?.power_w,
             turn: turn.checked()?,
@@ -371,30 +378,33 @@ pub struct Moved {
     /// Number of the pass.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
-    pub mission: u16,
+    pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
     /// True if the sender or any relay after it has moved.
-    pub any: bool,
+    pub any_moved: bool,
     /// SIR of the worst hop after the sender, linear.
-    pub worst: f32,
+    pub worst_sir: f32,
 }
 
 impl Moved {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         let at = PlaceBody::of(self.place);
-        write(&(tag::MOVED, pass, at, self.any, self.worst), buffer)
+        write(
+            &(tag::MOVED, pass, at, self.any_moved, self.worst_sir),
+            buffer,
+        )
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (pass, at, any, worst): (PassId, PlaceBody, bool, f32) = read(body)?;
         Ok(Self {
             number: pass.number(),
-            mission: pass.mission(),
+            view_digest: pass.digest(),
             place: at.checked().ok_or(MessageError::Value)?,
-            any,
-            worst: sir_in_range(worst).ok_or(MessageError::Value)?,
+            any_moved: any,
+            worst_sir: sir_in_range(worst).ok_or(MessageError::Value)?,
         })
     }
 }
@@ -412,15 +422,15 @@ pub struct Heard {
     /// Number of the pass, wrapping.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
-    pub mission: u16,
+    pub view_digest: u16,
     /// New estimate for all relays.
-    pub told: Told,
+    pub estimate: Told,
     /// Sums of the measurements.
     pub sums: Sums,
     /// Level at the receiver.
     pub receiver: Level,
     /// Node number of a relay that does not fit the others and is not included in `sums`; 0 for none. Used on the way back.
-    pub off: u16,
+    pub excluded: u16,
 }
 
 /// Estimate as one byte and four numbers, which are 0 if unused.
@@ -486,10 +496,10 @@ type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {
     pub(super) fn encode(&self, tag: u8, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         let [a, b, c, d, e, f, g, h, i, rest @ ..] = self.sums.numbers;
         let sums: SumsBody = ([a, b, c, d, e, f, g, h, i], rest);
-        let told = BeliefBody::of(self.told);
+        let told = BeliefBody::of(self.estimate);
         write(
             &(
                 tag,
@@ -497,7 +507,7 @@ impl Heard {
                 told,
                 sums,
                 [self.receiver.power_w, self.receiver.count],
-                Word::new(self.off),
+                Word::new(self.excluded),
             ),
             buffer,
         )
@@ -524,11 +534,11 @@ impl Heard {
         }
         Ok(Self {
             number: pass.number(),
-            mission: pass.mission(),
-            told,
+            view_digest: pass.digest(),
+            estimate: told,
             sums,
             receiver,
-            off,
+            excluded: off,
         })
     }
 }

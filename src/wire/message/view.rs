@@ -14,7 +14,7 @@ pub struct Proposal {
     /// Mission of the view: the one that every relay up to the sender has.
     pub mission_id: MissionId,
     /// New view, later than every view known to its proposer.
-    pub view: ViewId,
+    pub proposed_view: ViewId,
     /// Number of relays that the proposal has reached, including the sender: 1 to 1000.
     pub place: u16,
     /// Result of the poll so far.
@@ -35,7 +35,7 @@ pub struct Poll {
     pub lease_left: u16,
     /// Time until positions of the new view may be used, tenths of a second; 65535 if unknown. The cause is leases of earlier
     /// views.
-    pub rest: u16,
+    pub earlier_lease_left: u16,
     /// Latest successor of that view that a member has accepted; it may have been agreed on.
     pub successor: Option<Successor>,
 }
@@ -48,7 +48,7 @@ impl Poll {
             votes: 0,
             proposer: false,
             lease_left: u16::MAX,
-            rest: u16::MAX,
+            earlier_lease_left: u16::MAX,
             successor: None,
         }
     }
@@ -71,18 +71,18 @@ pub struct Decision {
     /// Proposed mission.
     pub mission_id: MissionId,
     /// Proposed view.
-    pub proposal: ViewId,
+    pub proposed_view: ViewId,
     /// Position of the sender on the proposal's path, from 1 at the proposer: 1 to 1000.
     pub place: u16,
     /// Number of relays that the proposal has reached: 1 to 1000.
-    pub there: u16,
+    pub reached: u16,
     /// Newest view that any polled relay knows to be agreed on, which the decision follows.
     pub base: View,
     /// View to accept: the proposed one, or one that was decided before; `None` without a quorum.
-    pub view: Option<View>,
+    pub accepted: Option<View>,
     /// Time until the view's positions may be used, tenths of a second. The cause is members of the previous view that were not
     /// polled.
-    pub lease_left: u16,
+    pub usable_in: u16,
 }
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -153,14 +153,14 @@ impl Proposal {
             votes,
             proposer,
             lease_left,
-            rest,
+            earlier_lease_left: rest,
             successor,
         } = self.poll;
         let successor = successor.map(|successor| {
             let proposal = successor.proposal.bits().to_le_bytes();
             (proposal, SizedBody::of(successor.view))
         });
-        let call = CallBody::new(self.mission_id, self.view, self.place);
+        let call = CallBody::new(self.mission_id, self.proposed_view, self.place);
         let numbers = [votes, lease_left, rest].map(Word::new);
         let agreed = SizedBody::of(agreed);
         write(
@@ -183,7 +183,7 @@ impl Proposal {
             votes,
             proposer,
             lease_left,
-            rest,
+            earlier_lease_left: rest,
             successor,
         };
         let known = is_view(agreed)
@@ -205,7 +205,7 @@ impl Proposal {
             .ok_or(MessageError::Value)?;
         Ok(Self {
             mission_id,
-            view,
+            proposed_view: view,
             place,
             poll,
         })
@@ -222,10 +222,10 @@ type ProposalBody = (
 
 impl Decision {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let call = CallBody::new(self.mission_id, self.proposal, self.place);
-        let view = self.view.map(SizedBody::of);
+        let call = CallBody::new(self.mission_id, self.proposed_view, self.place);
+        let view = self.accepted.map(SizedBody::of);
         let base = SizedBody::of(self.base);
-        let numbers = [self.there, self.lease_left].map(Word::new);
+        let numbers = [self.reached, self.usable_in].map(Word::new);
         write(&(tag::DECISION, call, base, view, numbers), buffer)
     }
 
@@ -244,12 +244,12 @@ impl Decision {
             .ok_or(MessageError::Value)?;
         Ok(Self {
             mission_id,
-            proposal,
+            proposed_view: proposal,
             place,
-            there,
+            reached: there,
             base,
-            view,
-            lease_left,
+            accepted: view,
+            usable_in: lease_left,
         })
     }
 }
@@ -261,7 +261,7 @@ pub struct Pulse {
     /// Number of the renewal, wrapping: all members have taken part in the one before.
     pub number: u16,
     /// Digest of the mission and the view.
-    pub mission: u16,
+    pub view_digest: u16,
     /// Duration of the lease after a member has taken part in a renewal, in tenths of a second: 1 to 65535.
     pub lease: u16,
 }
@@ -273,14 +273,14 @@ pub struct Pulsed {
     /// Number of the renewal.
     pub number: u16,
     /// Digest of the mission and the view.
-    pub mission: u16,
+    pub view_digest: u16,
     /// True if the renewal has reached the last relay and has been acknowledged by it.
     pub done: bool,
 }
 
 impl Pulse {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         write(&(tag::PULSE, pass, Word::new(self.lease)), buffer)
     }
 
@@ -292,7 +292,7 @@ impl Pulse {
         }
         Ok(Self {
             number: pass.number(),
-            mission: pass.mission(),
+            view_digest: pass.digest(),
             lease,
         })
     }
@@ -300,7 +300,7 @@ impl Pulse {
 
 impl Pulsed {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
-        let pass = PassId::new(self.number, self.mission);
+        let pass = PassId::new(self.number, self.view_digest);
         write(&(tag::PULSED, pass, self.done), buffer)
     }
 
@@ -308,7 +308,7 @@ impl Pulsed {
         let (pass, done): (PassId, bool) = read(body)?;
         Ok(Self {
             number: pass.number(),
-            mission: pass.mission(),
+            view_digest: pass.digest(),
             done,
         })
     }

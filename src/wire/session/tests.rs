@@ -1,6 +1,6 @@
 //! Handshakes of two sessions, and a table with fewer entries than nodes.
 
-use super::{Checked, HELLO, PEERS, Session};
+use super::{Checked, HANDSHAKE_LENGTH, PEERS, Session};
 use crate::node::duplicate::{RAISED, Rival, Sender};
 use crate::time::{Duration, Instant};
 use crate::wire::auth::{Auth, Key};
@@ -48,7 +48,7 @@ fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u3
     let len = if handshake {
         frame::encode_handshake(header, &body, signer, &mut out)
     } else {
-        frame::encode_signed(header, &Message::Busy { sweep: 1 }, signer, &mut out)
+        frame::encode_signed(header, &Message::Busy { number: 1 }, signer, &mut out)
     };
     plain(&out, len)
 }
@@ -154,7 +154,7 @@ fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
 #[test]
 fn a_body_of_a_handshake_says_who_is_known() {
     let mut own = session();
-    assert_eq!(own.handshake(2), [0; HELLO]);
+    assert_eq!(own.handshake(2), [0; HANDSHAKE_LENGTH]);
     own.greet(2);
     own.greet(3);
     assert_eq!(

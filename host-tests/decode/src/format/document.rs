@@ -13,7 +13,7 @@ fn section<'a>(document: &'a str, from: &str) -> Option<&'a str> {
 pub(super) fn read(document: &str) -> Result<Format, String> {
     let mut messages: Vec<Layout> = Vec::new();
     let mut known: Vec<(String, Vec<Row>)> = Vec::new();
-    while let Some(text) = section(document, &format!("\n### Tag {}: ", messages.len())) {
+    while let Some(text) = section(document, &format!("\n### Tag {:02x}: ", messages.len())) {
         let (name, text) = text.split_once('\n').unwrap_or((text, ""));
         let tables = tables(text);
         let Some(table) = tables

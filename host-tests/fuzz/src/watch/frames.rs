@@ -93,7 +93,7 @@ impl Frames {
             }
             self.number = number_of(&message).unwrap_or(self.number);
             if let Message::Hello(hello) = &message {
-                self.asked = hello.nonce;
+                self.asked = hello.offer_number;
             }
             if let Message::Fence { fence, .. } = &message {
                 self.association = fence.association;

@@ -7,7 +7,7 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,
         Message::Verdict(answer) => answer.number,
-        Message::Busy { sweep } => *sweep,
+        Message::Busy { number: sweep } => *sweep,
         Message::Gather(roster) | Message::Gathered(roster) => roster.number,
         Message::Sense(hearing) | Message::Sensed(hearing) => hearing.number,
         Message::Token(token) => token.number,

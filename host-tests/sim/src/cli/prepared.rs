@@ -309,7 +309,7 @@ fn drawn(
             (
                 before,
                 believed.into_iter().collect(),
-                OtherInterferers::Believed,
+                OtherInterferers::NewEstimate,
             )
         };
     let shown: Vec<_> = interferers.iter().chain(&others).copied().collect();

@@ -148,7 +148,7 @@ fn formed(outcome: &Outcome) -> u64 {
         .moments
         .iter()
         .filter_map(|moment| match moment.what {
-            TimelineEvent::Reformed { view, .. } => Some(view),
+            TimelineEvent::ViewAccepted { view, .. } => Some(view),
             _ => None,
         })
         .collect();

@@ -96,7 +96,7 @@ pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport>
 fn views(moments: &[Moment]) -> Vec<View> {
     let mut views: BTreeMap<u32, (u16, View)> = BTreeMap::new();
     for (place, moment) in moments.iter().enumerate() {
-        if let TimelineEvent::Reformed { view, relays, .. } = moment.what {
+        if let TimelineEvent::ViewAccepted { view, relays, .. } = moment.what {
             let (_, known) = views.entry(view).or_insert_with(|| {
                 let view = View {
                     number: view,

@@ -49,7 +49,7 @@ impl MomentReport {
             TimelineEvent::Booted => "switched on",
             TimelineEvent::Lost(_) => "lost",
             TimelineEvent::Found(_) => "found",
-            TimelineEvent::Reformed { .. } => "view accepted",
+            TimelineEvent::ViewAccepted { .. } => "view accepted",
             TimelineEvent::NoQuorum => "no quorum",
             TimelineEvent::LeaseLapsed => "lease expired",
             TimelineEvent::NotHeard => "not received by",
@@ -75,7 +75,7 @@ impl MomentReport {
             TimelineEvent::SensorOff => "sensor off",
         };
         let (view, relays) = match moment.what {
-            TimelineEvent::Reformed { view, relays, .. } => (Some(view), Some(relays)),
+            TimelineEvent::ViewAccepted { view, relays, .. } => (Some(view), Some(relays)),
             _ => (None, None),
         };
         let version = match moment.what {

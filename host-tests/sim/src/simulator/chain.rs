@@ -208,7 +208,7 @@ impl Chain {
                 let Ok(relay) = switched_on(&self.setup, start, stored, record) else {
                     return;
                 };
-                member.swept += member.relay.stats().sweeps;
+                member.swept += member.relay.stats().passes_begun;
                 member.starts = start.number;
                 member.relay = relay;
                 member.killed = None;

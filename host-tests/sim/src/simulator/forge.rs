@@ -20,7 +20,7 @@ pub(super) use uav_relay_scenario::deployment::NETWORK;
 
 /// Header flags: a tag follows; the body is a handshake.
 const SIGNED: u8 = 0x10;
-const HELLO: u8 = 0x20;
+const HANDSHAKE: u8 = 0x20;
 
 const CHECK: usize = 4;
 
@@ -130,56 +130,56 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let message = match (rng.random_range(0..6), better(mission, rng)) {
         (0, _) => Message::Heartbeat {
             mission: digest,
-            ask: rng.random(),
-            answer: rng.random(),
+            request: rng.random(),
+            reply: rng.random(),
         },
         (1, _) => Message::Busy {
-            sweep: rng.random(),
+            number: rng.random(),
         },
         (2, _) => Message::Hello(Hello {
             mission: digest,
-            newest: view,
+            latest_view: view,
             neighbour: way.to,
-            ask: true,
-            form: true,
+            requests_reply: true,
+            requests_view: true,
             fresh: rng.random(),
             ready: true,
             hears: 0x0F,
             behind: place,
-            holds: mission_id,
-            flies: true,
-            whole: rng.random(),
+            latest_mission: mission_id,
+            active: true,
+            active_in_view: rng.random(),
             refused: rng.random(),
-            nonce: rng.random(),
+            offer_number: rng.random(),
         }),
         (3, _) => Message::Proposal(Proposal {
             mission_id,
-            view,
+            proposed_view: view,
             place,
             poll: Poll {
                 agreed: loaded,
                 votes: place,
                 proposer: true,
                 lease_left: 0,
-                rest: 0,
+                earlier_lease_left: 0,
                 successor: None,
             },
         }),
         (4, Some(upload)) => Message::Offer {
             upload,
-            answer: rng.random(),
+            offer_number: rng.random(),
         },
         _ => Message::Decision(Decision {
             mission_id,
-            proposal: view,
+            proposed_view: view,
             place,
-            there: place,
+            reached: place,
             base: loaded,
-            view: rng.random::<bool>().then_some(View {
+            accepted: rng.random::<bool>().then_some(View {
                 id: view,
                 relays: rng.random_range(1..=mission.relays()),
             }),
-            lease_left: 0,
+            usable_in: 0,
         }),
     };
     let mut frame = [0; MAX_FRAME];
@@ -207,7 +207,7 @@ fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
 fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut plain = unsealed(&made_up(mission, way, rng)).unwrap_or_default();
     plain.truncate(HEADER);
-    flag(&mut plain, SIGNED | HELLO);
+    flag(&mut plain, SIGNED | HANDSHAKE);
     let mut rest = [0; HELLO_BODY + TAG];
     rng.fill_bytes(&mut rest);
     if let Some(asks) = rest.get_mut(HELLO_BODY - 1) {

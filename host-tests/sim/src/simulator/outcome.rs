@@ -25,7 +25,7 @@ pub enum TimelineEvent {
     /// The relay received its lost neighbour, or a new one, at that side.
     Found(Side),
     /// The relay accepted a new view.
-    Reformed {
+    ViewAccepted {
         /// Number of the view.
         view: u32,
         /// Index of the relay in the view, from 1 at Tx.

@@ -49,7 +49,7 @@ pub enum OtherInterferers {
     #[default]
     Before,
     /// Interferer estimated by the relays.
-    Believed,
+    NewEstimate,
 }
 
 impl OtherInterferers {
@@ -57,7 +57,7 @@ impl OtherInterferers {
     pub(super) const fn word(self) -> &'static str {
         match self {
             Self::Before => "before",
-            Self::Believed => "believed",
+            Self::NewEstimate => "believed",
         }
     }
 
@@ -65,7 +65,7 @@ impl OtherInterferers {
     pub(super) const fn tip(self) -> &'static str {
         match self {
             Self::Before => "interferer of the previous mission",
-            Self::Believed => "estimated interferer",
+            Self::NewEstimate => "estimated interferer",
         }
     }
 }

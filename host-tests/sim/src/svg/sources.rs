@@ -77,7 +77,7 @@ fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
         .map(|source| (frame.x.at(source.1), source));
     all.filter(|(at, _)| {
         let covers = |(_, x, _): &Source| (frame.x.at(*x) - at).abs() < 12.0;
-        picture.others_are == OtherInterferers::Believed || !inside.iter().any(covers)
+        picture.others_are == OtherInterferers::NewEstimate || !inside.iter().any(covers)
     })
     .collect()
 }

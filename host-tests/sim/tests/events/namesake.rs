@@ -5,7 +5,7 @@ use uav_relay::{Event, Relay};
 
 use crate::air::{Air, KEY, auth, relay};
 
-const TAKEN: Event = Event::IndexTaken { node: 3 };
+const TAKEN: Event = Event::DuplicateIndex { node: 3 };
 
 /// Returns a flying chain of five with a second relay 3 that has just been switched on, and its index.
 fn joined(loss: f64, seed: u64) -> (Air, usize) {
@@ -37,7 +37,7 @@ fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() 
                 let given = air.relays[other].setpoint();
                 assert_eq!(given, None, "loss {loss}, seed {seed}, {:?}", air.now);
             }
-            assert!(air.relays[other].stands_down() && !air.relays[2].stands_down());
+            assert!(air.relays[other].is_passive() && !air.relays[2].is_passive());
             let mut told = air.told(TAKEN);
             told.sort_unstable();
             told.dedup();
@@ -55,17 +55,17 @@ fn the_later_one_takes_part_once_the_other_is_gone() {
     for by_hand in [false, true] {
         let (mut air, other) = joined(0.0, 1);
         air.run(10);
-        assert!(air.relays[other].stands_down());
+        assert!(air.relays[other].is_passive());
         air.off[2] = true;
         if by_hand {
             let now = air.now;
-            air.relays[other].clear_index_taken(now);
-            assert!(!air.relays[other].stands_down());
+            air.relays[other].clear_duplicate_index(now);
+            assert!(!air.relays[other].is_passive());
         }
         air.run(20);
-        assert_eq!(air.relays[other].stands_down(), !by_hand);
+        assert_eq!(air.relays[other].is_passive(), !by_hand);
         air.run(100);
-        assert!(!air.relays[other].stands_down());
+        assert!(!air.relays[other].is_passive());
         assert!(air.relays[other].setpoint().is_some(), "it is relay 3 now");
     }
 }
@@ -85,7 +85,7 @@ fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
         other.handle_timeout(air.now);
         let other = air.join(other);
         air.run(400);
-        let down = [2, other].map(|at| air.relays[at].stands_down());
+        let down = [2, other].map(|at| air.relays[at].is_passive());
         assert_eq!(down[0], !down[1], "seed {seed}");
         let flies = if down[0] { other } else { 2 };
         assert!(air.relays[flies].setpoint().is_some());
@@ -105,7 +105,7 @@ fn with_a_key_the_one_with_the_larger_epoch_stays() {
         let silent = if first_stays { other } else { 2 };
         assert!(air.told(TAKEN).contains(&silent), "{epoch}");
         assert_eq!(air.relays[2].setpoint().is_some(), first_stays, "{epoch}");
-        assert_eq!(air.relays[2].stands_down(), !first_stays, "{epoch}");
+        assert_eq!(air.relays[2].is_passive(), !first_stays, "{epoch}");
         assert_eq!(
             air.relays[other].setpoint().is_some(),
             !first_stays,
@@ -130,10 +130,10 @@ fn forged_frames_have_nobody_stand_down() {
         air.run(1);
         liar.handle_timeout(air.now);
     }
-    assert_eq!(air.told(Event::IndexTaken { node: 2 }), [1]);
+    assert_eq!(air.told(Event::DuplicateIndex { node: 2 }), [1]);
     assert!(
         air.relays
             .iter()
-            .all(|relay| relay.setpoint().is_some() && !relay.stands_down())
+            .all(|relay| relay.setpoint().is_some() && !relay.is_passive())
     );
 }

@@ -74,7 +74,7 @@ fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() 
         let settings = super::air::settings(auth(KEY, 5));
         air.relays[1] = Relay::new(mission, identity, settings, 1_000 * seed, air.now).unwrap();
         let restarted = air.now;
-        let reports = |air: &Air| air.told(Event::IndexTaken { node: 2 }).contains(&1);
+        let reports = |air: &Air| air.told(Event::DuplicateIndex { node: 2 }).contains(&1);
         while air.relays[1].setpoint().is_none() {
             air.run(1);
             let seconds = air.now.since(restarted).as_micros() / 1_000_000;
@@ -116,6 +116,6 @@ fn a_neighbour_that_is_heard_at_both_ports_is_told() {
         }
         told.extend(std::iter::from_fn(|| middle.poll_event()));
     }
-    assert_eq!(told, [Event::IndexTaken { node: 1 }]);
-    assert!(!middle.stands_down());
+    assert_eq!(told, [Event::DuplicateIndex { node: 1 }]);
+    assert!(!middle.is_passive());
 }

@@ -38,7 +38,7 @@ fn joined(outcome: &Outcome, healed: Instant) -> Option<Instant> {
         if moment.at > healed && views.iter().all(|one| *one == (views[0].0, 8)) {
             return Some(healed);
         }
-        if let TimelineEvent::Reformed { view, relays, .. } = moment.what {
+        if let TimelineEvent::ViewAccepted { view, relays, .. } = moment.what {
             views[usize::from(moment.relay - 1)] = (view, relays);
             if moment.at >= healed && views.iter().all(|one| *one == (view, 8)) {
                 return Some(moment.at);

@@ -54,7 +54,7 @@ fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let last = outcome.moments.iter().rfind(|moment| {
         let changes = matches!(
             moment.what,
-            TimelineEvent::Reformed { .. } | TimelineEvent::Converged | TimelineEvent::NoQuorum
+            TimelineEvent::ViewAccepted { .. } | TimelineEvent::Converged | TimelineEvent::NoQuorum
         );
         changes && nodes.contains(&moment.relay)
     });

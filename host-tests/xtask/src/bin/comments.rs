@@ -2,9 +2,12 @@
 //!
 //! The first sentence of a doc comment is its summary: rustdoc shows it in every list. It has at most [`LONGEST`] characters, and its
 //! first word is a noun, an article, an adjective or a verb. Without a dictionary the check names the words that it must not be.
+//!
+//! No tracked file contains a name of `host-tests/xtask/data/old_names.txt`, except that list and CHANGELOG.md: after a rename the
+//! code, the documents and the tools use the new name.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
 /// Maximum length of a summary, characters.
 const LONGEST: usize = 100;
@@ -26,6 +29,12 @@ const WRONG: [&str; 8] = [
 
 /// Doc comments that are exempt: path, colon, summary. The list is empty, and stays so.
 const EXEMPT: [&str; 0] = [];
+
+/// Names that were replaced, one a line: words that nothing else uses.
+const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
+
+/// Files that may contain old names: the list of them, and the table of old and new names.
+const WITH_OLD_NAMES: [&str; 2] = ["host-tests/xtask/data/old_names.txt", "CHANGELOG.md"];
 
 /// Doc comment: its line, counted from 1, and its first paragraph.
 struct Comment {
@@ -118,6 +127,39 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
+/// Returns the old names in a text, each with its line, counted from 1.
+fn old_names(text: &str) -> Vec<(usize, &'static str)> {
+    let is_letter = |c: char| c.is_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split(|c| !is_letter(c)).collect();
+        let old = OLD_NAMES.lines().filter(|name| words.contains(name));
+        found.extend(old.map(|name| (index + 1, name)));
+    }
+    found
+}
+
+/// Returns the tracked files of the project.
+fn tracked() -> std::io::Result<Vec<String>> {
+    let output = Command::new("git").arg("ls-files").output()?;
+    let names = String::from_utf8_lossy(&output.stdout);
+    Ok(names.lines().map(str::to_owned).collect())
+}
+
+/// Returns each old name in a tracked text file.
+fn check_names() -> std::io::Result<Vec<String>> {
+    let mut faults = Vec::new();
+    for file in tracked()? {
+        // A file that is deleted or not UTF-8 has no names.
+        let text = std::fs::read_to_string(&file).unwrap_or_default();
+        if !WITH_OLD_NAMES.contains(&file.as_str()) {
+            let found = old_names(&text).into_iter();
+            faults.extend(found.map(|(line, name)| format!("{file}:{line}: old name {name}")));
+        }
+    }
+    Ok(faults)
+}
+
 fn check() -> std::io::Result<(usize, Vec<String>)> {
     let mut files = Vec::new();
     for folder in FOLDERS {
@@ -140,6 +182,17 @@ fn check() -> std::io::Result<(usize, Vec<String>)> {
 }
 
 fn main() -> ExitCode {
+    match check_names() {
+        Ok(faults) if faults.is_empty() => {}
+        Ok(faults) => {
+            eprintln!("{}\nCHANGELOG.md has the new names", faults.join("\n"));
+            return ExitCode::FAILURE;
+        }
+        Err(error) => {
+            eprintln!("git ls-files: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
     match check() {
         Ok((count, faults)) if faults.is_empty() && count > 0 => {
             println!("{count} doc comments");
@@ -162,7 +215,15 @@ fn main() -> ExitCode {
 
 #[cfg(test)]
 mod tests {
-    use super::{comments, fault, summary};
+    use super::{OLD_NAMES, comments, fault, old_names, summary};
+
+    #[test]
+    fn old_names_are_whole_words() {
+        let name = OLD_NAMES.lines().next().unwrap();
+        let text = format!("a{name}\n{name}_b\n({name})");
+        assert_eq!(old_names(&text), [(3, name)]);
+        assert!(OLD_NAMES.lines().is_sorted_by(|a, b| a < b));
+    }
 
     #[test]
     fn a_summary_ends_with_its_first_sentence() {

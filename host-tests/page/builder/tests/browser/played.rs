@@ -78,7 +78,7 @@ fn a_chain_is_seen_to_lose_a_relay_and_to_close_up() {
     let words = said(&mut browser, "summary");
     assert_eq!(
         words,
-        "At 0.000 s: 0 of 8 relays have a position; 0 messages."
+        "At 0.000 s: 0 of 8 relays have an agreed position; 0 messages."
     );
     let waits = browser.value("document.querySelectorAll('#above .hop.waits').length");
     assert_eq!(waits, 9);

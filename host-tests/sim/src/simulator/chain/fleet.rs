@@ -221,7 +221,7 @@ impl Chain {
         let lent = self.members.iter().zip(&self.fleet);
         lent.filter(|(member, vehicle)| member.killed.is_none() && vehicle.is_lent(self.now))
             .all(|(member, vehicle)| {
-                let agreed = member.relay.final_setpoint();
+                let agreed = member.relay.agreed_place();
                 let there = agreed.and_then(|place| vehicle.there(place));
                 let there = there.is_some_and(|place| apart(place, vehicle.at()) < THERE_M);
                 vehicle.link.is_flown() && there

@@ -69,7 +69,7 @@ impl Chain {
         living
             .filter(|(member, _)| member.killed.is_none())
             .all(|(member, drone)| {
-                let agreed = member.relay.final_setpoint();
+                let agreed = member.relay.agreed_place();
                 agreed.is_some_and(|place| apart(point(place), drone.taken()) < 1e-3)
             })
     }

@@ -25,8 +25,8 @@ impl Chain {
                 Event::MissionMismatch { node } => (TimelineEvent::MissionMismatch, Some(node)),
                 Event::KeyMismatch { node } => (TimelineEvent::KeyMismatch, Some(node)),
                 Event::EpochWentBack { node } => (TimelineEvent::EpochWentBack, Some(node)),
-                Event::IndexTaken { node } => (TimelineEvent::DuplicateIndex, Some(node)),
-                Event::Believed => (TimelineEvent::NewEstimate, None),
+                Event::DuplicateIndex { node } => (TimelineEvent::DuplicateIndex, Some(node)),
+                Event::NewEstimate => (TimelineEvent::NewEstimate, None),
                 Event::InterfererUnclear => (TimelineEvent::InterfererUnclear, None),
                 Event::SensorOff { node } => (TimelineEvent::SensorOff, Some(node)),
                 Event::LeaseLapsed => (TimelineEvent::LeaseLapsed, None),
@@ -34,10 +34,10 @@ impl Chain {
                     self.holding += 1;
                     (TimelineEvent::Converged, None)
                 }
-                Event::Reformed => {
+                Event::ViewAccepted => {
                     // The rounds so far belong to the previous view.
                     self.outcome.rounds.clear();
-                    let what = TimelineEvent::Reformed {
+                    let what = TimelineEvent::ViewAccepted {
                         view: member.relay.view().number(),
                         index: member.relay.index(),
                         relays: member.relay.mission().relays(),
@@ -110,6 +110,6 @@ impl Chain {
 impl Member {
     /// Returns the number of sweeps that this relay has begun over all its starts.
     fn begun(&self) -> u32 {
-        self.swept + self.relay.stats().sweeps
+        self.swept + self.relay.stats().passes_begun
     }
 }

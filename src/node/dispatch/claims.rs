@@ -1,0 +1,144 @@
+//! Claims to this relay's node number, which another node may use too.
+
+use super::Node;
+use crate::event::{About, Event};
+use crate::node::duplicate::{Duplicated, Sender};
+use crate::settings::Wiring;
+use crate::side::Side;
+use crate::time::Instant;
+use crate::wire::message::{Claim, Message};
+
+impl Node {
+    pub(crate) fn on_duplicate_index(&mut self, now: Instant, sender: Sender) {
+        let settings = self.member.settings;
+        let shown = match sender {
+            Sender::Itself => false,
+            // Without signatures the frame may be this relay's own, which only a claim can tell.
+            Sender::Unknown => settings.auth.is_some(),
+            Sender::Rival(rival) => rival.is_current,
+        };
+        if shown
+            && self
+                .duplicate
+                .should_report(now, Duplicated::Own, &settings)
+        {
+            let node = self.member.node;
+            self.raise_about(About::Index, Side::Upstream, node);
+            if let Sender::Rival(rival) = sender
+                && rival.newer_epoch
+            {
+                // The other node may be this relay itself, before its epoch went back.
+                self.raise_about(About::Epoch, Side::Upstream, node);
+            }
+        }
+        let placed = self.setpoint().is_some();
+        // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
+        let lease = &self.layers.lease;
+        let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
+        let has_lease = placed && leased;
+        if self
+            .duplicate
+            .handle_frame(now, sender, has_lease, &settings)
+        {
+            self.layers.round.discard_agreed_place();
+            if placed {
+                self.raise(Event::SetpointChanged);
+            }
+        }
+    }
+
+    /// Repeats a claim to its sender, or compares an echo; returns false if signed frames replace claims.
+    pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
+        if self.member.settings.auth.is_some() {
+            return false;
+        }
+        if claim.echo {
+            let sender = self.duplicate.rival(claim);
+            if sender != Sender::Itself {
+                self.on_duplicate_index(now, sender);
+            }
+        } else if !self.is_passive() {
+            let claim = Claim {
+                echo: true,
+                ..claim
+            };
+            self.echo = Some((side, from, claim));
+        }
+        true
+    }
+
+    pub(super) fn next_claim(&mut self) -> Option<(Side, u16, Message)> {
+        if let Some((side, to, claim)) = self.echo.take() {
+            return Some((side, to, Message::Claim(claim)));
+        }
+        let (side, to) = self.poll_claim()?;
+        let claim = Claim {
+            number: self.duplicate.number(),
+            other_number: self.duplicate.other_number(),
+            passive: self.is_passive(),
+            echo: false,
+        };
+        Some((side, to, Message::Claim(claim)))
+    }
+
+    /// Returns the destination of a due claim, and marks it as sent.
+    ///
+    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
+    pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
+        if !self.duplicate.poll_claim() {
+            return None;
+        }
+        let side = self.claim_side;
+        self.claim_side = side.other();
+        let nodes = [side, side.other()].map(|side| (side, self.layers.neighbours.at(side).node()));
+        let neighbour = nodes.into_iter().find(|(_, node)| *node != 0);
+        neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
+    }
+
+    /// Returns the claim number if all sessions must be started again with it.
+    pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
+        self.duplicate.poll_sessions()
+    }
+
+    pub(crate) const fn claim_number(&self) -> u32 {
+        self.duplicate.number()
+    }
+
+    /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
+    ///
+    /// Another relay with this number then detects this one even if the chain sends nothing else.
+    pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
+        let once = match message {
+            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
+            Message::Pulsed(pulsed) => pulsed.done,
+            _ => false,
+        };
+        once && self.member.settings.wiring == Wiring::Shared
+    }
+
+    pub(crate) fn rival(&self, claim: Claim) -> Sender {
+        self.duplicate.rival(claim)
+    }
+
+    /// Returns true while this relay is passive, because another one has its number.
+    pub(crate) const fn is_passive(&self) -> bool {
+        self.duplicate.is_passive()
+    }
+
+    /// Handles the report that the other relay with this number has been removed.
+    pub(crate) fn clear_duplicate(&mut self, now: Instant) {
+        if self.duplicate.clear(now, &self.member.settings) {
+            self.become_active(now);
+        }
+    }
+
+    /// Becomes active as after a restart: view, lease and proposal may be those of the other node by now.
+    pub(super) fn become_active(&mut self, now: Instant) {
+        self.layers.neighbours.leave();
+        self.layers.lease.end();
+        if !self.layers.round.is_fresh() {
+            self.layers.round.suspend();
+            self.layers.view.leave(now);
+        }
+    }
+}

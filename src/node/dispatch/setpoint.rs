@@ -1,0 +1,70 @@
+//! Setpoint for the autopilot, and the reports of the drone that it depends on.
+
+use super::Node;
+use crate::event::Event;
+use crate::guard::HoldReason;
+use crate::node::context::Member;
+use crate::place::Placement;
+use crate::side::Side;
+use crate::time::Instant;
+
+impl Node {
+    /// Returns the agreed position, or without a quorum the one by `Settings::without_quorum`.
+    fn wanted_place(&self) -> Option<Placement> {
+        let agreed = self.layers.round.agreed_place()?;
+        Some(if self.layers.view.has_no_quorum() {
+            self.member.settings.without_quorum.place(agreed)
+        } else {
+            agreed
+        })
+    }
+
+    pub(super) fn steer(&mut self, now: Instant) {
+        if self.steering.steer(now, self.wanted_place()) {
+            self.raise(Event::SetpointChanged);
+        }
+    }
+
+    pub(crate) fn handle_position(&mut self, now: Instant, measured_at: Instant, place: Placement) {
+        self.steering.handle_position(measured_at, place);
+        self.steer(now);
+    }
+
+    /// Takes the control state of the drone: true while it flies to the setpoints. Returns true if the guard did not know it.
+    pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
+        let is_news = self.steering.handle_control(now, flown);
+        if is_news {
+            self.steer(now);
+        }
+        is_news
+    }
+
+    /// Handles the report that the lost relays at `side` are not in the air any more. The others of the view at that side are not
+    /// meant.
+    pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
+        let Member { index, mission, .. } = &self.member;
+        let in_view = match side {
+            Side::Upstream => index.saturating_sub(1),
+            Side::Downstream => mission.relays().saturating_sub(*index),
+        };
+        let lost = u16::from(self.layers.neighbours.at(side).node() != 0);
+        self.steering.clear_lost(side, in_view > lost);
+        self.steer(now);
+    }
+
+    pub(crate) const fn agreed_place(&self) -> Option<Placement> {
+        self.layers.round.agreed_place()
+    }
+
+    /// Returns the current setpoint; `None` while the relay is passive.
+    pub(crate) fn setpoint(&self) -> Option<Placement> {
+        if self.is_passive() {
+            return None;
+        }
+        self.steering.setpoint(self.wanted_place())
+    }
+
+    pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
+        self.steering.hold_reason(side)
+    }
+}

@@ -1,0 +1,142 @@
+//! Expired timers of all layers: silent neighbours, view requests, wait for the first pass.
+
+use super::Node;
+use crate::event::About;
+use crate::node::context::first_pass;
+use crate::node::neighbour::liveness::patient_tick;
+use crate::settings::Wiring;
+use crate::side::Side;
+use crate::time::Instant;
+
+impl Node {
+    /// Handles expired timers, each layer once. Bounded by one portion of a computation.
+    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        if self.duplicate.handle_timeout(now, &self.member.settings) {
+            self.become_active(now);
+        }
+        if self.is_passive() {
+            return;
+        }
+        let solved = self.is_solving(now);
+        let context = self.layers.context(now, &self.member);
+        let effects = self.layers.round.handle_timeout(&context);
+        self.apply(now, effects);
+        let context = self.layers.context(now, &self.member);
+        let effects = self.layers.lease.handle_timeout(&context);
+        self.apply(now, effects);
+        if solved && !self.is_solving(now) {
+            self.on_solved(now);
+        }
+        self.drop_links_if_expired(now);
+        for side in [Side::Upstream, Side::Downstream] {
+            if self.layers.neighbours.at(side).is_due(now) {
+                self.on_neighbour_timeout(now, side);
+            }
+        }
+        if self.awaits_first() && self.is_solving(now) {
+            if self.layers.view.request.is_due(now) {
+                self.await_first(now);
+            }
+        } else {
+            let leads = self.layers.neighbours.at(self.back()).has_no_peer();
+            let fresh = self.layers.round.is_fresh();
+            let context = self.layers.context(now, &self.member);
+            let effects = self.layers.view.handle_timeout(&context, leads, fresh);
+            self.apply(now, effects);
+        }
+        self.layers.update.handle_timeout(now);
+        self.steering.handle_timeout(now);
+        self.steer(now);
+    }
+
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        if self.is_passive() {
+            return self.duplicate.next_timeout();
+        }
+        [
+            self.duplicate.next_timeout(),
+            self.layers.neighbours.next_timeout(),
+            self.layers.view.next_timeout(),
+            self.layers.lease.next_timeout(),
+            self.layers.round.next_timeout(),
+            self.steering.next_timeout(),
+            self.no_quorum_timer.next_timeout(),
+            self.layers.update.next_timeout(),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
+    }
+
+    fn on_neighbour_timeout(&mut self, now: Instant, side: Side) {
+        let (solving, searches) = (self.is_solving(now), self.searches());
+        let (layers, settings) = (&mut self.layers, &self.member.settings);
+        let neighbour = layers.neighbours.at_mut(side);
+        if solving && neighbour.excuse_silence(now, settings) {
+            return;
+        }
+        let node = neighbour.node();
+        let ended = neighbour.has_no_peer();
+        let dead = layers.lease.span(settings);
+        let many = settings.wiring == Wiring::Shared && layers.lease.is_open();
+        let asking = many.then(|| patient_tick(settings, self.member.all));
+        let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
+        let ends = neighbour.has_no_peer() && !ended;
+        self.steering
+            .link(side, Some(neighbour.node()).filter(|node| *node != 0));
+        if lost {
+            self.raise_about(About::Lost, side, node);
+        }
+        if ends {
+            self.layers.view.request.repeat_now(now);
+        }
+        self.review_neighbours(now);
+    }
+
+    /// Requests a new view if the neighbours differ from those of the last decision.
+    pub(super) fn review_neighbours(&mut self, now: Instant) {
+        if self.layers.neighbours.have_changed(now) {
+            self.layers.view.request.start(now);
+        }
+        if self.layers.neighbours.at(self.onward()).has_no_peer()
+            && self.layers.view.outstanding().is_some()
+        {
+            // The next relay of the outstanding proposal is lost, so this relay is the last one and decides.
+            let context = self.layers.context(now, &self.member);
+            let effects = self.layers.view.decide(&context);
+            self.apply(now, effects);
+        }
+    }
+
+    /// Returns true while this relay computes the joint solution, as all relays of its view do.
+    fn is_solving(&self, now: Instant) -> bool {
+        self.layers
+            .round
+            .is_solving(&self.layers.context(now, &self.member))
+    }
+
+    /// Restarts the timers for neighbours and for the first pass, which waited for the joint solution.
+    fn on_solved(&mut self, now: Instant) {
+        for side in [Side::Upstream, Side::Downstream] {
+            let neighbour = self.layers.neighbours.at_mut(side);
+            neighbour.excuse_silence(now, &self.member.settings);
+        }
+        if self.awaits_first() {
+            self.await_first(now);
+        }
+    }
+
+    /// Returns true if neither a pass has been received nor a view requested since the start.
+    fn awaits_first(&self) -> bool {
+        self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
+    }
+
+    /// Starts the timer for the first pass; when it expires, the relay requests a view.
+    pub(super) fn await_first(&mut self, now: Instant) {
+        let (settings, all) = (&self.member.settings, self.member.all);
+        let there_and_back = settings.hop_time.times(2 * u32::from(all));
+        let usual = now + settings.probe_after + there_and_back;
+        let slow = now + first_pass(settings, all);
+        self.layers.view.request.await_first(usual.max(slow));
+    }
+}
