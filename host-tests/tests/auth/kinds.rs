@@ -1,5 +1,6 @@
 //! Kinds of attacks, and the counter that each must increment according to `FORMAT.md`.
 
+use host_tests::fixtures::NETWORK;
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,7 +9,7 @@ use uav_relay_decode::vectors::Vectors;
 use uav_relay_oracle::random::seed;
 
 use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, handshake, nonce, plain};
-use super::net::{Heard, NETWORK, Net};
+use super::net::{Heard, Net};
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
