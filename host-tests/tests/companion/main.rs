@@ -16,6 +16,7 @@ mod idle;
 mod listening;
 mod mavsdk;
 mod medium;
+mod mistrust;
 mod moved;
 mod numbered;
 mod options;
