@@ -1,7 +1,7 @@
 //! Common flights of tests: eight drones in a row, heavy faults, and settings for the end of a run.
 
 use rand::RngExt;
-use uav_relay::{Band, Duration, Instant, Mission, MissionConfig, Profile};
+use uav_relay::{Band, Duration, GuardConfig, Instant, Mission, MissionConfig, Profile};
 use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::{FlightSpec, Point};
@@ -70,6 +70,19 @@ pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
     FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
+}
+
+/// Separation of guarded flights, m.
+pub const SEPARATION_M: f32 = 5.0;
+
+/// Smallest permitted distance of two drones, m: positions are f32 of up to 1 km, with rounding errors of 2 mm.
+pub const APART_M: f64 = SEPARATION_M as f64 - 2e-3;
+
+/// Gives `setup` a guard, and eight drones that start at least the separation apart.
+pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
+    let common = setup.mission.config().common;
+    setup.settings.guard = Some(GuardConfig::of(&setup.mission, common));
+    setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
 }
 
 /// Returns own powers and altitudes of all eight relays three times in ten, otherwise none.

@@ -51,7 +51,7 @@ fn places(relays: u16) -> Vec<(&'static str, u16)> {
 }
 
 #[test]
-fn one_loss_is_noticed_within_15_s_and_costs_six_sweeps_at_most() {
+fn a_loss_is_noticed_within_15_s_and_costs_up_to_six_sweeps() {
     println!(
         "| N | lost | noticed after | view accepted after | at the new positions after | sweeps |"
     );

@@ -64,7 +64,7 @@ fn frames_that_begin_in_common_slots_have_twice_that() {
 }
 
 #[test]
-fn carrier_sense_carries_more_where_all_hear_each_other_and_little_where_none_do() {
+fn carrier_sense_carries_more_where_all_hear_each_other() {
     let frames = 5_000;
     let near = throughput(crowd(Access::Csma, true, 1), 0.5, frames, false);
     let hidden = throughput(crowd(Access::Csma, false, 1), 0.5, frames, false);

@@ -30,7 +30,7 @@ fn a_chain_takes_the_same_places_by_any_channel() {
 }
 
 #[test]
-fn a_deaf_relay_receives_nothing_from_that_one_until_it_hears_again() {
+fn a_deaf_relay_receives_nothing_until_it_hears_again() {
     for access in [Access::Ideal, Access::Aloha, Access::Csma] {
         let mut setup = Setup::on_air(mission(2), access);
         setup.deaf = vec![OneWayFailure {

@@ -40,7 +40,7 @@ fn two_frames_that_overlap_are_both_lost_where_both_are_heard() {
 }
 
 #[test]
-fn of_three_frames_in_a_row_the_one_in_the_middle_takes_both_others_with_it() {
+fn of_three_overlapping_frames_none_is_received() {
     let hearers = vec![vec![3], vec![3], vec![3], vec![]];
     let mut bench = Bench::new(Access::Aloha, hearers, 1);
     for (node, later) in [(0, 0), (1, micros(80)), (2, micros(160))] {
@@ -94,7 +94,7 @@ fn a_hidden_node_does_not_wait_and_one_in_range_does() {
 }
 
 #[test]
-fn two_that_begin_in_the_same_slot_collide_and_in_different_slots_do_not() {
+fn two_frames_collide_only_in_the_same_slot() {
     let (mut same, runs) = (0, 4_000);
     for seed in 0..runs {
         let mut bench = Bench::in_one_range(Access::Csma, 3, seed);
@@ -145,7 +145,7 @@ fn a_radio_that_is_switched_off_sends_nothing_more() {
 }
 
 #[test]
-fn who_finds_the_channel_busy_again_and_again_waits_longer_and_longer() {
+fn a_node_waits_longer_each_time_the_channel_is_busy() {
     let runs = 2_000;
     let mut times = 0;
     for seed in 0..runs {

@@ -1,8 +1,10 @@
-//! Chains of relays on asynchronous ports, each a task of one executor, compared with polled ports.
+//! Chains of relays on asynchronous ports, each a task of one executor.
 
 use std::cell::RefCell;
+use std::pin::Pin;
 use std::rc::Rc;
 
+use embassy_futures::join::join;
 use futures_executor::LocalPool;
 use futures_util::task::LocalSpawnExt as _;
 use host_tests::fixtures;
@@ -68,64 +70,43 @@ pub(crate) fn fly(
     let drones: Vec<Rc<RefCell<Drone>>> = (0..count).map(|_| Rc::default()).collect();
     for (index, drone) in (1..=relays).zip(&drones) {
         let at = usize::from(index);
-        let (lines, drone) = (lines.clone(), Rc::clone(drone));
+        let drone = Rc::clone(drone);
         let time = time.clone();
-        let rx = |line: &Shared, end| Rx {
-            line: Rc::clone(line),
+        let rx = |line: usize, end| Rx {
+            line: Rc::clone(&lines[line]),
             end,
             time: time.clone(),
         };
-        let tx = |line: &Shared, end, port| Tx {
-            line: Rc::clone(line),
+        let tx = |line: usize, end, port| Tx {
+            line: Rc::clone(&lines[line]),
             end,
             time: time.clone(),
             fate: fate(trouble, index, port),
         };
         // The sender of every wire is at end 0.
-        let task: std::pin::Pin<Box<dyn Future<Output = ()>>> = match wiring {
+        let task: Pin<Box<dyn Future<Output = ()>>> = match wiring {
             Wiring::Pair => {
-                let [from_up, to_down] = [&lines[at - 1], &lines[at]];
-                let [to_up, from_down] = [&lines[count + at], &lines[count + 1 + at]];
-                let up = AsyncLink::new(rx(from_up, 1), tx(to_up, 0, Port::Upstream), BAUD);
-                let down = AsyncLink::new(rx(from_down, 1), tx(to_down, 0, Port::Downstream), BAUD);
+                let up = (rx(at - 1, 1), tx(count + at, 0, Port::Upstream));
+                let down = (rx(count + 1 + at, 1), tx(at, 0, Port::Downstream));
+                let [up, down] = [up, down].map(|(rx, tx)| AsyncLink::new(rx, tx, BAUD));
                 let mut ports = AsyncPair::new(up, down);
                 let time = time.clone();
                 Box::pin(async move {
                     let mut relay = relay(relays, index, wiring);
                     let relay = AsyncRelay::new(&mut relay);
-                    embassy_futures::join::join(
-                        ports.run(&relay, &time, |_| true),
-                        firmware(&relay, &time, &drone),
-                    )
-                    .await;
+                    let runs = ports.run(&relay, &time, |_| true);
+                    join(runs, firmware(&relay, &time, &drone)).await;
                 })
             }
             Wiring::Shared => {
-                let [rx, tx] = [&lines[0]; 2];
-                let link = AsyncLink::new(
-                    Rx {
-                        line: Rc::clone(rx),
-                        end: at - 1,
-                        time: time.clone(),
-                    },
-                    Tx {
-                        line: Rc::clone(tx),
-                        end: at - 1,
-                        time: time.clone(),
-                        fate: fate(trouble, index, Port::Shared),
-                    },
-                    BAUD,
-                );
-                let mut ports = AsyncShared::new(link);
+                let (rx, tx) = (rx(0, at - 1), tx(0, at - 1, Port::Shared));
+                let mut ports = AsyncShared::new(AsyncLink::new(rx, tx, BAUD));
                 let time = time.clone();
                 Box::pin(async move {
                     let mut relay = relay(relays, index, wiring);
                     let relay = AsyncRelay::new(&mut relay);
-                    embassy_futures::join::join(
-                        ports.run(&relay, &time, |_| true),
-                        firmware(&relay, &time, &drone),
-                    )
-                    .await;
+                    let runs = ports.run(&relay, &time, |_| true);
+                    join(runs, firmware(&relay, &time, &drone)).await;
                 })
             }
         };

@@ -2,23 +2,23 @@
 
 mod autopilot;
 mod chain;
-mod polled;
 mod ports;
 mod time;
 mod wire;
 
 use chain::{Flown, fly, setpoints};
+use host_tests::bench::agreed;
+use host_tests::fixtures;
 use uav_relay::serial::SerialStats;
-use uav_relay::{Event, Instant, Port, Side, Wiring};
+use uav_relay::{Event, Instant, Mission, Port, Side, Wiring};
 use wire::Fate;
 
 const END: Instant = Instant::from_millis(20_000);
 
 #[test]
-fn five_settle_where_the_polled_ones_do() {
+fn five_settle_like_bare_relays() {
+    let expected = agreed(Mission::try_new(fixtures::paper(5)).unwrap());
     for wiring in [Wiring::Pair, Wiring::Shared] {
-        let expected = polled::places(wiring, 5);
-        assert!(expected.iter().all(Option::is_some), "{wiring:?}");
         for capacity in [1, 16, 1_000] {
             let flown = fly(wiring, 5, capacity, None, END);
             assert_eq!(setpoints(&flown), expected, "{wiring:?} {capacity}");

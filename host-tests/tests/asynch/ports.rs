@@ -8,6 +8,7 @@ use std::task::{Context, Poll, Waker};
 
 use embedded_hal::digital::{ErrorType as PinType, OutputPin};
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
+use futures_executor::LocalPool;
 use futures_util::task::LocalSpawnExt as _;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::wire::deframe::Deframer;
@@ -26,6 +27,16 @@ struct Taker {
     /// Interval of failing writes.
     fails: usize,
     done: usize,
+}
+
+impl Taker {
+    /// Creates a writer that blocks after `writes` writes.
+    fn until(writes: usize) -> Self {
+        Self {
+            writes: Rc::new(Cell::new(writes)),
+            ..Self::default()
+        }
+    }
 }
 
 struct Silent;
@@ -81,8 +92,14 @@ impl Read for Flood {
     }
 }
 
-fn poll<F: Future>(future: std::pin::Pin<&mut F>, cx: &mut Context<'_>) {
-    assert!(future.poll(cx).is_pending());
+/// Runs the ports of a relay from the first to the last millisecond, and drops the runner then.
+fn run_for(time: &Time, millis: std::ops::Range<u64>, runner: impl Future) {
+    let (mut pool, mut cx) = (LocalPool::new(), Context::from_waker(Waker::noop()));
+    let mut runner = pin!(runner);
+    for millis in millis {
+        time.run(&mut pool, Instant::from_millis(millis));
+        assert!(runner.as_mut().poll(&mut cx).is_pending());
+    }
 }
 
 /// Returns the numbers of intact and damaged frames.
@@ -108,39 +125,20 @@ fn deframed(bytes: &[u8]) -> [usize; 2] {
 fn a_frame_that_is_cut_short_is_ended_before_the_next() {
     for cut in 1..12 {
         let time = Time::default();
-        let mut pool = futures_executor::LocalPool::new();
-        let taken = Rc::<RefCell<Vec<u8>>>::default();
-        let writes = Rc::new(Cell::new(cut));
-        let down = Taker {
-            taken: Rc::clone(&taken),
-            writes: Rc::clone(&writes),
-            ..Taker::default()
-        };
-        let up = Taker::default();
+        let down = Taker::until(cut);
+        let (taken, writes) = (Rc::clone(&down.taken), Rc::clone(&down.writes));
         let mut ports = AsyncPair::new(
-            AsyncLink::new(Silent, up, BAUD),
+            AsyncLink::new(Silent, Taker::default(), BAUD),
             AsyncLink::new(Silent, down, BAUD),
         );
         let mut relay = relay(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
-        {
-            let mut cx = Context::from_waker(Waker::noop());
-            let mut run = pin!(ports.run(&relay, &time, |_| true));
-            for millis in 0..3_000 {
-                time.run(&mut pool, Instant::from_millis(millis));
-                poll(run.as_mut(), &mut cx);
-            }
-        }
+        run_for(&time, 0..3_000, ports.run(&relay, &time, |_| true));
         assert_eq!(writes.get(), 0);
         let before = taken.borrow().len();
         let half = taken.borrow().last() != Some(&0);
         writes.set(usize::MAX);
-        let mut cx = Context::from_waker(Waker::noop());
-        let mut run = pin!(ports.run(&relay, &time, |_| true));
-        for millis in 3_000..9_000 {
-            time.run(&mut pool, Instant::from_millis(millis));
-            poll(run.as_mut(), &mut cx);
-        }
+        run_for(&time, 3_000..9_000, ports.run(&relay, &time, |_| true));
         let taken = taken.borrow();
         let [whole, spoiled] = deframed(&taken);
         println!("dropped behind {before} bytes: {whole} whole frames, {spoiled} cut short");
@@ -154,26 +152,18 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
 #[test]
 fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
     let time = Time::default();
-    let mut pool = futures_executor::LocalPool::new();
-    let taken = Rc::<RefCell<Vec<u8>>>::default();
     let down = Taker {
-        taken: Rc::clone(&taken),
-        writes: Rc::new(Cell::new(usize::MAX)),
         fails: 23,
-        ..Taker::default()
+        ..Taker::until(usize::MAX)
     };
+    let taken = Rc::clone(&down.taken);
     let mut ports = AsyncPair::new(
         AsyncLink::new(Silent, Taker::default(), BAUD),
         AsyncLink::new(Silent, down, BAUD),
     );
     let mut relay = relay(2, 1, Wiring::Pair);
     let relay = AsyncRelay::new(&mut relay);
-    let mut cx = Context::from_waker(Waker::noop());
-    let mut run = pin!(ports.run(&relay, &time, |_| true));
-    for millis in 0..20_000 {
-        time.run(&mut pool, Instant::from_millis(millis));
-        poll(run.as_mut(), &mut cx);
-    }
+    run_for(&time, 0..20_000, ports.run(&relay, &time, |_| true));
     let [whole, spoiled] = deframed(&taken.borrow());
     let stats = relay.stats(Port::Downstream);
     println!(
@@ -192,25 +182,15 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
 fn a_port_that_is_always_ready_starves_nobody() {
     for fails in [false, true] {
         let time = Time::default();
-        let mut pool = futures_executor::LocalPool::new();
-        let taken = Rc::<RefCell<Vec<u8>>>::default();
-        let down = Taker {
-            taken: Rc::clone(&taken),
-            writes: Rc::new(Cell::new(usize::MAX)),
-            ..Taker::default()
-        };
+        let down = Taker::until(usize::MAX);
+        let taken = Rc::clone(&down.taken);
         let mut ports = AsyncPair::new(
             AsyncLink::new(Flood { fails }, Taker::default(), BAUD),
             AsyncLink::new(Silent, down, BAUD),
         );
         let mut relay = relay(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
-        let mut cx = Context::from_waker(Waker::noop());
-        let mut run = pin!(ports.run(&relay, &time, |_| true));
-        for millis in 0..3_000 {
-            time.run(&mut pool, Instant::from_millis(millis));
-            poll(run.as_mut(), &mut cx);
-        }
+        run_for(&time, 0..3_000, ports.run(&relay, &time, |_| true));
         assert!(deframed(&taken.borrow())[0] > 3, "{fails}");
         let failed = relay.stats(Port::Upstream).other;
         assert_eq!(failed > 10, fails, "{failed}");
@@ -258,7 +238,7 @@ impl OutputPin for Pin {
 fn the_pin_is_high_while_bytes_leave_and_little_longer() {
     for capacity in [1, 4, 16, 1_000] {
         let time = Time::default();
-        let mut pool = futures_executor::LocalPool::new();
+        let mut pool = LocalPool::new();
         let air = line(2, capacity);
         let pin = Pin {
             time: time.clone(),

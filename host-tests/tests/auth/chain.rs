@@ -1,25 +1,15 @@
 //! Authenticated chains: their positions equal those of plain chains, also with faults and reboots.
 
-use host_tests::fixtures::mission;
-use uav_relay::{
-    Adjust, Auth, Identity, Instant, Key, Method, Phase, Relay, Settings, Stats, Wiring,
-};
+use host_tests::fixtures::{self, mission};
+use host_tests::flights::settle;
+use uav_relay::{Adjust, Auth, Instant, Key, Method, Phase, Settings, Stats, Wiring};
 use uav_relay_oracle::random::seed;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission::mission as of_scenario;
-use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-use super::net::{Deed, KEY, NETWORK, Net};
-
-fn settle(setup: Setup) -> Outcome {
-    let outcome = run(setup).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    assert_eq!(outcome.unsafe_setpoints, 0);
-    outcome
-}
+use super::net::{Deed, KEY, Net};
 
 fn signed(mut setup: Setup) -> Setup {
     setup.settings.auth = Some(Auth {
@@ -163,12 +153,8 @@ fn a_stranger_is_not_heard() {
             auth,
             ..Settings::default()
         };
-        let identity = Identity {
-            network: NETWORK,
-            index: 2,
-        };
         let mut net = Net::new(2, Wiring::Pair, &[]);
-        *net.relay(2) = Relay::new(mission(2), identity, settings, 1, Instant::ZERO).unwrap();
+        *net.relay(2) = fixtures::relay(mission(2), 2, settings);
         net.run(Instant::from_millis(14_000));
         let (head, tail) = (net.stats(1), net.stats(2));
         assert_eq!((head.received, tail.received), (0, 0));

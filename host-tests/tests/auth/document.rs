@@ -1,11 +1,10 @@
 //! Vectors of frames with a tag, byte by byte.
 
-use host_tests::fixtures::mission;
-use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings};
+use host_tests::fixtures::{self, NETWORK, mission};
+use uav_relay::{Auth, Instant, Key, Port, Settings};
 use uav_relay_decode::vectors::Vectors;
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
-use super::net::NETWORK;
 
 fn key() -> [u8; 32] {
     std::array::from_fn(|byte| u8::try_from(byte).unwrap())
@@ -45,7 +44,7 @@ fn the_worked_frames_are_what_the_rules_say() {
 
 /// Checks that relays accept the worked frames: relay 2 of 3 uses its first nonce for relay 1.
 #[test]
-fn the_worked_handshake_is_taken_and_the_crate_makes_the_same_tags() {
+fn the_worked_handshake_is_taken_and_tags_are_the_same() {
     let settings = Settings {
         auth: Some(Auth {
             key: Key::new(key()),
@@ -53,11 +52,7 @@ fn the_worked_handshake_is_taken_and_the_crate_makes_the_same_tags() {
         }),
         ..Settings::default()
     };
-    let identity = Identity {
-        network: NETWORK,
-        index: 2,
-    };
-    let mut relay = Relay::new(mission(3), identity, settings, 1, Instant::ZERO).unwrap();
+    let mut relay = fixtures::relay(mission(3), 2, settings);
     let (_, wire) = worked("a handshake");
     relay.handle_bytes(Instant::ZERO, Port::Upstream, &wire);
     assert_eq!(relay.stats().handshakes, 1);

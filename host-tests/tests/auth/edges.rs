@@ -1,13 +1,13 @@
 //! Counters and epochs at their limits, by frames that require the key.
 
-use host_tests::fixtures::mission;
-use uav_relay::MAX_FRAME;
+use host_tests::bench;
+use host_tests::fixtures::{NETWORK, mission};
 use uav_relay::SetupError;
 use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
 use super::kinds::raised;
-use super::net::{KEY, NETWORK, relay};
+use super::net::{KEY, relay};
 
 const NOW: Instant = Instant::from_millis(5);
 
@@ -21,14 +21,9 @@ impl Link {
     /// Creates a link on which both have authenticated each other.
     fn new() -> Self {
         let mut relay = relay(3, 2, Wiring::Pair, (4, Instant::ZERO));
-        let mut out = [0; MAX_FRAME];
-        let mut own = None;
-        relay.persist(|_| true);
-        while let Some(transmit) = relay.poll_transmit(NOW, &mut out) {
-            if transmit.port == Port::Upstream {
-                own = Some(plain(&out[..transmit.len]).nonces()[0]);
-            }
-        }
+        let mut sent = bench::sent(&mut relay, NOW).into_iter();
+        let upstream = sent.rfind(|(port, _)| *port == Port::Upstream);
+        let own = upstream.map(|(_, wire)| plain(&wire).nonces()[0]);
         let nonces = [nonce(9, 1), own.unwrap()];
         assert_eq!(nonces[1] >> 32, 4, "the epoch");
         let mut link = Self { relay, nonces };

@@ -1,7 +1,7 @@
 //! Replayed handshakes: at most they delay a first contact until the genuine handshake arrives.
 
+use host_tests::bench;
 use rand::seq::IndexedRandom;
-use uav_relay::MAX_FRAME;
 use uav_relay::{Event, Instant, Port, Side, Wiring};
 
 use super::frames::plain;
@@ -67,7 +67,7 @@ fn recorded_handshakes_at_any_time_change_no_place() {
 
 /// Checks that a booted relay accepts each recorded handshake at most once, and then the genuine one.
 #[test]
-fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
+fn recorded_handshakes_are_answered_once_each_and_overtaken() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     for life in 2..=9 {
         net.run(Instant::from_millis(u64::from(life) * 1_000));
@@ -109,7 +109,7 @@ fn a_flood_of_recorded_handshakes_is_answered_once_each_and_overtaken() {
 
 /// Checks a genuine handshake that arrives, with a lost answer, while the relay trusts a recorded one.
 #[test]
-fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
+fn a_relay_that_took_a_recorded_handshake_finds_out() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     net.run(Instant::from_millis(1_000));
     let old = net
@@ -123,10 +123,8 @@ fn a_relay_that_believes_a_recorded_handshake_finds_out_by_itself() {
     net.run(Instant::from_millis(2_000));
     let start = Instant::from_millis(2_000);
     let mut fresh = relay(2, 2, Wiring::Pair, (2, start));
-    let mut lost = [0; MAX_FRAME];
     fresh.handle_bytes(start, Port::Upstream, &old);
-    fresh.persist(|_| true);
-    while fresh.poll_transmit(start, &mut lost).is_some() {}
+    bench::sent(&mut fresh, start);
     *net.relay(2) = fresh;
     net.genuine[1] = 0;
     net.lives[1] = 2;
@@ -159,7 +157,6 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
 /// Returns the time until relay 1 loses its silent neighbour (ms), and the accepted handshakes.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
-    let mut frame = [0; MAX_FRAME];
     let mut lost_after = None;
     for ms in 0..20_000 {
         let now = Instant::from_millis(ms);
@@ -169,16 +166,10 @@ fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
             lonely.handle_bytes(now, Port::Downstream, &wire);
         }
         lonely.handle_timeout(now);
-        lonely.persist(|_| true);
-        while lonely.poll_transmit(now, &mut frame).is_some() {}
-        while let Some(event) = lonely.poll_event() {
-            if matches!(
-                event,
-                Event::NeighbourLost {
-                    side: Side::Downstream,
-                    ..
-                }
-            ) {
+        bench::sent(&mut lonely, now);
+        for event in bench::events(&mut lonely) {
+            if let Event::NeighbourLost { side, .. } = event {
+                assert_eq!(side, Side::Downstream);
                 lost_after.get_or_insert(ms);
             }
             assert!(!matches!(event, Event::NeighbourBack { .. }));

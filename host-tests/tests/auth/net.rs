@@ -2,14 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use host_tests::fixtures::mission;
-use uav_relay::MAX_FRAME;
+use host_tests::bench;
+use host_tests::fixtures::{NETWORK, mission};
 use uav_relay::{
-    Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, Mission,
-    MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,
+    Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, MAX_FRAME,
+    Mission, MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,
 };
 
-pub(crate) const NETWORK: u16 = 7;
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
 
 /// Latency between neighbours.
@@ -290,13 +289,10 @@ impl Net {
 
     fn drain(&mut self, index: u16) -> usize {
         let now = self.now;
-        let mut frame = [0; MAX_FRAME];
-        let mut sent = 0;
-        self.relay(index).persist(|_| true);
-        while let Some(transmit) = self.relay(index).poll_transmit(now, &mut frame) {
-            sent += 1;
-            let wire = frame[..transmit.len].to_vec();
-            let to = match transmit.port {
+        let sent = bench::sent(self.relay(index), now);
+        let count = sent.len();
+        for (port, wire) in sent {
+            let to = match port {
                 Port::Upstream => index - 1,
                 Port::Downstream => index + 1,
                 Port::Shared => super::frames::plain(&wire).destination(),
@@ -312,7 +308,7 @@ impl Net {
                 "{index}: {event:?} at {now:?}"
             );
         }
-        sent
+        count
     }
 
     fn drain_ground(&mut self, end: usize) {

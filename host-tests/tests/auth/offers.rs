@@ -1,15 +1,15 @@
 //! Forged and replayed offers of newer missions.
 
-use host_tests::fixtures::mission;
+use host_tests::fixtures::{self, NETWORK, mission};
 use rand::RngExt;
 use rand::seq::IndexedRandom;
 use uav_relay::Upload;
 use uav_relay::ground::Progress;
-use uav_relay::{Identity, Instant, Port, Relay, Settings, Side, Wiring};
+use uav_relay::{Instant, Port, Settings, Side, Wiring};
 
 use super::frames::{HEADER, Plain, SIGNED, TAG, nonce, plain};
 use super::kinds::{Attacker, Kind, raised};
-use super::net::{Deed, Heard, NETWORK, Net, newer};
+use super::net::{Deed, Heard, Net, newer};
 
 /// First byte of an offer's body.
 const OFFER: u8 = 14;
@@ -110,11 +110,7 @@ fn a_chain_without_tags_takes_no_mission_from_anybody() {
             wiring,
             ..Settings::default()
         };
-        let identity = Identity {
-            network: NETWORK,
-            index: 2,
-        };
-        let mut relay = Relay::new(mission(3), identity, settings, 1, Instant::ZERO).unwrap();
+        let mut relay = fixtures::relay(mission(3), 2, settings);
         for (from, raises) in [
             (1, "unsigned"),
             (3, "unsigned"),

@@ -3,26 +3,9 @@
 use super::vehicle::Mode;
 use super::*;
 
-fn flying() -> Vehicle {
-    let mut vehicle = Vehicle::new(Kind::ArduCopter);
-    vehicle.fly_off();
-    vehicle
-}
-
-#[test]
-fn nothing_is_streamed_while_the_pilot_flies() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(500.0));
-    vehicle.run(5_000);
-    assert!(vehicle.targets().is_empty());
-    assert_eq!(vehicle.link.state(), State::Standby);
-}
-
 #[test]
 fn it_is_led_to_its_place_and_then_left_alone() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(180.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::ArduCopter, 180.0);
     vehicle.run(30_000);
     assert!((vehicle.place.x_m - 180.0).abs() < 0.05);
     let last = vehicle.targets().last().unwrap().1;
@@ -39,7 +22,7 @@ fn it_is_led_to_its_place_and_then_left_alone() {
 
 #[test]
 fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
-    let mut vehicle = flying();
+    let mut vehicle = Vehicle::flying(Kind::ArduCopter);
     vehicle.takes_targets = false;
     vehicle.setpoint = Some(place(100.0));
     vehicle.engage();
@@ -58,7 +41,7 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
 /// Checks that an autopilot that does not report its target does not count as refusing.
 #[test]
 fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
-    let mut vehicle = flying();
+    let mut vehicle = Vehicle::flying(Kind::ArduCopter);
     vehicle.says_targets = false;
     vehicle.setpoint = Some(place(130.0));
     vehicle.engage();
@@ -72,9 +55,7 @@ fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
 
 #[test]
 fn a_moving_target_that_is_not_taken_is_an_event() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(500.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::ArduCopter, 500.0);
     vehicle.run(10_000);
     assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
     vehicle.takes_targets = false;
@@ -86,9 +67,7 @@ fn a_moving_target_that_is_not_taken_is_an_event() {
 
 #[test]
 fn back_in_its_mode_the_target_is_told_anew() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(120.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::ArduCopter, 120.0);
     vehicle.run(20_000);
     vehicle.mode = Mode::Position;
     vehicle.run(3_000);
@@ -107,7 +86,7 @@ fn back_in_its_mode_the_target_is_told_anew() {
 #[test]
 fn the_last_target_stands_whenever_it_is_confirmed() {
     for late in 0..100_u16 {
-        let mut vehicle = flying();
+        let mut vehicle = Vehicle::flying(Kind::ArduCopter);
         vehicle.engage();
         vehicle.run(20 * u64::from(late % 25));
         vehicle.setpoint = Some(place(110.0 + f32::from(late) * 0.013));

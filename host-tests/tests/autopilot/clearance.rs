@@ -43,10 +43,9 @@ fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
 }
 
 #[test]
-fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
+fn an_operator_clears_a_lost_relay_by_a_command() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
-        let mut vehicle = Vehicle::new(kind);
-        vehicle.fly_off();
+        let mut vehicle = Vehicle::flying(kind);
         let side = Side::Downstream;
         vehicle
             .link
@@ -102,8 +101,7 @@ fn an_operator_clears_a_lost_relay_by_a_command_to_the_companion() {
 /// Checks commands that a cable or a router delivers two at once. The second one is as good as lost, and its repetition counts.
 #[test]
 fn two_commands_at_once_are_obeyed_one_after_the_other() {
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
+    let mut vehicle = Vehicle::flying(Kind::Px4);
     for (side, node) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
         vehicle
             .link

@@ -3,11 +3,11 @@
 use uav_relay::flight::autopilot::{Autopilot, WaitReason};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Auth, Event, GuardConfig, Key, MAX_FRAME, Mission, MissionConfig, Port, Relay, Settings, Side,
-    Sites, Upload,
+    Auth, Event, GuardConfig, Key, Mission, MissionConfig, Port, Relay, Settings, Side, Sites,
+    Upload,
 };
 
-use host_tests::fixtures;
+use host_tests::{bench, fixtures};
 use mavlink::dialects::common::{
     COMMAND_LONG_DATA, MavCmd, MavLandedState, MavMessage, RADIO_STATUS_DATA,
 };
@@ -86,7 +86,7 @@ fn flies(kind: Kind, settings: Settings) -> (Vehicle, Relay) {
 }
 
 #[test]
-fn a_relay_has_a_setpoint_while_its_drone_is_engaged_and_the_drone_flies_there() {
+fn an_engaged_drone_flies_to_its_relays_setpoint() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let (mut vehicle, mut relay) = flies(kind, Settings::default());
         assert_eq!(vehicle.link.state(), State::Standby);
@@ -145,11 +145,9 @@ fn a_relay_is_handed_what_the_radio_hears() {
 
 /// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
 fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_silent: bool) {
-    let mut frame = [0; MAX_FRAME];
-    first.persist(|_| true);
-    while let Some(sent) = first.poll_transmit(now, &mut frame) {
-        if sent.port == Port::Downstream && !is_silent {
-            second.handle_bytes(now, Port::Upstream, &frame[..sent.len]);
+    for (port, bytes) in bench::sent(first, now) {
+        if port == Port::Downstream && !is_silent {
+            second.handle_bytes(now, Port::Upstream, &bytes);
         }
     }
     if is_silent {
@@ -158,10 +156,9 @@ fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_si
     second.handle_timeout(now);
     let at = second.setpoint().unwrap_or(place(start_m));
     second.handle_position(now, now, at);
-    second.persist(|_| true);
-    while let Some(sent) = second.poll_transmit(now, &mut frame) {
-        if sent.port == Port::Upstream {
-            first.handle_bytes(now, Port::Downstream, &frame[..sent.len]);
+    for (port, bytes) in bench::sent(second, now) {
+        if port == Port::Upstream {
+            first.handle_bytes(now, Port::Downstream, &bytes);
         }
     }
 }

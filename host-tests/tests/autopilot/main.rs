@@ -91,8 +91,7 @@ fn messages_that_come_too_seldom_are_asked_for_again() {
 
 #[test]
 fn heartbeats_of_others_are_not_the_mode() {
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
+    let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.engage();
     vehicle.run(3_000);
     assert_eq!(vehicle.link.state(), State::Engaged);
@@ -137,12 +136,9 @@ fn positions_are_as_old_as_the_autopilot_says() {
 }
 
 #[test]
-fn nothing_is_flown_without_a_position_and_the_last_target_is_kept() {
+fn without_a_position_the_last_target_is_kept() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
-        let mut vehicle = Vehicle::new(kind);
-        vehicle.fly_off();
-        vehicle.setpoint = Some(place(500.0));
-        vehicle.engage();
+        let mut vehicle = Vehicle::engaged(kind, 500.0);
         vehicle.run(4_000);
         vehicle.position_every_ms = u64::MAX;
         vehicle.run(2_000);
@@ -171,8 +167,7 @@ fn nothing_is_flown_without_a_position_and_the_last_target_is_kept() {
 #[test]
 fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
-        let mut vehicle = Vehicle::new(kind);
-        vehicle.fly_off();
+        let mut vehicle = Vehicle::flying(kind);
         vehicle.engage();
         vehicle.run(3_000);
         let before = vehicle.intervals(33);
@@ -189,28 +184,6 @@ fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
         vehicle.run(5_000);
         assert_eq!(vehicle.targets().len(), told, "nothing on the ground");
     }
-}
-
-#[test]
-fn a_silent_autopilot_is_gone_after_three_seconds() {
-    let mut vehicle = Vehicle::new(Kind::ArduCopter);
-    vehicle.fly_off();
-    vehicle.engage();
-    vehicle.run(2_000);
-    vehicle.mute = true;
-    vehicle.run(4_500);
-    assert_eq!(vehicle.link.state(), State::Silent);
-    let told = vehicle.targets().len();
-    vehicle.run(5_000);
-    assert_eq!(vehicle.targets().len(), told);
-    assert!(
-        vehicle
-            .said
-            .iter()
-            .rev()
-            .take(6)
-            .all(|(_, said)| matches!(said, Said::Heartbeat))
-    );
 }
 
 #[test]
@@ -248,25 +221,8 @@ fn numbers_for_the_operator_come_once_a_second() {
 }
 
 #[test]
-fn it_sleeps_between_what_is_due() {
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
-    vehicle.engage();
-    vehicle.setpoint = Some(place(500.0));
-    for _ in 0..20_000 {
-        vehicle.step();
-        while vehicle.link.poll_transmit(vehicle.now).is_some() {}
-        assert!(
-            vehicle.link.poll_timeout(vehicle.now) > vehicle.now,
-            "it would spin"
-        );
-    }
-}
-
-#[test]
 fn the_setpoint_of_before_is_forgotten_on_none() {
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
+    let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.setpoint = Some(Placement::on_line(900.0, 20.0));
     vehicle.engage();
     vehicle.run(6_000);
@@ -286,10 +242,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
 #[test]
 fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
-        let mut vehicle = Vehicle::new(kind);
-        vehicle.fly_off();
-        vehicle.setpoint = Some(place(110.0));
-        vehicle.engage();
+        let mut vehicle = Vehicle::engaged(kind, 110.0);
         for wrong in [f32::NAN, f32::INFINITY, 1e9] {
             vehicle.setpoint = Some(place(wrong));
             vehicle.run(3_000);
@@ -308,10 +261,7 @@ fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
 fn a_bearing_that_is_none_is_left_out() {
     use uav_relay::pointing::Bearing;
 
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
-    vehicle.setpoint = Some(place(110.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::Px4, 110.0);
     for (azimuth_rad, leaves_out) in [(1.0, false), (f32::NAN, true), (1e9, true)] {
         let from = vehicle.now;
         vehicle.link.handle_bearing(Some(Bearing {
@@ -334,8 +284,7 @@ fn a_bearing_that_is_none_is_left_out() {
 /// Checks that nothing is streamed in standby, so that a PX4 refuses OFFBOARD.
 #[test]
 fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
+    let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.setpoint = Some(place(120.0));
     let from = vehicle.now;
     vehicle.link.handle_ready(vehicle.now, false);
@@ -356,7 +305,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
 
 /// Checks the text on a new view: one on each drone in flight, none on others.
 #[test]
-fn the_operator_reads_one_text_for_a_view_and_that_a_mission_was_adopted() {
+fn the_operator_reads_of_a_view_and_a_mission_once() {
     use uav_relay::Event;
     use uav_relay::HoldReason::Unheard;
 

@@ -109,7 +109,7 @@ impl Rig {
 
 /// Checks the model: at the sudden stop of a 5 m/s target, a real PX4 overshoots by 2.1 to 2.7 m.
 #[test]
-fn the_models_px4_flies_as_far_past_a_dead_stop_as_the_real_one() {
+fn the_models_px4_flies_past_a_dead_stop_like_the_real_one() {
     let mut body = Body::default();
     let mut most: f64 = 0.0;
     for i in 0..3_000 {
@@ -325,7 +325,7 @@ fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
 
 /// Checks the number of requests in ten minutes of flight.
 #[test]
-fn what_an_autopilot_does_not_send_it_is_not_asked_for_again_and_again() {
+fn messages_that_never_come_are_not_requested_for_ever() {
     for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 9)] {
         let mut rig = Rig::new(kind);
         assert!(rig.choose(Mode::Companion));
@@ -384,7 +384,7 @@ fn a_drone_that_is_given_back_at_full_speed_stops() {
 
 /// Checks positions that are half a second older than reported. The drone arrives within the speed limit.
 #[test]
-fn positions_that_are_later_than_stated_do_no_harm_to_the_flight() {
+fn late_positions_do_no_harm_to_the_flight() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut rig = Rig::new(kind);
         rig.real.hidden_lag = 25;

@@ -5,12 +5,6 @@ use mavlink::dialects::common::MavLandedState;
 use super::vehicle::Mode;
 use super::*;
 
-fn flying() -> Vehicle {
-    let mut vehicle = Vehicle::new(Kind::Px4);
-    vehicle.fly_off();
-    vehicle
-}
-
 /// Returns the longest gap between targets from `from` on, ms.
 fn longest_gap(vehicle: &Vehicle, from: Instant) -> u64 {
     let times: Vec<Instant> = vehicle
@@ -36,8 +30,8 @@ fn no_target_is_sent_on_the_ground_or_during_take_off() {
 }
 
 #[test]
-fn in_the_air_its_own_place_is_streamed_until_the_mode_is_taken() {
-    let mut vehicle = flying();
+fn in_the_air_its_own_position_is_streamed_in_standby() {
+    let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.setpoint = Some(place(500.0));
     let from = vehicle.now;
     vehicle.run(3_000);
@@ -53,9 +47,7 @@ fn in_the_air_its_own_place_is_streamed_until_the_mode_is_taken() {
 
 #[test]
 fn it_is_led_to_its_place_and_held_there() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(180.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::Px4, 180.0);
     let from = vehicle.now;
     assert_eq!(vehicle.link.state(), State::Engaged);
     vehicle.run(40_000);
@@ -92,9 +84,7 @@ fn it_is_led_to_its_place_and_held_there() {
 
 #[test]
 fn the_pilot_takes_it_and_nothing_is_taken_back() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(500.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     vehicle.run(5_000);
     vehicle.mode = Mode::Position;
     vehicle.run(1_100);
@@ -115,9 +105,7 @@ fn the_pilot_takes_it_and_nothing_is_taken_back() {
 
 #[test]
 fn a_failsafe_is_not_ended_by_the_link() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(500.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     vehicle.run(3_000);
     // The cable breaks until after the autopilot has started its return.
     vehicle.mute = true;
@@ -138,9 +126,7 @@ fn a_failsafe_is_not_ended_by_the_link() {
 
 #[test]
 fn landing_for_a_moment_is_still_flying() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(500.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     let from = vehicle.now;
     vehicle.run(2_000);
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_LANDING;
@@ -153,9 +139,7 @@ fn landing_for_a_moment_is_still_flying() {
 
 #[test]
 fn after_a_landing_it_is_quiet_though_the_mode_says_otherwise() {
-    let mut vehicle = flying();
-    vehicle.setpoint = Some(place(500.0));
-    vehicle.engage();
+    let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     vehicle.run(2_000);
     vehicle.mode = Mode::Hold;
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_LANDING;

@@ -111,7 +111,7 @@ fn with_one_key_it_flies_to_its_place() {
 }
 
 #[test]
-fn what_does_not_fit_is_told_once_and_without_a_key_there_is_no_flight() {
+fn a_key_that_does_not_fit_is_told_once_and_there_is_no_flight() {
     use Mistrust::{NoKey, OtherKey, Unsigned};
     for (ours, theirs, why, is_heard) in [
         (None, Some(OURS), NoKey, true),

@@ -157,6 +157,21 @@ impl Vehicle {
         }
     }
 
+    /// Returns a vehicle in the air under its pilot's control.
+    pub(crate) fn flying(kind: Kind) -> Self {
+        let mut vehicle = Self::new(kind);
+        vehicle.fly_off();
+        vehicle
+    }
+
+    /// Returns a vehicle in the air that flies to a setpoint at `x_m`.
+    pub(crate) fn engaged(kind: Kind, x_m: f32) -> Self {
+        let mut vehicle = Self::flying(kind);
+        vehicle.setpoint = Some(place(x_m));
+        vehicle.engage();
+        vehicle
+    }
+
     /// Takes off under the pilot's control.
     pub(crate) fn fly_off(&mut self) {
         self.run(2_000);

@@ -2,14 +2,10 @@
 
 use std::time::Duration;
 
-use tempfile::TempDir;
-use uav_relay::Geodetic;
-use uav_relay::flight::axis::Axis;
-
+use crate::files::{Files, asked, until};
 use crate::flying::Flight;
-use crate::peer::{Heard, Peer, RX, Site, TX, apart_m, on_earth};
+use crate::peer::{Heard, Peer, RX, Site, TX, apart_m, between_m, on_earth, text};
 use crate::process::Relay;
-use crate::stays::{asked, until};
 
 /// Question in the event line.
 const SWAPPED: &str = "are latitude and longitude swapped?";
@@ -18,35 +14,27 @@ const SWAPPED: &str = "are latitude and longitude swapped?";
 struct Apart {
     drone: Peer,
     relay: Relay,
-    folder: TempDir,
+    files: Files,
 }
 
 impl Apart {
     fn start(kind: &str, tx: Site, rx: Site) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-        let (link, socket) = (path("tty"), path("status"));
-        let at = on_earth(380.0, 0.0).map(|number| number.to_string());
-        let drone = Peer::start("autopilot.py", &[kind, &link, &at[0], &at[1], &at[2]]);
-        let site = |site: Site| site.map(|number| number.to_string()).join(",");
-        let ends = [tx, rx]
-            .map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).expect("on earth"));
-        let axis = Axis::try_new(ends[0], ends[1]).unwrap();
-        let distance = axis.distance_m().to_string();
-        let (tx, rx) = (site(tx), site(rx));
-        let mut options = vec!["--index", "1", "--of", "1", "--autopilot", &link];
-        options.extend(["--site-tx", &tx, "--site-rx", &rx, "--distance", &distance]);
-        options.extend(["--status-socket", &socket]);
-        let relay = Relay::start(&options);
+        let files = Files::new();
+        let (link, socket) = (files.text("tty"), files.text("status"));
+        let drone = Peer::autopilot(kind, &link, 380.0, None);
+        let distance = between_m(tx, rx);
+        let sites = format!("--site-tx {} --site-rx {}", text(tx), text(rx));
+        let own = format!("--distance {distance} --autopilot {link} --status-socket {socket}");
+        let relay = Relay::start(&format!("--index 1 --of 1 {sites} {own}"));
         Self {
             drone,
             relay,
-            folder,
+            files,
         }
     }
 
     fn position(&self) -> serde_json::Value {
-        asked(&self.folder.path().join("status"))["autopilot"]["position"].clone()
+        asked(self.files.path("status"))["autopilot"]["position"].clone()
     }
 }
 
@@ -91,8 +79,7 @@ fn is_off_a_swapped_line(kind: &str) {
     std::thread::sleep(Duration::from_secs(12));
     assert!(apart.relay.lines_with(SWAPPED).is_empty(), "it was told");
     // In the air the event repeats every ten seconds, and the operator receives it too.
-    apart.drone.order("arm");
-    apart.drone.order("takeoff");
+    apart.drone.takes_off();
     apart.relay.line("autopilot: in the air");
     apart.relay.line(SWAPPED);
     apart.drone.forget();
@@ -155,7 +142,7 @@ fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
     };
     let mut apart = Apart::start("arducopter", shifted(TX), shifted(RX));
     apart.relay.line("autopilot: on the ground");
-    let status = apart.folder.path().join("status");
+    let status = apart.files.path("status");
     let said = until(&status, |said| {
         said["autopilot"]["position"]["outside"] == "geofence"
     });
@@ -164,8 +151,7 @@ fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
         .unwrap();
     assert!((from_m - 120.0).abs() < 1.0, "{from_m}");
     assert!(!apart.relay.has_said("geofence"), "it is on the ground");
-    apart.drone.order("arm");
-    apart.drone.order("takeoff");
+    apart.drone.takes_off();
     let line = apart.relay.line("geofence");
     assert!(
         line.ends_with("the drone is 120 m from the line between transmitter and receiver, 120 m outside the mission's geofence"),
@@ -178,7 +164,7 @@ fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
 
 #[test]
 fn a_drone_at_its_line_is_not_told_of() {
-    let mut flight = Flight::found("arducopter", 380.0);
+    let mut flight = Flight::found("arducopter", "");
     flight.takes_off();
     flight.is_engaged();
     std::thread::sleep(Duration::from_secs(3));

@@ -5,15 +5,13 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use rustix::process::Signal;
 use serde_json::Value;
-
-use super::medium::{Medium, QUIET};
-use super::process::Relay;
-use super::signed::Files;
-use super::stays::fill_disk;
-use super::{Chain, simulated};
 use uav_relay_scenario::Scenario;
+
+use crate::chain::{Chain, simulated};
+use crate::medium::QUIET;
+use crate::process::Relay;
+use crate::stays::fill_disk;
 
 /// Sender, destination and counter of a frame.
 type Seen = (u64, u64, u64);
@@ -45,23 +43,20 @@ fn frames(file: &Path) -> Vec<(String, Seen)> {
 
 #[test]
 fn every_frame_is_in_the_captures_of_both_ends() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = |index: usize| folder.path().join(format!("relay{index}.pcapng"));
-    let mut chain = Chain::of_wires(3, QUIET);
+    let mut chain = Chain::on_wires(3, QUIET);
+    let file = |chain: &Chain, index: usize| chain.files.text(&format!("relay{index}.pcapng"));
     for index in 1..=3 {
-        chain.options = vec!["--capture".to_owned(), file(index).display().to_string()];
-        let relay = chain.relay(index);
+        let relay = chain.relay(index, &format!("--capture {}", file(&chain, index)));
         chain.relays.push(relay);
     }
-    let places: Vec<_> = chain.relays.iter_mut().map(Relay::settled).collect();
-    assert_eq!(places, simulated(&Scenario::default(), 3));
+    assert_eq!(chain.settled(), simulated(&Scenario::default(), 3));
     // All frames in transit have arrived by then, and no new ones are sent for seconds.
     std::thread::sleep(Duration::from_millis(500));
-    for relay in chain.relays {
-        relay.signal(Signal::TERM);
-        assert_eq!(relay.end().status, Some(0));
-    }
-    let all = [1, 2, 3].map(|index| frames(&file(index)));
+    chain
+        .relays
+        .drain(..)
+        .for_each(|relay| drop(relay.stopped()));
+    let all = [1, 2, 3].map(|index| frames(Path::new(&file(&chain, index))));
     let went = |at: usize, way: &str, from: u64, to: u64| -> BTreeSet<Seen> {
         let frames = all[at - 1].iter().filter(|(its, _)| its == way);
         let seen = frames.map(|(_, seen)| *seen);
@@ -80,31 +75,19 @@ fn every_frame_is_in_the_captures_of_both_ends() {
 
 #[test]
 fn a_capture_that_cannot_begin_is_refused() {
-    let mut chain = Chain::of_wires(2, QUIET);
-    chain.options = vec!["--capture".to_owned(), "/dev/full".to_owned()];
-    let relay = chain.relay(1);
-    let ended = relay.end();
-    assert_eq!(ended.status, Some(1));
-    assert!(
-        ended.stderr.join(" ").contains("--capture /dev/full: "),
-        "{ended:?}"
-    );
+    let line = Chain::on_wires(2, QUIET)
+        .relay(1, "--capture /dev/full")
+        .refused(1);
+    assert!(line.contains("--capture /dev/full: "), "{line}");
 }
 
 /// Checks the middle relay, which has two ports and reports the failure once for both.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("relay.pcapng");
-    let capture = ["--capture", file.to_str().unwrap()].map(str::to_owned);
-    let quick = ["--probe-after-ms", "300", "--dead-after-ms", "900"].map(str::to_owned);
-    let mut chain = Chain::of_wires(3, QUIET);
-    for index in 1..=3 {
-        chain.options = quick.to_vec();
-        if index == 2 {
-            chain.options.extend(capture.clone());
-        }
-        let relay = chain.relay(index);
+    let mut chain = Chain::on_wires(3, QUIET).with("--probe-after-ms 300 --dead-after-ms 900");
+    let file = chain.files.text("relay.pcapng");
+    for (index, own) in [(1, ""), (2, &*format!("--capture {file}")), (3, "")] {
+        let relay = chain.relay(index, own);
         chain.relays.push(relay);
     }
     assert_eq!(chain.settled(), simulated(&Scenario::default(), 3));
@@ -124,64 +107,50 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     fill_disk(chain.relays[1].pid(), false);
     std::thread::sleep(Duration::from_secs(1));
     assert!(std::fs::metadata(&file).unwrap().len() <= full + 64);
-    for relay in chain.relays {
-        relay.signal(Signal::TERM);
-        assert_eq!(relay.end().status, Some(0));
-    }
+    chain
+        .relays
+        .drain(..)
+        .for_each(|relay| drop(relay.stopped()));
 }
 
 /// Checks a full disk at a ground station. It reports the end of its capture and still answers relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
-    let files = Files::new();
-    let wire = Medium::new(2, QUIET);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("ground.pcapng").display().to_string();
-    let level = folder.path().join("level");
-    std::fs::write(&level, "1e-9\n").unwrap();
-    let signed = files.options("key", "ground");
-    let mut options = vec!["--stand", "--end", "tx", "--of", "1", "--tty", wire.tty(0)];
-    options.extend([
-        "--capture",
-        &file,
-        "--measurements",
-        level.to_str().unwrap(),
-    ]);
-    options.extend(signed.iter().map(String::as_str));
-    let mut station = Relay::ground(&options);
+    let chain = Chain::with_ground(1, QUIET);
+    let files = &chain.files;
+    let (file, level) = (files.text("ground.pcapng"), files.write("level", "1e-9\n"));
+    let (tty, signed) = (
+        chain.tx.as_ref().unwrap().tty(0),
+        files.signed("key", "ground"),
+    );
+    let stand = format!("--stand --end tx --of 1 --tty {tty} --measurements {level}");
+    let mut station = Relay::ground(&format!("{stand} --capture {file} {signed}"));
     station.line("measurement: 1.000e-9 W");
     fill_disk(station.pid(), true);
-    let signed = files.options("key", "relay");
-    let mut options = vec!["--index", "1", "--of", "1", "--upstream", wire.tty(1)];
-    options.extend(signed.iter().map(String::as_str));
-    let _relay = Relay::start(&options);
+    let _relay = chain.relay(1, &files.signed("key", "relay"));
     for power in ["2e-9\n", "3e-9\n", "4e-9\n"] {
         std::thread::sleep(Duration::from_millis(1_200));
         std::fs::write(&level, power).unwrap();
     }
     station.line("capture ended: --capture cannot be written: File too large");
-    if !station.has_said("back: relay 1") {
-        station.line("back: relay 1 is received");
-    }
+    station.says("back: relay 1");
     assert!(station.lines_with("capture ended").is_empty(), "once");
-    station.signal(Signal::TERM);
-    assert_eq!(station.end().status, Some(0));
+    station.stopped();
 }
 
 /// Checks that a restart after a crash does not overwrite the earlier capture.
 #[test]
 fn a_restart_keeps_the_capture_of_the_start_before() {
-    let folder = tempfile::tempdir().unwrap();
-    let name = |name: &str| folder.path().join(name);
-    let first = name("relay1.pcapng");
-    let mut chain = Chain::of_wires(2, QUIET);
-    let mut second = chain.relay(2);
-    chain.options = ["--capture", first.to_str().unwrap()]
-        .map(str::to_owned)
-        .to_vec();
+    let chain = Chain::on_wires(2, QUIET);
+    let mut second = chain.relay(2, "");
+    let first = chain.files.path("captured/relay1.pcapng");
+    let folder = first.parent().unwrap();
+    std::fs::create_dir(folder).unwrap();
+    let capture = format!("--capture {}", first.display());
     let mut kept = Vec::new();
-    for (number, file) in (1..).zip([&first, &name("relay1-2.pcapng"), &name("relay1-3.pcapng")]) {
-        let mut relay = chain.relay(1);
+    let others = ["relay1-2.pcapng", "relay1-3.pcapng"].map(|name| folder.join(name));
+    for (number, file) in (1..).zip([&first, &others[0], &others[1]]) {
+        let mut relay = chain.relay(1, &capture);
         if number > 1 {
             let line = relay.line("capture: written to ");
             let said = format!(
@@ -203,10 +172,7 @@ fn a_restart_keeps_the_capture_of_the_start_before() {
     }
     second.line("converged: ");
     // A refused start leaves no file.
-    chain
-        .options
-        .extend(["--positions", "/dev/null"].map(str::to_owned));
-    let ended = chain.relay(1).end();
-    assert_eq!(ended.status, Some(1), "{ended:?}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+    let refused = chain.relay(1, &format!("{capture} --positions /dev/null"));
+    assert_eq!(refused.end().status, Some(1));
+    assert_eq!(std::fs::read_dir(folder).unwrap().count(), 3);
 }

@@ -1,65 +1,48 @@
 //! Clearing of a silent relay by an operator.
 
-use std::io::{Read as _, Write as _};
-use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
+use crate::chain::{Chain, QUICK};
+use crate::files::{Files, answer, asked, write};
 use crate::medium::{Medium, QUIET};
-use crate::positions::{fifo, write};
+use crate::peer::Peer;
 use crate::process::{LIMIT, Relay, bits};
-use crate::stays::asked;
 
 /// Sends a command to the socket. Returns true if it was executed, with the text of the answer.
-fn commanded(socket: &Path, command: &str) -> (bool, String) {
-    let mut stream = UnixStream::connect(socket).unwrap();
-    stream.set_read_timeout(Some(LIMIT)).unwrap();
-    writeln!(stream, "{command}").unwrap();
-    let mut text = String::new();
-    stream.read_to_string(&mut text).unwrap();
-    let said: Value = serde_json::from_str(&text).unwrap();
+fn commanded(socket: impl AsRef<Path>, command: &str) -> (bool, String) {
+    let said: Value = serde_json::from_str(&answer(socket, command, false)).unwrap();
     let text = said["text"].as_str().unwrap();
     (said["done"].as_bool().unwrap(), text.to_owned())
 }
 
 /// Three drones 20 m apart; relays 1 and 2 follow their setpoints, relay 3 does not move.
 struct Drones {
-    folder: tempfile::TempDir,
-    relays: Vec<Relay>,
-    fifos: Vec<PathBuf>,
-    at: Vec<[f32; 3]>,
+    chain: Chain,
+    fifos: [String; 3],
+    at: [[f32; 3]; 3],
     /// Log lines of each relay.
-    said: Vec<Vec<String>>,
+    said: [Vec<String>; 3],
 }
 
 impl Drones {
-    fn start(channel: &Medium) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let fifos: Vec<PathBuf> = (1..=3)
-            .map(|index| fifo(folder.path(), &format!("positions{index}")))
-            .collect();
-        let start = |index: usize| {
-            let (number, tty) = (index.to_string(), channel.tty(index - 1));
-            let socket = folder.path().join(format!("status{index}"));
-            let files = [fifos[index - 1].to_str().unwrap(), socket.to_str().unwrap()];
-            let options = ["--index", &number, "--of", "3", "--shared", tty];
-            let quick = ["--probe-after-ms", "500", "--dead-after-ms", "1500"];
-            let files = ["--positions", files[0], "--status-socket", files[1]];
-            Relay::start(&[&options[..], &quick, &files].concat())
-        };
-        Self {
-            relays: (1..=3).map(start).collect(),
-            fifos,
-            at: [10.0, 30.0, 50.0].map(|x_m| [x_m, 0.0, 20.0]).to_vec(),
-            said: vec![Vec::new(); 3],
-            folder,
+    fn start() -> Self {
+        let mut chain = Chain::on_channel(3, Medium::new(3, QUIET));
+        let fifos = [1, 2, 3].map(|index| chain.files.fifo(&format!("positions{index}")));
+        for (index, fifo) in (1..).zip(&fifos) {
+            let socket = chain.files.text(&format!("status{index}"));
+            let own = format!("{QUICK} --positions {fifo} --status-socket {socket}");
+            let relay = chain.relay(index, &own);
+            chain.relays.push(relay);
         }
-    }
-
-    fn socket(&self, index: usize) -> PathBuf {
-        self.folder.path().join(format!("status{index}"))
+        Self {
+            chain,
+            fifos,
+            at: [10.0, 30.0, 50.0].map(|x_m| [x_m, 0.0, 20.0]),
+            said: Default::default(),
+        }
     }
 
     fn has_said(&self, index: usize, part: &str) -> bool {
@@ -71,7 +54,7 @@ impl Drones {
         let end = Instant::now() + LIMIT;
         while !is_so(self) {
             assert!(Instant::now() < end, "{:?}: {:#?}", self.at, self.said);
-            for (k, relay) in self.relays.iter_mut().enumerate() {
+            for (k, relay) in self.chain.relays.iter_mut().enumerate() {
                 let [x, y, h] = self.at[k];
                 write(&self.fifos[k], &format!("{x} {y} {h}\n"));
                 let lines = relay.lines_with("");
@@ -88,14 +71,13 @@ impl Drones {
 }
 
 #[test]
-fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
-    let channel = Medium::new(3, QUIET);
-    let mut drones = Drones::start(&channel);
+fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
+    let mut drones = Drones::start();
     drones.fly_until(|all| (1..=3).all(|index| all.has_said(index, "converged: ")));
-    drop(drones.relays.pop());
+    drop(drones.chain.relays.pop());
     drones.fly_until(|all| all.has_said(2, "a lost relay may still hover between"));
-    let socket = drones.socket(2);
-    assert_eq!(asked(&socket)["relay"]["lost"], serde_json::json!([3]));
+    let socket = drones.chain.files.path("status2");
+    assert_eq!(asked(&socket)["relay"]["lost"], json!([3]));
     for (command, why) in [
         ("land", "unknown command; the command is clear-lost N"),
         ("clear-lost", "name the relays that have landed"),
@@ -104,7 +86,7 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
         ("clear-lost 4", "relay 4: must be within 1 to 3"),
         ("clear-lost x", "relay x: must be within 1 to 3"),
     ] {
-        let (is_done, text) = commanded(&socket, command);
+        let (is_done, text) = commanded(&socket, &format!("{command}\n"));
         assert!(!is_done && text.starts_with(why), "{command}: {text}");
     }
     // Relay 2 stays 4 m clear of the silent relay.
@@ -112,75 +94,55 @@ fn an_operator_clears_a_relay_that_fell_silent_and_the_others_fly_on() {
     drones.fly_until(|_| still.elapsed() > Duration::from_secs(2));
     assert!(drones.at[1][0] <= 46.0, "{:?}", drones.at);
     let said = "relay 3 is cleared: no lost relay downstream limits this relay any more";
-    assert_eq!(commanded(&socket, "clear-lost 3"), (true, said.to_owned()));
+    assert_eq!(
+        commanded(&socket, "clear-lost 3\n"),
+        (true, said.to_owned())
+    );
     let uid = rustix::process::getuid().as_raw();
     let process = std::process::id();
     let line =
         format!("relay 2  cleared: {said} (`clear-lost 3` by user {uid}, process {process})");
     drones.fly_until(|all| all.has_said(2, &line));
     drones.fly_until(|all| all.at[1][0] > 60.0);
-    assert_eq!(asked(&socket)["relay"]["lost"], serde_json::json!([]));
+    assert_eq!(asked(&socket)["relay"]["lost"], json!([]));
 }
 
 /// Checks clients that send nothing, like `nc -U`, or half a command: they are answered at once.
 #[test]
 fn a_client_that_sends_a_part_of_a_command_is_answered() {
-    let folder = tempfile::tempdir().unwrap();
-    let socket = folder.path().join("status");
-    let options = ["--index", "1", "--of", "1", "--status-socket"];
-    let mut relay = Relay::start(&[&options[..], &[socket.to_str().unwrap()]].concat());
+    let files = Files::new();
+    let socket = files.text("status");
+    let mut relay = Relay::start(&format!("--index 1 --of 1 --status-socket {socket}"));
     relay.line("converged: ");
-    let mut stream = UnixStream::connect(&socket).unwrap();
-    stream.set_read_timeout(Some(LIMIT)).unwrap();
-    write!(stream, "clear-lo").unwrap();
-    let mut text = String::new();
-    stream.read_to_string(&mut text).unwrap();
-    let said: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(said["done"], false, "{text}");
+    let (is_done, text) = commanded(&socket, "clear-lo");
+    assert!(!is_done, "{text}");
     relay.line("command refused: unknown command; the command is clear-lost N");
     assert_eq!(asked(&socket)["relay"]["index"], 1);
-    let mut silent = UnixStream::connect(&socket).unwrap();
-    silent.set_read_timeout(Some(LIMIT)).unwrap();
-    let mut text = String::new();
-    silent.read_to_string(&mut text).unwrap();
+    let text = answer(&socket, "", false);
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
 
 /// Checks clearing through the neighbour's autopilot, as a ground station does it.
 #[test]
 fn an_operator_clears_a_relay_by_a_mavlink_command() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (link, socket) = (path("tty"), path("status"));
-    let at = crate::peer::on_earth(300.0, 0.0).map(|number| number.to_string());
-    let [lat, lon, amsl] = &at;
-    let mut drone = crate::peer::Peer::start("autopilot.py", &["px4", &link, lat, lon, amsl]);
-    let channel = Medium::new(2, QUIET);
-    let distance = crate::peer::distance_m().to_string();
-    let quick = ["--probe-after-ms", "500", "--dead-after-ms", "1500"];
-    let second = ["--index", "2", "--of", "2", "--distance", &distance];
-    let second = [&second[..], &["--shared", channel.tty(1)], &quick].concat();
-    let second = Relay::start(&second);
-    let options = crate::peer::options(&link);
-    let mut first: Vec<&str> = options.iter().map(String::as_str).collect();
-    first[3] = "2";
-    first.extend(["--shared", channel.tty(0), "--status-socket", &socket]);
-    first.extend(quick);
-    let mut relay = Relay::start(&first);
-    relay.line("converged: ");
-    relay.line("autopilot: on the ground");
+    let chain = Chain::on_channel(2, Medium::new(2, QUIET));
+    let (link, socket) = (chain.files.text("tty"), chain.files.text("status"));
+    let mut drone = Peer::autopilot("px4", &link, 300.0, None);
+    let distance = crate::peer::distance_to_m(crate::peer::RX);
+    let second = chain.relay(2, &format!("--distance {distance} {QUICK}"));
+    let own = crate::peer::options(&link);
+    let mut relay = chain.relay(1, &format!("{own} --status-socket {socket} {QUICK}"));
+    relay.says("converged: ");
+    relay.says("autopilot: on the ground");
     drop(second);
     relay.line("lost: ");
-    assert_eq!(
-        asked(Path::new(&socket))["relay"]["lost"],
-        serde_json::json!([2])
-    );
-    let answer = |drone: &crate::peer::Peer, result: u64| {
+    assert_eq!(asked(&socket)["relay"]["lost"], json!([2]));
+    let answer = |drone: &Peer, result: u64| {
         let ack = drone.hears(|heard| heard.is("COMMAND_ACK") && heard.0["result"] == result);
         assert_eq!(ack.0["command"], 31_010);
         let to = [&ack.0["target_system"], &ack.0["target_component"]];
         assert_eq!(to, [255, 190]);
-        assert_eq!(ack.0["from"], serde_json::json!([7, 191]));
+        assert_eq!(ack.0["from"], json!([7, 191]));
     };
     drone.order("clear 1");
     answer(&drone, 2);
@@ -192,8 +154,5 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     relay.line(
         "cleared: relay 2 is cleared: no lost relay downstream limits this relay any more (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
     );
-    assert_eq!(
-        asked(Path::new(&socket))["relay"]["lost"],
-        serde_json::json!([])
-    );
+    assert_eq!(asked(&socket)["relay"]["lost"], json!([]));
 }

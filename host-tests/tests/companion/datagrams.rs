@@ -2,11 +2,9 @@
 
 use std::net::UdpSocket;
 
-use rustix::process::Signal;
-use tempfile::TempDir;
-
-use crate::peer::{Heard, Peer, on_earth, options, relay};
-use crate::process::{Ended, Relay};
+use crate::files::Files;
+use crate::peer::{Heard, Peer, relay};
+use crate::process::Relay;
 
 /// Free UDP ports of this computer.
 #[derive(Clone, Copy, Debug)]
@@ -52,9 +50,7 @@ impl Ports {
 
     /// Starts a drone on the ground at the first port; it sends to `partner` until it receives a datagram.
     pub(crate) fn drone(self, partner: u16) -> Peer {
-        let at = on_earth(380.0, 0.0).map(|number| number.to_string());
-        let link = format!("udp:{}@{partner}", self.port);
-        Peer::start("autopilot.py", &["px4", &link, &at[0], &at[1], &at[2]])
+        Peer::autopilot("px4", &format!("udp:{}@{partner}", self.port), 380.0, None)
     }
 }
 
@@ -69,15 +65,14 @@ fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
 /// Starts a companion three times with one autopilot; the first is killed, the second terminates.
 fn is_heard_again(address: &str, ports: Ports) {
     let mut drone = ports.drone(ports.local);
-    let mut first = relay(address, &[]);
+    let mut first = relay(address, "");
     they_hear_each_other(&mut first, &mut drone);
     // Dropping kills it with SIGKILL.
     drop(first);
-    let mut second = relay(address, &[]);
+    let mut second = relay(address, "");
     they_hear_each_other(&mut second, &mut drone);
-    second.signal(Signal::TERM);
-    assert_eq!(second.end().status, Some(0));
-    let mut third = relay(address, &[]);
+    second.stopped();
+    let mut third = relay(address, "");
     they_hear_each_other(&mut third, &mut drone);
     let heard = drone.hears(Heard::is_any);
     assert_eq!(heard.partner(), Some(ports.local), "{address}");
@@ -96,7 +91,7 @@ fn a_companion_that_restarts_is_heard_at_any_other_port() {
 }
 
 #[test]
-fn a_companion_that_restarts_is_heard_at_the_local_port_that_was_stated() {
+fn a_companion_that_restarts_is_heard_at_its_local_port() {
     let ports = Ports::apart(7);
     let address = format!("udp:localhost:{}@{}", ports.port, ports.local);
     is_heard_again(&address, ports);
@@ -108,13 +103,12 @@ fn a_companion_that_restarts_in_the_air_is_heard() {
     let ports = Ports::apart(1_000);
     let address = format!("udp:127.0.0.1:{}", ports.port);
     let mut drone = ports.drone(ports.local);
-    let mut first = relay(&address, &[]);
+    let mut first = relay(&address, "");
     they_hear_each_other(&mut first, &mut drone);
-    drone.order("arm");
-    drone.order("takeoff");
+    drone.takes_off();
     first.line("autopilot: in the air");
     drop(first);
-    let mut second = relay(&address, &[]);
+    let mut second = relay(&address, "");
     second.line("autopilot: found a PX4");
     second.line("autopilot: in the air");
 }
@@ -125,7 +119,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     let ports = Ports::apart(1_000);
     // The drone does not send before it receives a datagram.
     let mut drone = ports.drone(9);
-    let mut relay = relay(&format!("udp:127.0.0.1:{}", ports.port), &[]);
+    let mut relay = relay(&format!("udp:127.0.0.1:{}", ports.port), "");
     they_hear_each_other(&mut relay, &mut drone);
     for _ in 0..2 {
         drone.order("unplug");
@@ -137,8 +131,7 @@ fn an_autopilot_that_restarts_is_found_again() {
         let heard = drone.hears(Heard::is_any);
         assert_eq!(heard.partner(), Some(ports.local));
     }
-    relay.signal(Signal::TERM);
-    assert_eq!(relay.end().status, Some(0));
+    relay.stopped();
 }
 
 /// Checks the error line: it names the occupied port and the alternative.
@@ -159,14 +152,11 @@ fn a_local_port_that_cannot_be_had_is_named() {
             ["is this program's own port", "LOCAL must be another"],
         ),
     ] {
-        let options = options(address);
-        let options: Vec<&str> = options.iter().map(String::as_str).collect();
-        let Ended { status, stderr, .. } = Relay::start(&options).end();
-        assert_eq!((status, stderr.len()), (Some(1), 1), "{stderr:?}");
+        let line = relay(address, "").refused(1);
         let begin = format!("--autopilot {address}: ");
-        assert!(stderr[0].starts_with(&begin), "{stderr:?}");
+        assert!(line.starts_with(&begin), "{line}");
         for part in parts {
-            assert!(stderr[0].contains(part), "{part} not in {stderr:?}");
+            assert!(line.contains(part), "{part} not in {line}");
         }
     }
     drop(taken);
@@ -176,40 +166,19 @@ fn a_local_port_that_cannot_be_had_is_named() {
 fn the_file_states_a_local_port() {
     let ports = Ports::apart(11);
     let drone = ports.drone(9);
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("drone.toml");
     let text = include_str!("../../../examples/drone.toml");
     let autopilot = format!(
         "autopilot = \"udp:127.0.0.1:{}@{}\"\n",
         ports.port, ports.local
     );
-    let kept = |line: &&str| {
-        ![
-            "autopilot",
-            "epoch_file",
-            "upload_file",
-            "view_file",
-            "key_file",
-            "shared =",
-        ]
-        .iter()
-        .any(|key| line.starts_with(key))
-    };
+    let others = "autopilot epoch_file upload_file view_file key_file shared";
+    let kept = |line: &&str| !others.split(' ').any(|key| line.starts_with(key));
     let mut lines: Vec<&str> = text.lines().filter(kept).collect();
-    let at = lines
-        .iter()
-        .position(|line| *line == "[companion]")
-        .unwrap();
-    lines.insert(at + 1, &autopilot);
-    std::fs::write(&file, lines.join("\n")).unwrap();
-    let mut relay = Relay::start(&[
-        "--config",
-        file.to_str().unwrap(),
-        "--index",
-        "1",
-        "--of",
-        "1",
-    ]);
+    let at = lines.iter().position(|line| *line == "[companion]");
+    lines.insert(at.unwrap() + 1, &autopilot);
+    let files = Files::new();
+    let file = files.write("drone.toml", lines.join("\n"));
+    let mut relay = Relay::start(&format!("--config {file} --index 1 --of 1"));
     relay.line("autopilot: found a PX4");
     let heard = drone.hears(Heard::is_any);
     assert_eq!(heard.partner(), Some(ports.local));

@@ -2,9 +2,8 @@
 
 use std::time::Duration;
 
-use tempfile::TempDir;
-
-use crate::peer::{Heard, Peer, Site, agreed, apart_m, on_earth, relay};
+use crate::files::Files;
+use crate::peer::{Heard, Peer, Site, agreed, apart_m, relay};
 use crate::process::Relay;
 
 /// Messages requested by the companion (position, landed state, target), and their intervals, µs.
@@ -21,26 +20,18 @@ pub(crate) struct Flight {
     pub(crate) drone: Peer,
     pub(crate) relay: Relay,
     is_px4: bool,
-    _folder: TempDir,
+    _files: Files,
 }
 
 impl Flight {
-    /// Starts a drone on the ground at `x_m` along the line and a relay that has found it.
-    pub(crate) fn found(kind: &str, x_m: f64) -> Self {
-        Self::found_by(kind, x_m, None)
-    }
-
-    /// Starts a drone on the ground and a relay with additional options, which finds it.
-    pub(crate) fn listening(kind: &str, more: &[&str]) -> Self {
-        let mut flight = Self::started_with(kind, START_M, [None; 2], more);
-        flight.relay.line("autopilot: found a");
-        flight.relay.line("autopilot: on the ground, or not armed");
-        flight
+    /// Starts a drone and a relay with additional options, which has found it on the ground.
+    pub(crate) fn found(kind: &str, options: &str) -> Self {
+        Self::found_by(kind, None, options)
     }
 
     /// Starts a drone and a relay that sign with `key`, if any, and find each other.
-    fn found_by(kind: &str, x_m: f64, key: Option<&str>) -> Self {
-        let mut flight = Self::started(kind, x_m, [key; 2]);
+    fn found_by(kind: &str, key: Option<&str>, options: &str) -> Self {
+        let mut flight = Self::started(kind, [key; 2], options);
         if key.is_some() {
             flight.relay.line("autopilot: frames are signed");
         }
@@ -50,48 +41,27 @@ impl Flight {
         flight
     }
 
-    /// Starts a drone with the first key and a relay with the second.
-    pub(crate) fn started(kind: &str, x_m: f64, keys: [Option<&str>; 2]) -> Self {
-        Self::started_with(kind, x_m, keys, &[])
-    }
-
     /// Starts a drone with the first key, and a relay with the second key and additional `options`.
-    pub(crate) fn started_with(
-        kind: &str,
-        x_m: f64,
-        keys: [Option<&str>; 2],
-        options: &[&str],
-    ) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-        let file = |name: &str, key: Option<&str>| {
-            let name = path(name);
-            key.map(|key| crate::signed::write_key(&name, key))?;
-            Some(name)
-        };
-        let (link, [theirs, ours]) = (path("tty"), keys);
-        let (theirs, ours) = (file("theirs", theirs), file("ours", ours));
-        let at = on_earth(x_m, 0.0).map(|number| number.to_string());
-        let [lat, lon, amsl] = &at;
-        let mut arguments = vec![kind, &link, lat, lon, amsl];
-        arguments.extend(theirs.as_deref());
-        let drone = Peer::start("autopilot.py", &arguments);
-        let more = ours.iter().flat_map(|file| ["--autopilot-key-file", file]);
-        let more: Vec<&str> = more.chain(options.iter().copied()).collect();
-        let mut relay = relay(&link, &more);
+    pub(crate) fn started(kind: &str, keys: [Option<&str>; 2], options: &str) -> Self {
+        let files = Files::new();
+        let link = files.text("tty");
+        let [theirs, ours] = [("theirs", keys[0]), ("ours", keys[1])]
+            .map(|(name, key)| key.map(|key| files.write_key(name, key)));
+        let drone = Peer::autopilot(kind, &link, START_M, theirs.as_deref());
+        let ours = ours.map_or_else(String::new, |file| format!("--autopilot-key-file {file}"));
+        let mut relay = relay(&link, &format!("{ours} {options}"));
         relay.line("autopilot: by --autopilot");
         Self {
             drone,
             relay,
             is_px4: kind == "px4",
-            _folder: folder,
+            _files: files,
         }
     }
 
     /// Arms the drone and takes off under its pilot's control.
     pub(crate) fn takes_off(&mut self) {
-        self.drone.order("arm");
-        self.drone.order("takeoff");
+        self.drone.takes_off();
         self.relay
             .line("autopilot: in the air, not controlled by the relay");
     }
@@ -111,9 +81,8 @@ impl Flight {
 
     /// Waits until the drone is at `place`.
     pub(crate) fn arrives(&self, place: Site) {
-        let there = self
-            .drone
-            .hears(|heard| heard.0["own"].is_object() && apart_m(heard.own(), place) < 1.0);
+        let is_there = |heard: &Heard| heard.is_any() && apart_m(heard.own(), place) < 1.0;
+        let there = self.drone.hears(is_there);
         assert_eq!(there.mode(), "companion");
     }
 
@@ -161,7 +130,7 @@ fn lead_to(targets: &[Heard], place: Site) {
 /// Finds, engages and flies a drone to its agreed position.
 fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     let place = agreed();
-    let mut flight = Flight::found_by(kind, START_M, key);
+    let mut flight = Flight::found_by(kind, key, "");
     // A PX4 is not asked for its target because it does not report it.
     let asked = if kind == "px4" { &ASKED[..2] } else { &ASKED };
     flight.drone.is_asked_for(asked);
@@ -175,9 +144,8 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     flight.relay.line("autopilot: ready");
     flight.drone.order("mode companion");
     flight.relay.line("autopilot: setpoint control engaged");
-    let mut all = flight
-        .drone
-        .hears_until(|heard| heard.0["own"].is_object() && apart_m(heard.own(), place) < 0.5);
+    let is_there = |heard: &Heard| heard.is_any() && apart_m(heard.own(), place) < 0.5;
+    let mut all = flight.drone.hears_until(is_there);
     assert!(
         all.iter()
             .any(|heard| heard.says("relay: engaged, flies to position"))
@@ -266,7 +234,7 @@ fn an_arducopter(key: Option<&str>) {
 /// Checks a place outside the fence: the autopilot refuses the target, and the relay reports it.
 #[test]
 fn an_arducopter_that_refuses_is_told_of() {
-    let mut flight = Flight::found("arducopter", START_M);
+    let mut flight = Flight::found("arducopter", "");
     flight.takes_off();
     flight.drone.order("refuse");
     flight.is_engaged();

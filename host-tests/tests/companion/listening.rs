@@ -7,27 +7,19 @@ use uav_relay::Placement;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 
+use crate::files::{Files, write};
 use crate::flying::Flight;
-use crate::positions::{fifo, write};
 use crate::process::{Relay, bits};
 
-const LISTENING: [&str; 5] = [
-    "--listen",
-    "--interferer",
-    "unknown",
-    "--listen-every",
-    "0.5",
-];
+const LISTENING: &str = "--listen --interferer unknown --listen-every 0.5";
 
 /// Feeds a relay through its FIFO with positions and powers along a pilot's flight.
 #[test]
 fn one_finds_the_interferer_by_its_fifo() {
     let scene = Scene::new(&Scenario::default(), 1).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let fifo = fifo(folder.path(), "positions");
-    let path = fifo.to_str().unwrap();
-    let more = ["--index", "1", "--of", "1", "--positions", path];
-    let mut relay = Relay::start(&[&more[..], &LISTENING].concat());
+    let files = Files::new();
+    let fifo = files.fifo("positions");
+    let mut relay = Relay::start(&format!("--index 1 --of 1 --positions {fifo} {LISTENING}"));
     relay.line("guarded: ");
     let mut lines = String::from("1 2 3 0\nreceiver\nreceiver -1\n");
     for [x_m, y_m, altitude_m] in [
@@ -63,7 +55,7 @@ fn one_finds_the_interferer_by_its_fifo() {
 /// Checks that a radio's measurements count in the air, and that the relay moves to measure elsewhere.
 #[test]
 fn a_radio_on_the_autopilots_link_is_heard() {
-    let mut flight = Flight::listening("arducopter", &LISTENING);
+    let mut flight = Flight::found("arducopter", LISTENING);
     flight.takes_off();
     flight.drone.order("noise 150");
     flight.relay.line(

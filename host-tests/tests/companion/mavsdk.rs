@@ -1,26 +1,18 @@
 //! MAVSDK as the autopilot, over UDP: its own server of telemetry, modes and requests.
 
-use std::net::UdpSocket;
-
-use rustix::process::Signal;
-
+use crate::datagrams::Ports;
 use crate::flying::ASKED;
 use crate::peer::{Heard, Peer, agreed, apart_m, on_earth, relay};
-
-fn free_port() -> u16 {
-    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.local_addr().unwrap().port()
-}
 
 #[test]
 fn mavsdk_is_led_to_its_place_and_let_go() {
     let place = agreed();
-    let port = free_port().to_string();
+    let port = Ports::apart(1_000).port;
     let address = format!("udpin://127.0.0.1:{port}");
     let at = on_earth(370.0, 15.0).map(|number| number.to_string());
     let [lat, lon, amsl] = &at;
     let mut drone = Peer::start("mavsdk_autopilot.py", &[&address, lat, lon, amsl]);
-    let mut relay = relay(&format!("udp:127.0.0.1:{port}"), &[]);
+    let mut relay = relay(&format!("udp:127.0.0.1:{port}"), "");
     let heartbeat = drone.hears(|heard| heard.is("HEARTBEAT"));
     assert_eq!(heartbeat.0["type"], 18);
     assert!(!relay.has_said("autopilot: found"), "a generic one");
@@ -46,6 +38,5 @@ fn mavsdk_is_led_to_its_place_and_let_go() {
     drone.order("mode hold");
     relay.line("autopilot: in the air, not controlled by the relay");
     drone.hears(|heard| heard.says("relay: released, holds position"));
-    relay.signal(Signal::TERM);
-    assert_eq!(relay.end().status, Some(0));
+    relay.stopped();
 }

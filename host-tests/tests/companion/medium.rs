@@ -1,15 +1,19 @@
 //! Medium that copies every byte of one tty to all others: two ttys form a wire, more a radio channel.
+//!
+//! Ttys of a pluggable medium have names as made by udev; each can be unplugged, and plugged in as another tty.
 
+use std::os::unix::fs::symlink;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use tempfile::TempDir;
 
-use crate::pty::Pty;
+use crate::pty::{Pty, make_raw};
 
 /// Probability of each fault, per byte.
 #[derive(Clone, Copy, Debug)]
@@ -43,33 +47,75 @@ struct Counts {
     corrupted: AtomicU64,
 }
 
+/// Ttys of a medium; `None` for one that is unplugged.
+type Ttys = Mutex<Vec<Option<Arc<Pty>>>>;
+
 /// Running medium; its ttys vanish when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Medium {
     paths: Vec<PathBuf>,
+    ptys: Arc<Ttys>,
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
     pump: Option<JoinHandle<()>>,
+    /// Folder of the names of a pluggable medium.
+    _folder: Option<TempDir>,
 }
 
 impl Medium {
     pub(crate) fn new(ttys: usize, noise: Noise) -> Self {
         let ptys: Vec<Pty> = (0..ttys).map(|_| Pty::new()).collect();
         let paths = ptys.iter().map(|pty| pty.path().to_owned()).collect();
-        let counts = Arc::new(Counts::default());
+        let ptys = ptys.into_iter().map(|pty| Some(Arc::new(pty))).collect();
+        Self::of(paths, ptys, noise, None)
+    }
+
+    /// Creates a quiet medium whose ttys can be unplugged.
+    pub(crate) fn pluggable(ttys: usize) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let name = |index| folder.path().join(format!("radio{index}"));
+        let paths = (0..ttys).map(name).collect();
+        let medium = Self::of(paths, vec![None; ttys], QUIET, Some(folder));
+        (0..ttys).for_each(|index| medium.plug(index));
+        medium
+    }
+
+    fn of(
+        paths: Vec<PathBuf>,
+        ptys: Vec<Option<Arc<Pty>>>,
+        noise: Noise,
+        folder: Option<TempDir>,
+    ) -> Self {
+        let (ptys, counts) = (Arc::new(Mutex::new(ptys)), Arc::new(Counts::default()));
         let stop = Arc::new(AtomicBool::new(false));
-        let (shared, stopped) = (Arc::clone(&counts), Arc::clone(&stop));
-        let pump = std::thread::spawn(move || carry(&ptys, noise, &shared, &stopped));
+        let shared = (Arc::clone(&ptys), Arc::clone(&counts), Arc::clone(&stop));
+        let pump = std::thread::spawn(move || carry(&shared.0, noise, &shared.1, &shared.2));
         Self {
             paths,
+            ptys,
             counts,
             stop,
             pump: Some(pump),
+            _folder: folder,
         }
     }
 
     pub(crate) fn tty(&self, index: usize) -> &str {
         self.paths[index].to_str().unwrap()
+    }
+
+    /// Unplugs a tty of a pluggable medium, and removes its name.
+    pub(crate) fn pull(&self, index: usize) {
+        std::fs::remove_file(&self.paths[index]).unwrap();
+        self.ptys.lock().unwrap()[index] = None;
+    }
+
+    /// Plugs another tty in under the name.
+    pub(crate) fn plug(&self, index: usize) {
+        let pty = Pty::new();
+        make_raw(pty.path().to_str().unwrap());
+        symlink(pty.path(), &self.paths[index]).unwrap();
+        self.ptys.lock().unwrap()[index] = Some(Arc::new(pty));
     }
 
     /// Adds the numbers of lost and corrupted bytes to `sums`.
@@ -90,7 +136,7 @@ impl Drop for Medium {
     }
 }
 
-fn carry(ptys: &[Pty], noise: Noise, counts: &Counts, stop: &AtomicBool) {
+fn carry(shared: &Ttys, noise: Noise, counts: &Counts, stop: &AtomicBool) {
     let mut rng = ChaCha8Rng::seed_from_u64(noise.seed);
     let look_up = Timespec {
         tv_sec: 0,
@@ -98,6 +144,8 @@ fn carry(ptys: &[Pty], noise: Noise, counts: &Counts, stop: &AtomicBool) {
     };
     let count = |counter: &AtomicU64| counter.fetch_add(1, Ordering::Relaxed);
     while !stop.load(Ordering::Relaxed) {
+        // A copy: a tty can be unplugged while the others are waited for.
+        let ptys: Vec<_> = shared.lock().unwrap().iter().flatten().cloned().collect();
         let mut fds: Vec<_> = ptys
             .iter()
             .map(|pty| PollFd::new(&pty.wire, PollFlags::IN))

@@ -2,21 +2,17 @@
 
 use std::time::Duration;
 
+use crate::files::Files;
 use crate::flying::Flight;
 use crate::medium::{Medium, QUIET};
-use crate::peer::{Heard, RX, Site, TX, agreed, agreed_toward, apart_m, distance_m};
-use crate::process::{Ended, Relay};
-use crate::signed::Files;
+use crate::peer::{Heard, RX, Site, TX, agreed, agreed_toward, apart_m, distance_to_m, text};
+use crate::process::Relay;
 
 /// Site about 200 m beyond the old receiver and to the right, on higher ground.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
 /// Time shorter than the guard's wait for the drone to stop.
 const STANDS: Duration = Duration::from_millis(2_500);
-
-fn text([lat, lon, amsl]: Site) -> String {
-    format!("{lat},{lon},{amsl}")
-}
 
 #[test]
 fn a_drone_stays_where_it_is_and_then_flies_along_the_new_line() {
@@ -25,33 +21,25 @@ fn a_drone_stays_where_it_is_and_then_flies_along_the_new_line() {
         assert!(apart_m(before, after) > 20.0, "it has some way to go");
         let files = Files::new();
         let wire = Medium::new(2, QUIET);
-        let own = files.options("key", "epoch");
-        let mut options: Vec<&str> = own.iter().map(String::as_str).collect();
-        options.extend(["--upstream", wire.tty(1)]);
-        let mut flight = Flight::started_with(kind, 380.0, [None; 2], &options);
+        let own = format!(
+            "{} --upstream {}",
+            files.signed("key", "epoch"),
+            wire.tty(1)
+        );
+        let mut flight = Flight::started(kind, [None; 2], &own);
         flight.takes_off();
         flight.is_engaged();
         flight.arrives(before);
         flight.drone.forget();
-        let (tx, rx, moved) = (text(TX), text(RX), text(MOVED));
-        let distance = distance_m().to_string();
-        let own = files.options("key", "ground");
-        let mut ground = vec![
-            "--of",
-            "1",
-            "--yes",
-            "--version",
-            "1",
-            "--end",
-            "tx",
-            "--tty",
+        let (tty, signed, distance) = (
             wire.tty(0),
-        ];
-        ground.extend(["--site-tx", &tx, "--site-rx", &rx, "--distance", &distance]);
-        ground.extend(["--new-site-rx", &moved]);
-        ground.extend(own.iter().map(String::as_str));
-        let Ended { status, stderr, .. } = Relay::ground(&ground).end();
-        assert_eq!((status, &stderr[..]), (Some(0), &[][..]));
+            files.signed("key", "ground"),
+            distance_to_m(RX),
+        );
+        let upload = format!("--of 1 --yes --version 1 --end tx --tty {tty} {signed}");
+        let sites = format!("--site-tx {} --site-rx {}", text(TX), text(RX));
+        let new = format!("--distance {distance} --new-site-rx {}", text(MOVED));
+        Relay::ground(&format!("{upload} {sites} {new}")).succeeds();
         let adopted = flight.relay.line("adopted: flies version 1");
         let between = "between 47.4000000,8.5400000,420.000 and 47.4095000,8.5535000,440.000";
         assert!(adopted.ends_with(between), "{adopted}");

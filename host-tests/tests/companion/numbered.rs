@@ -2,27 +2,18 @@
 
 use serde_json::Value;
 
+use crate::chain::{Chain, QUICK};
+use crate::files::until;
 use crate::medium::{Medium, QUIET};
-use crate::process::Relay;
-use crate::stays::until;
-
-fn start(channel: &Medium, index: usize, more: &[&str]) -> Relay {
-    let (number, tty) = (index.to_string(), channel.tty(index - 1));
-    let options = ["--index", &number, "--of", "3", "--shared", tty];
-    let quick = ["--probe-after-ms", "500", "--dead-after-ms", "1500"];
-    Relay::start(&[&options[..], &quick, more].concat())
-}
 
 /// Checks the loss of relay 2: relay 3 is the second of two then, and keeps its number 3.
 #[test]
-fn a_drone_keeps_its_number_when_its_place_in_the_chain_changes() {
-    let folder = tempfile::tempdir().unwrap();
-    let socket = folder.path().join("status");
-    let channel = Medium::new(3, QUIET);
-    let mut first = start(&channel, 1, &["--json"]);
-    let mut second = start(&channel, 2, &[]);
-    let more = ["--status-socket", socket.to_str().unwrap()];
-    let mut third = start(&channel, 3, &more);
+fn a_drone_keeps_its_number_when_its_place_changes() {
+    let chain = Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK);
+    let socket = chain.files.text("status");
+    let mut first = chain.relay(1, "--json");
+    let mut second = chain.relay(2, "");
+    let mut third = chain.relay(3, &format!("--status-socket {socket}"));
     for relay in [&mut first, &mut second, &mut third] {
         relay.line("converged");
     }
@@ -41,14 +32,11 @@ fn a_drone_keeps_its_number_when_its_place_in_the_chain_changes() {
 
 #[test]
 fn every_line_names_its_relay() {
-    let channel = Medium::new(3, QUIET);
-    for (json, name) in [(false, " s  relay 2  "), (true, "\"index\":2")] {
-        let relays =
-            [1, 2, 3].map(|index| start(&channel, index, &["--json"][..usize::from(json)]));
-        let [_first, mut second, _third] = relays;
-        second.line("converged");
-        second.signal(rustix::process::Signal::TERM);
-        let lines = second.end().stdout;
+    for (json, name) in [("", " s  relay 2  "), ("--json", "\"index\":2")] {
+        let mut chain =
+            Chain::on_channel(3, Medium::new(3, QUIET)).started(&format!("{QUICK} {json}"));
+        chain.relays[1].line("converged");
+        let lines = chain.relays.swap_remove(1).stopped();
         assert!(lines.len() > 4, "{lines:?}");
         for line in lines {
             assert!(line.contains(name), "{line}");

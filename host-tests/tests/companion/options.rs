@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::process::{Ended, Relay};
+use crate::process::Relay;
 
 /// Options to which those of [`WRONG`] without `--index` are added.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
@@ -88,31 +88,14 @@ const WRONG_AUTOPILOT: &[&str] = &[
     "--speed 5",
 ];
 
-fn split(options: &str) -> Vec<&str> {
-    options.split_whitespace().collect()
-}
-
 /// Returns each of `cases` with its error line, after `good` options.
 fn refusals(good: &str, cases: &[&str]) -> String {
     let mut all = String::new();
     for case in cases {
         let alone = case.is_empty() || case.starts_with("--index");
-        let options = if alone {
-            (*case).to_owned()
-        } else {
-            good.to_owned() + case
-        };
-        let Ended {
-            status,
-            stdout,
-            stderr,
-        } = Relay::start(&split(&options)).end();
-        assert_eq!(
-            (status, stdout.len(), stderr.len()),
-            (Some(2), 0, 1),
-            "{case}: {stderr:?}"
-        );
-        writeln!(all, "{case}\n    {}", stderr[0]).unwrap();
+        let good = if alone { "" } else { good };
+        let line = Relay::start(&format!("{good}{case}")).refused_at_once(2);
+        writeln!(all, "{case}\n    {line}").unwrap();
     }
     all
 }
@@ -123,7 +106,7 @@ fn wrong_options_are_named_with_their_value_and_range() {
 }
 
 #[test]
-fn wrong_options_of_an_autopilot_are_named_with_their_value_and_range() {
+fn wrong_options_of_an_autopilot_are_named() {
     let good = format!("{GOOD}{SITES}");
     insta::assert_snapshot!(refusals(&good, WRONG_AUTOPILOT));
 }
@@ -139,12 +122,8 @@ fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
             "--autopilot udp:nowhere.invalid:14540: HOST nowhere.invalid is not found: ",
         ),
     ] {
-        let options = format!("--index 1 --of 1 --autopilot {autopilot} {SITES}");
-        let Ended { status, stderr, .. } = Relay::start(&split(&options)).end();
-        assert_eq!(status, Some(1), "{stderr:?}");
-        assert!(
-            stderr.len() == 1 && stderr[0].starts_with(why),
-            "{stderr:?}"
-        );
+        let line =
+            Relay::start(&format!("--index 1 --of 1 --autopilot {autopilot} {SITES}")).refused(1);
+        assert!(line.starts_with(why), "{line}");
     }
 }

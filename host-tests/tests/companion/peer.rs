@@ -20,14 +20,14 @@ pub(crate) type Site = [f64; 3];
 pub(crate) const TX: Site = [47.40, 8.54, 420.0];
 pub(crate) const RX: Site = [47.41, 8.55, 431.0];
 
-/// Returns the distance of the two sites by the library, m.
-pub(crate) fn distance_m() -> f64 {
-    distance_to_m(RX)
-}
-
 /// Returns the distance of the transmitter from a receiver at `rx`, m.
 pub(crate) fn distance_to_m(rx: Site) -> f64 {
-    let [tx, rx] = [TX, rx].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
+    between_m(TX, rx)
+}
+
+/// Returns the distance of two sites by the library, m.
+pub(crate) fn between_m(tx: Site, rx: Site) -> f64 {
+    let [tx, rx] = [tx, rx].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
     Axis::try_new(tx, rx).unwrap().distance_m()
 }
 
@@ -54,30 +54,19 @@ pub(crate) fn apart_m(a: Site, b: Site) -> f64 {
     level.hypot(a[2] - b[2])
 }
 
-/// Returns the options of a single relay.
-pub(crate) fn options(autopilot: &str) -> Vec<String> {
-    let site = |site: Site| site.map(|number| number.to_string()).join(",");
-    let distance = distance_m().to_string();
-    let (tx, rx) = (site(TX), site(RX));
-    [
-        ["--index", "1"],
-        ["--of", "1"],
-        ["--distance", &distance],
-        ["--site-tx", &tx],
-        ["--site-rx", &rx],
-        ["--autopilot", autopilot],
-    ]
-    .concat()
-    .into_iter()
-    .map(ToOwned::to_owned)
-    .collect()
+pub(crate) fn text(site: Site) -> String {
+    site.map(|number| number.to_string()).join(",")
 }
 
-pub(crate) fn relay(autopilot: &str, more: &[&str]) -> Relay {
-    let options = options(autopilot);
-    let mut options: Vec<&str> = options.iter().map(String::as_str).collect();
-    options.extend(more);
-    Relay::start(&options)
+/// Returns the options of a relay between the sites, with its autopilot.
+pub(crate) fn options(autopilot: &str) -> String {
+    let (tx, rx, distance) = (text(TX), text(RX), distance_to_m(RX));
+    format!("--distance {distance} --site-tx {tx} --site-rx {rx} --autopilot {autopilot}")
+}
+
+/// Starts a single relay.
+pub(crate) fn relay(autopilot: &str, more: &str) -> Relay {
+    Relay::start(&format!("--index 1 --of 1 {} {more}", options(autopilot)))
 }
 
 /// Returns the agreed position of a single relay without an autopilot.
@@ -87,8 +76,8 @@ pub(crate) fn agreed() -> Site {
 
 /// Returns the agreed position of a single relay for a receiver at `rx`.
 pub(crate) fn agreed_toward(rx: Site) -> Site {
-    let distance = distance_to_m(rx).to_string();
-    let mut relay = Relay::start(&["--index", "1", "--of", "1", "--distance", &distance]);
+    let distance = distance_to_m(rx);
+    let mut relay = Relay::start(&format!("--index 1 --of 1 --distance {distance}"));
     let [x_m, y_m, altitude_m, _] = relay.settled().map(f32::from_bits);
     assert_eq!(y_m, 0.0, "it is on the line");
     toward(rx, x_m.into(), altitude_m.into())
@@ -189,8 +178,22 @@ impl Peer {
         peer
     }
 
+    /// Runs an autopilot of `kind` at `link`, on the ground at `x_m` along the line.
+    pub(crate) fn autopilot(kind: &str, link: &str, x_m: f64, more: Option<&str>) -> Self {
+        let [lat, lon, amsl] = on_earth(x_m, 0.0).map(|number| number.to_string());
+        let mut arguments = vec![kind, link, &lat, &lon, &amsl];
+        arguments.extend(more);
+        Self::start("autopilot.py", &arguments)
+    }
+
     pub(crate) fn order(&mut self, order: &str) {
         writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
+    }
+
+    /// Arms and takes off under the pilot's control.
+    pub(crate) fn takes_off(&mut self) {
+        self.order("arm");
+        self.order("takeoff");
     }
 
     /// Waits for the next message that is `wanted`, ignoring those before.

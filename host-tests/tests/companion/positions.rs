@@ -1,46 +1,25 @@
 //! Relays that receive their drones' positions through a FIFO.
 
-use std::fs::File;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use rustix::fs::{CWD, Mode, mkfifoat};
-use rustix::process::Signal;
-
-use crate::Chain;
+use crate::chain::Chain;
+use crate::files::{Files, write};
 use crate::medium::QUIET;
-use crate::process::{Ended, LIMIT, Relay, bits};
-
-pub(crate) fn fifo(folder: &Path, name: &str) -> PathBuf {
-    let path = folder.join(name);
-    mkfifoat(CWD, &path, Mode::RUSR | Mode::WUSR).unwrap();
-    path
-}
-
-pub(crate) fn write(path: &Path, text: &str) {
-    let mut file = File::options().write(true).open(path).unwrap();
-    file.write_all(text.as_bytes()).unwrap();
-}
+use crate::process::{LIMIT, Relay, bits};
 
 /// Checks that first setpoints are the drones' positions, and last ones those of an unguarded chain.
 #[test]
 fn two_that_know_where_they_are_make_room_for_each_other() {
-    let mut free = Chain::start(2, QUIET, &[]);
-    for relay in &mut free.relays {
-        relay.line("unguarded: no --positions: drones are not kept apart while they move");
-    }
+    let mut free = Chain::start(2, "");
+    free.lines("unguarded: no --positions: drones are not kept apart while they move");
     let expected = free.settled();
     drop(free);
 
-    let folder = tempfile::tempdir().unwrap();
-    let mut chain = Chain::of_wires(2, QUIET);
-    let fifos: Vec<PathBuf> = (1..=2)
-        .map(|index| fifo(folder.path(), &index.to_string()))
-        .collect();
+    let mut chain = Chain::on_wires(2, QUIET);
+    let fifos = ["1", "2"].map(|name| chain.files.fifo(name));
     for (index, fifo) in (1..).zip(&fifos) {
-        chain.options = vec!["--positions".to_owned(), fifo.display().to_string()];
-        chain.relays.push(chain.relay(index));
+        let relay = chain.relay(index, &format!("--positions {fifo}"));
+        chain.relays.push(relay);
     }
     // The drones are always at their latest setpoints.
     let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
@@ -80,10 +59,9 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
 
 #[test]
 fn lines_that_are_no_position_are_counted_and_said_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let fifo = fifo(folder.path(), "positions");
-    let path = fifo.to_str().unwrap();
-    let mut relay = Relay::start(&["--index", "1", "--of", "1", "--positions", path]);
+    let files = Files::new();
+    let fifo = files.fifo("positions");
+    let mut relay = Relay::start(&format!("--index 1 --of 1 --positions {fifo}"));
     relay.line("guarded: ");
     let long = "1 ".repeat(10_000);
     write(
@@ -101,35 +79,21 @@ fn lines_that_are_no_position_are_counted_and_said_once() {
     );
     write(&fifo, "100 0 20\n");
     relay.line("setpoint: ");
-    relay.signal(Signal::TERM);
-    let Ended { status, stdout, .. } = relay.end();
-    assert_eq!(status, Some(0));
-    let said = stdout.iter().filter(|line| line.contains("is not x_m"));
-    assert_eq!(said.count(), 1, "{stdout:?}");
-    assert!(
-        stdout
-            .iter()
-            .any(|line| line.contains("position: 8 invalid lines")),
-        "{stdout:?}"
-    );
+    let said = relay.stopped();
+    let times = |part: &str| said.iter().filter(|line| line.contains(part)).count();
+    assert_eq!(times("is not x_m"), 1, "{said:?}");
+    assert!(times("position: 8 invalid lines") > 0, "{said:?}");
 }
 
 #[test]
 fn what_is_no_fifo_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("file");
-    std::fs::write(&file, "1 2 3\n").unwrap();
+    let files = Files::new();
+    let file = files.write("file", "1 2 3\n");
     for (path, why) in [
-        (file.as_path(), "is no FIFO, make one with mkfifo"),
-        (&folder.path().join("none"), "No such file"),
+        (file, "is no FIFO, make one with mkfifo"),
+        (files.text("none"), "No such file"),
     ] {
-        let path = path.to_str().unwrap();
-        let arguments = ["--index", "1", "--of", "1", "--positions", path];
-        let Ended { status, stderr, .. } = Relay::start(&arguments).end();
-        assert_eq!(status, Some(1));
-        assert!(
-            stderr[0].contains(path) && stderr[0].contains(why),
-            "{stderr:?}"
-        );
+        let line = Relay::start(&format!("--index 1 --of 1 --positions {path}")).refused(1);
+        assert!(line.contains(&path) && line.contains(why), "{line}");
     }
 }

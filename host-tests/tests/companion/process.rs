@@ -1,4 +1,4 @@
-//! Relay or ground station as a process: its lines, exit and processor load. It is killed when dropped.
+//! Relay or ground station as a process: its options, lines, exit and processor load. It is killed when dropped.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
@@ -45,28 +45,33 @@ pub(crate) fn lines_of(pipe: impl Read + Send + 'static) -> Receiver<String> {
 }
 
 impl Relay {
-    pub(crate) fn start(arguments: &[&str]) -> Self {
-        Self::run(companion(), arguments)
+    /// Starts a companion with options that are separated by white space.
+    pub(crate) fn start(options: &str) -> Self {
+        Self::run(companion(), &words(options), Stdio::piped())
     }
 
-    pub(crate) fn ground(arguments: &[&str]) -> Self {
-        Self::run(ground(), arguments)
+    /// Starts a ground station.
+    pub(crate) fn ground(options: &str) -> Self {
+        Self::run(ground(), &words(options), Stdio::piped())
     }
 
-    fn run(program: &Path, arguments: &[&str]) -> Self {
-        let mut child = Command::new(program)
-            .args(arguments)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+    /// Starts `program`. Its lines can be waited for if its output is piped.
+    pub(crate) fn run(program: &Path, options: &[&str], output: Stdio) -> Self {
+        let mut command = Command::new(program);
+        command.args(options).stdout(output);
+        Self::of(&mut command)
+    }
+
+    /// Starts a command, with its errors piped.
+    pub(crate) fn of(command: &mut Command) -> Self {
+        let piped = command.stdin(Stdio::null()).stderr(Stdio::piped());
+        let mut child = piped.spawn().unwrap();
         Self {
-            lines: lines_of(child.stdout.take().unwrap()),
+            lines: child.stdout.take().map_or_else(|| channel().1, lines_of),
             errors: lines_of(child.stderr.take().unwrap()),
             child,
             seen: Vec::new(),
-            name: arguments.join(" "),
+            name: format!("{command:?}"),
         }
     }
 
@@ -93,6 +98,13 @@ impl Relay {
     pub(crate) fn has_said(&mut self, part: &str) -> bool {
         self.seen.extend(self.lines.try_iter());
         self.seen.iter().any(|line| line.contains(part))
+    }
+
+    /// Waits for a line that contains `part`, unless there has been one.
+    pub(crate) fn says(&mut self, part: &str) {
+        if !self.has_said(part) {
+            self.line(part);
+        }
     }
 
     /// Returns the lines that contain `part` since the last call.
@@ -139,14 +151,8 @@ impl Relay {
 
     /// Waits for the exit.
     pub(crate) fn end(mut self) -> Ended {
-        let end = Instant::now() + LIMIT;
-        let status = loop {
-            match self.child.try_wait().unwrap() {
-                Some(status) => break status,
-                None if Instant::now() > end => panic!("{}: does not end", self.name),
-                None => std::thread::sleep(Duration::from_millis(2)),
-            }
-        };
+        wait_until(|| self.child.try_wait().unwrap().is_some());
+        let status = self.child.wait().unwrap();
         let mut stdout = std::mem::take(&mut self.seen);
         stdout.extend(self.lines.iter());
         Ended {
@@ -154,6 +160,45 @@ impl Relay {
             stdout,
             stderr: self.errors.iter().collect(),
         }
+    }
+
+    /// Terminates the process, which exits with status 0 and without an error. Returns its lines.
+    pub(crate) fn stopped(self) -> Vec<String> {
+        self.signal(Signal::TERM);
+        self.succeeds()
+    }
+
+    /// Waits for an exit with status 0 and without an error. Returns the lines.
+    pub(crate) fn succeeds(self) -> Vec<String> {
+        let name = self.name.clone();
+        let ended = self.end();
+        assert_eq!(
+            (ended.status, ended.stderr.len()),
+            (Some(0), 0),
+            "{name}: {ended:?}"
+        );
+        ended.stdout
+    }
+
+    /// Waits for an exit with `status` and one error line, which is returned.
+    pub(crate) fn refused(self, status: i32) -> String {
+        self.fails(status).1
+    }
+
+    /// Waits for an exit with `status` and one error line, which is returned, before any other line.
+    pub(crate) fn refused_at_once(self, status: i32) -> String {
+        let (said, error) = self.fails(status);
+        assert_eq!(said, [""; 0], "{error}");
+        error
+    }
+
+    /// Waits for an exit with `status` and one error line. Returns the other lines and that one.
+    pub(crate) fn fails(self, status: i32) -> (Vec<String>, String) {
+        let name = self.name.clone();
+        let mut ended = self.end();
+        let found = (ended.status, ended.stderr.len());
+        assert_eq!(found, (Some(status), 1), "{name}: {ended:?}");
+        (ended.stdout, ended.stderr.remove(0))
     }
 
     /// Returns the processor time and the number of voluntary sleeps so far.
@@ -171,6 +216,17 @@ impl Relay {
         let sleeps = sleeps.unwrap().trim().parse().unwrap();
         (Duration::from_millis(millis), sleeps)
     }
+
+    /// Prints and returns the processor time and the number of voluntary sleeps since `before`.
+    pub(crate) fn cost_since(&self, before: (Duration, u64)) -> (Duration, u64) {
+        let (time, sleeps) = self.cost();
+        let (used, woken) = (time.saturating_sub(before.0), sleeps - before.1);
+        println!(
+            "{} ms of processor time, {woken} wake-ups",
+            used.as_millis()
+        );
+        (used, woken)
+    }
 }
 
 impl Drop for Relay {
@@ -178,6 +234,19 @@ impl Drop for Relay {
         // The process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+pub(crate) fn words(options: &str) -> Vec<&str> {
+    options.split_whitespace().collect()
+}
+
+/// Waits until the condition holds, for at most [`LIMIT`].
+pub(crate) fn wait_until(mut is_so: impl FnMut() -> bool) {
+    let end = Instant::now() + LIMIT;
+    while !is_so() {
+        assert!(Instant::now() < end, "not within {LIMIT:?}");
+        std::thread::sleep(Duration::from_millis(10));
     }
 }
 

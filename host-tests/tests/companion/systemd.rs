@@ -5,10 +5,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 
 use crate::binary::companion;
-use crate::process::LIMIT;
+use crate::process::{LIMIT, Relay};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
@@ -49,14 +49,11 @@ fn the_unit_is_one_that_systemd_takes() {
 #[test]
 fn the_example_file_is_whole() {
     let file = root().join("examples/drone.toml");
-    let options = ["--config", file.to_str().unwrap(), "--index", "2"];
-    let relay = crate::process::Relay::start(&options);
-    let ended = relay.end();
     // The only mistake is the missing key.
-    assert_eq!(ended.status, Some(2));
+    let line = Relay::start(&format!("--config {} --index 2", file.display())).refused(2);
     let key = root().join("examples/network7.key");
-    let line = format!("--key-file {}: cannot be read: ", key.display());
-    assert!(ended.stderr[0].starts_with(&line), "{:?}", ended.stderr);
+    let said = format!("--key-file {}: cannot be read: ", key.display());
+    assert!(line.starts_with(&said), "{line}");
 }
 
 #[test]
@@ -65,15 +62,14 @@ fn it_says_that_it_is_ready_and_alive() {
     let name = folder.path().join("notify");
     let socket = UnixDatagram::bind(&name).unwrap();
     socket.set_read_timeout(Some(LIMIT)).unwrap();
-    let mut child = Command::new(companion())
+    let mut command = Command::new(companion());
+    command
         .args(["--index", "1", "--of", "1"])
         .env("NOTIFY_SOCKET", &name)
         .env("WATCHDOG_USEC", "400000")
         .env_remove("WATCHDOG_PID")
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
+        .stdout(Stdio::null());
+    let relay = Relay::of(&mut command);
     let heard = || {
         let mut buffer = [0; 64];
         let count = socket.recv(&mut buffer).unwrap();
@@ -91,7 +87,7 @@ fn it_says_that_it_is_ready_and_alive() {
         took > Duration::from_millis(1_800),
         "every 200 ms: {took:?}"
     );
-    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    relay.signal(Signal::TERM);
     while heard() != "STOPPING=1" {}
-    assert!(child.wait().unwrap().success());
+    relay.succeeds();
 }

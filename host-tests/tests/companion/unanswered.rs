@@ -1,42 +1,38 @@
 //! Report on an autopilot that does not answer: after 3 s, once, with hints, and in the status.
 
 use std::net::UdpSocket;
-use std::path::Path;
 use std::time::Duration;
 
-use rustix::process::Signal;
-use tempfile::TempDir;
-
 use crate::datagrams::Ports;
+use crate::files::{Files, asked, until};
 use crate::peer::relay;
 use crate::process::Relay;
 use crate::pty::Pty;
-use crate::stays::{asked, until};
 
 /// Greatest delay of a line on a busy machine, s.
 const LATE_S: f64 = 1.5;
 
 struct Unanswered {
     relay: Relay,
-    socket: std::path::PathBuf,
-    _folder: TempDir,
+    files: Files,
 }
 
 impl Unanswered {
     fn start(autopilot: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let socket = folder.path().join("status");
-        let mut relay = relay(autopilot, &["--status-socket", socket.to_str().unwrap()]);
+        let files = Files::new();
+        let socket = files.text("status");
+        let mut relay = relay(autopilot, &format!("--status-socket {socket}"));
         relay.line("autopilot: by --autopilot");
-        Self {
-            relay,
-            socket,
-            _folder: folder,
-        }
+        Self { relay, files }
     }
 
-    fn status(&self) -> &Path {
-        &self.socket
+    /// Starts a relay with an autopilot at the first of two UDP ports.
+    fn at(ports: Ports) -> Self {
+        Self::start(&format!("udp:127.0.0.1:{}", ports.port))
+    }
+
+    fn status(&self) -> std::path::PathBuf {
+        self.files.path("status")
     }
 
     /// Checks that the line comes after 3 s, contains `parts`, and is in the status.
@@ -56,14 +52,9 @@ impl Unanswered {
 
     /// Checks that no further line comes for 7 s, in which the relay sleeps.
     fn is_said_once(&mut self) {
-        let (time, sleeps) = self.relay.cost();
+        let before = self.relay.cost();
         std::thread::sleep(Duration::from_secs(7));
-        let (time_now, sleeps_now) = self.relay.cost();
-        let (used, woken) = (time_now.saturating_sub(time), sleeps_now - sleeps);
-        println!(
-            "{} ms of processor time, {woken} wake-ups in 7 s",
-            used.as_millis()
-        );
+        let (used, woken) = self.relay.cost_since(before);
         assert!(used < Duration::from_millis(300), "{used:?}");
         assert!(woken < 300, "woken {woken} times");
         let again = self.relay.lines_with("autopilot: ");
@@ -81,7 +72,7 @@ fn seconds(line: &str) -> f64 {
 #[test]
 fn a_udp_port_at_which_nobody_listens_is_said_once() {
     let ports = Ports::apart(1_000);
-    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let mut unanswered = Unanswered::at(ports);
     let (at, local) = (
         format!("127.0.0.1:{}", ports.port),
         format!("from local port {}", ports.local),
@@ -109,8 +100,7 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
     );
     drop(drone);
     unanswered.relay.line("autopilot: no heartbeat");
-    unanswered.relay.signal(Signal::TERM);
-    assert_eq!(unanswered.relay.end().status, Some(0));
+    unanswered.relay.stopped();
 }
 
 /// Simulates a PX4 that answers another program.
@@ -118,7 +108,7 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
 fn a_udp_port_that_does_not_answer_is_said_once() {
     let ports = Ports::apart(1_000);
     let silent = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
-    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let mut unanswered = Unanswered::at(ports);
     let local = format!("from local port {}", ports.local);
     unanswered.is_said(&[
         "autopilot: no answer at ",
@@ -145,7 +135,7 @@ fn a_tty_that_does_not_answer_is_said_once() {
 fn noise_is_told_from_silence() {
     let ports = Ports::apart(1_000);
     let noisy = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
-    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let mut unanswered = Unanswered::at(ports);
     for _ in 0..30 {
         noisy
             .send_to(&[0x55; 50], ("127.0.0.1", ports.local))
@@ -163,7 +153,7 @@ fn others_are_told_from_an_autopilot() {
     let ports = Ports::apart(1_000);
     let mut drone = ports.drone(ports.local);
     drone.order("stranger");
-    let mut unanswered = Unanswered::start(&format!("udp:127.0.0.1:{}", ports.port));
+    let mut unanswered = Unanswered::at(ports);
     let line = unanswered.relay.line("is from a PX4 or an ArduCopter");
     assert!(line.contains("autopilot: no frame received at "), "{line}");
     assert!(!unanswered.relay.has_said("no answer"), "frames came");

@@ -8,7 +8,7 @@ use crate::peer::{Heard, agreed};
 #[test]
 fn a_port_that_vanishes_is_opened_again() {
     let place = agreed();
-    let mut flight = Flight::found("arducopter", 370.0);
+    let mut flight = Flight::found("arducopter", "");
     flight.takes_off();
     flight.is_engaged();
     flight.drone.hears(Heard::is_target);

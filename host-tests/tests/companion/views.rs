@@ -1,6 +1,6 @@
 //! Stored votes on views: a restarted process is bound by them.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use host_tests::fixtures::voted;
 use uav_relay::wire::digest::digest;
@@ -8,45 +8,19 @@ use uav_relay::{Mission, ViewRecord};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
 
+use crate::chain::{Chain, QUICK, simulated};
 use crate::medium::{Medium, QUIET};
-use crate::process::{Ended, Relay};
-use crate::simulated;
+use crate::process::Relay;
 
-/// Relays of a chain on one channel, and a folder for their files.
-struct Channel {
-    medium: Medium,
-    folder: tempfile::TempDir,
+/// Returns a chain of three on one channel that is quick to notice a loss.
+fn channel() -> Chain {
+    Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK)
 }
 
-impl Channel {
-    fn new(relays: usize) -> Self {
-        Self {
-            medium: Medium::new(relays, QUIET),
-            folder: tempfile::tempdir().unwrap(),
-        }
-    }
-
-    fn file(&self, index: usize) -> PathBuf {
-        self.folder.path().join(format!("views{index}"))
-    }
-
-    fn start(&self, index: usize) -> Relay {
-        let file = self.file(index);
-        Relay::start(&[
-            "--index",
-            &index.to_string(),
-            "--of",
-            "3",
-            "--shared",
-            self.medium.tty(index - 1),
-            "--probe-after-ms",
-            "500",
-            "--dead-after-ms",
-            "1500",
-            "--view-file",
-            file.to_str().unwrap(),
-        ])
-    }
+/// Starts relay `index` with a file for its votes.
+fn start(chain: &Chain, index: usize) -> Relay {
+    let file = chain.files.text(&format!("views{index}"));
+    chain.relay(index, &format!("--view-file {file}"))
 }
 
 fn loaded() -> Mission {
@@ -62,8 +36,8 @@ fn store(file: &Path, record: &ViewRecord) -> Vec<u8> {
     bytes
 }
 
-fn stored(file: &Path) -> ViewRecord {
-    let bytes = std::fs::read(file).unwrap();
+fn stored(chain: &Chain, index: usize) -> ViewRecord {
+    let bytes = std::fs::read(chain.files.path(&format!("views{index}"))).unwrap();
     ViewRecord::from_bytes(&bytes[..ViewRecord::LENGTH]).unwrap()
 }
 
@@ -73,27 +47,25 @@ const STANDS_BY: &str = "restored: votes of before this start, from --view-file;
 #[test]
 fn three_that_are_started_again_stand_by_what_they_said() {
     let expected = simulated(&Scenario::default(), 3);
-    let channel = Channel::new(3);
-    let mut relays: Vec<Relay> = (1..=3).map(|index| channel.start(index)).collect();
-    for (relay, place) in relays.iter_mut().zip(&expected) {
-        relay.settles_at(*place);
-        assert!(!relay.has_said("restored: "));
-    }
-    drop(relays.pop());
-    let of_two = simulated(&Scenario::default(), 2);
-    for (relay, place) in relays.iter_mut().zip(&of_two) {
-        relay.settles_at(*place);
-    }
-    drop(relays);
-    let before: Vec<ViewRecord> = (1..=3).map(|index| stored(&channel.file(index))).collect();
-    let mut relays: Vec<Relay> = (1..=3).map(|index| channel.start(index)).collect();
-    for (relay, place) in relays.iter_mut().zip(&expected) {
-        relay.line(STANDS_BY);
-        relay.settles_at(*place);
-    }
-    drop(relays);
+    let mut chain = channel();
+    chain.relays = (1..=3).map(|index| start(&chain, index)).collect();
+    chain.settles_at(&expected);
+    assert!(
+        chain
+            .relays
+            .iter_mut()
+            .all(|relay| !relay.has_said("restored: "))
+    );
+    drop(chain.relays.pop());
+    chain.settles_at(&simulated(&Scenario::default(), 2));
+    chain.relays.clear();
+    let before = [1, 2, 3].map(|index| stored(&chain, index));
+    chain.relays = (1..=3).map(|index| start(&chain, index)).collect();
+    chain.lines(STANDS_BY);
+    chain.settles_at(&expected);
+    chain.relays.clear();
     for (index, before) in (1..).zip(before) {
-        assert_ne!(stored(&channel.file(index)), before, "relay {index}");
+        assert_ne!(stored(&chain, index), before, "relay {index}");
     }
 }
 
@@ -110,23 +82,26 @@ fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
 /// Checks two of three relays, a quorum of the loaded chain, but not of a stored view without them.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly() {
-    let channel = Channel::new(3);
+    let mut chain = channel();
     let said = voted(digest(&loaded()), 1, 40, false);
     for index in [1, 2] {
-        store(&channel.file(index), &said);
+        store(&chain.files.path(&format!("views{index}")), &said);
     }
-    let mut relays = [1, 2].map(|index| channel.start(index));
-    relays[0].line(STANDS_BY);
-    relays[0].line("no quorum: ");
-    for relay in &mut relays {
-        assert!(!relay.has_said("setpoint: "));
-    }
+    chain.relays = (1..=2).map(|index| start(&chain, index)).collect();
+    chain.relays[0].line(STANDS_BY);
+    chain.relays[0].line("no quorum: ");
+    assert!(
+        chain
+            .relays
+            .iter_mut()
+            .all(|relay| !relay.has_said("setpoint: "))
+    );
 }
 
 #[test]
 fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
-    let channel = Channel::new(1);
-    let file = channel.file(1);
+    let chain = channel();
+    let file = chain.files.path("views1");
     let good = store(&file, &voted(digest(&loaded()), 3, 40, true));
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
@@ -144,20 +119,14 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();
-        let Ended {
-            status,
-            stdout,
-            stderr,
-        } = channel.start(1).end();
         let line = format!("--view-file {}: {words}", file.display());
         assert_eq!(
-            (status, stderr),
-            (Some(NOT_RETRIED), vec![line]),
+            start(&chain, 1).refused_at_once(NOT_RETRIED),
+            line,
             "{bytes:?}"
         );
-        assert_eq!(stdout, Vec::<String>::new());
         assert_eq!(std::fs::read(&file).unwrap(), bytes);
     }
     std::fs::write(&file, &good).unwrap();
-    channel.start(1).line(STANDS_BY);
+    start(&chain, 1).line(STANDS_BY);
 }

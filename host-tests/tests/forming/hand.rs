@@ -1,46 +1,23 @@
-//! Relays on instantaneous wires, on which a test can inspect, delay and drop every frame.
+//! Chain of the paper's link in virtual time, of which relays reboot, and the margin of its result.
 
-use std::collections::VecDeque;
-
-use uav_relay::wire::deframe::Deframer;
-use uav_relay::wire::frame::{self, MAX_FRAME};
+use host_tests::bench::{Bench, Frame};
+use host_tests::fixtures::NETWORK;
 use uav_relay::wire::message::{AdjustStep, Message};
-use uav_relay::{Band, Identity, Instant, Mission, MissionConfig, Phase, Port, Relay, Settings};
+use uav_relay::{Band, Duration, Identity, Instant, Mission, MissionConfig, Relay, Settings};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Place};
 
-/// Frame in transit: receiver counted from 0, its port, and the bytes.
-pub(crate) struct Flying {
-    pub(crate) to: usize,
-    pub(crate) port: Port,
-    pub(crate) bytes: Vec<u8>,
-}
-
-impl Flying {
-    /// Returns true for a message of Algorithm 2's last round.
-    pub(crate) fn is_stop(&self) -> bool {
-        self.is(
-            |message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop),
-        )
-    }
-
-    pub(crate) fn is(&self, what: impl Fn(&Message) -> bool) -> bool {
-        let mut deframer = Deframer::new();
-        self.bytes.iter().any(|&byte| match deframer.push(byte) {
-            Some(Ok(plain)) => what(&frame::decode(plain).unwrap().1),
-            _ => false,
-        })
-    }
+/// Returns true for a message of Algorithm 2's last round.
+pub(crate) fn is_stop(frame: &Frame) -> bool {
+    frame.is(|message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop))
 }
 
 pub(crate) struct Chain {
     link: Link,
     mission: Mission,
     settings: Settings,
-    pub(crate) relays: Vec<Relay>,
-    pub(crate) now: Instant,
-    pub(crate) flying: VecDeque<Flying>,
+    pub(crate) bench: Bench,
 }
 
 impl Chain {
@@ -59,78 +36,43 @@ impl Chain {
             band,
             ..*mission.config()
         };
-        let mut chain = Self {
+        let mission = Mission::try_new(config).unwrap();
+        Self {
             link,
-            mission: Mission::try_new(config).unwrap(),
+            mission,
             settings,
-            relays: Vec::new(),
-            now: Instant::ZERO,
-            flying: VecDeque::new(),
-        };
-        for (at, seed) in (0..relays).zip(0..) {
-            let relay = chain.switched_on(at, seed);
-            chain.relays.push(relay);
+            bench: Bench::of(mission, |_| settings),
         }
-        chain
-    }
-
-    fn switched_on(&self, at: usize, seed: u32) -> Relay {
-        let index = u16::try_from(at).unwrap() + 1;
-        let identity = Identity { network: 1, index };
-        Relay::new(self.mission, identity, self.settings, seed, self.now).unwrap()
     }
 
     pub(crate) fn reboot(&mut self, at: usize, seed: u32) {
-        self.relays[at] = self.switched_on(at, seed);
+        let identity = Identity {
+            network: NETWORK,
+            index: u16::try_from(at).unwrap() + 1,
+        };
+        let now = self.bench.now;
+        let relay = Relay::new(self.mission, identity, self.settings, seed, now);
+        self.bench.relays[at] = relay.unwrap();
     }
 
     /// Delivers the next frame, or else advances to the next timer.
     pub(crate) fn step(&mut self) {
-        if let Some(Flying { to, port, bytes }) = self.flying.pop_front() {
-            self.relays[to].handle_bytes(self.now, port, &bytes);
-        } else {
-            let next = self.relays.iter().filter_map(Relay::poll_timeout).min();
-            self.now = next.unwrap().max(self.now);
-        }
-        for (at, relay) in self.relays.iter_mut().enumerate() {
-            relay.handle_timeout(self.now);
-            let mut frame = [0; MAX_FRAME];
-            relay.persist(|_| true);
-            while let Some(transmit) = relay.poll_transmit(self.now, &mut frame) {
-                let (to, port) = match transmit.port {
-                    Port::Downstream => (at + 1, Port::Upstream),
-                    _ => (at - 1, Port::Downstream),
-                };
-                let bytes = frame[..transmit.len].to_vec();
-                self.flying.push_back(Flying { to, port, bytes });
-            }
-        }
+        self.bench.step(Instant::from_micros(u64::MAX));
     }
 
-    /// Steps until `done`, for at most `limit_ms` of virtual time. Returns the time taken, ms.
-    pub(crate) fn until(&mut self, limit_ms: u64, done: impl Fn(&Self) -> bool) -> Option<u64> {
-        let begun = self.now;
-        let took = |chain: &Self| chain.now.since(begun).as_micros().div_ceil(1000);
-        while !done(self) {
-            self.step();
-            if took(self) > limit_ms {
-                return None;
-            }
-        }
-        Some(took(self))
-    }
-
-    /// Returns true if all relays hold positions in the same view and no frame is in transit.
-    pub(crate) fn holds(&self) -> bool {
-        let view = self.relays[0].view();
-        let holds = |relay: &Relay| relay.phase() == Phase::Holding && relay.view() == view;
-        self.relays.iter().all(holds)
+    /// Runs until `done`, for at most `limit_ms`. Returns the time taken, ms.
+    pub(crate) fn until(&mut self, limit_ms: u64, done: impl Fn(&Bench) -> bool) -> Option<u64> {
+        let took = self
+            .bench
+            .run_until(Duration::from_millis(limit_ms), done)?;
+        Some(took.as_micros().div_ceil(1000))
     }
 
     /// Returns the relative margin of the chain's SIR over its target, and the smallest distance, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self
+            .bench
             .relays
             .iter()
             .map(at)
@@ -138,7 +80,11 @@ impl Chain {
             .collect();
         let apart = |pair: &[Place]| pair[0].distance_m(&pair[1]);
         let nearest = places.windows(2).map(apart).fold(f64::INFINITY, f64::min);
-        let targets = self.relays.iter().map(|relay| relay.target().unwrap());
+        let targets = self
+            .bench
+            .relays
+            .iter()
+            .map(|relay| relay.target().unwrap());
         let most = f64::from(targets.fold(0.0, f32::max));
         (
             joint::sir(&self.link, &places).unwrap() / most - 1.0,

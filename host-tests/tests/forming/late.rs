@@ -3,7 +3,8 @@
 use uav_relay::wire::message::Message;
 use uav_relay::{Adjust, Local, Method, Settings};
 
-use crate::hand::{Chain, LOW, WIDE};
+use crate::hand::{Chain, LOW, WIDE, is_stop};
+use host_tests::bench::Bench;
 
 /// Delays a leader's first pass beyond its reboot and an agreement by Algorithm 2. No relay may follow it.
 #[test]
@@ -20,19 +21,19 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     for held in 1..4 {
         for seed in 1..=20 {
             let mut chain = Chain::new(4, 100.0, WIDE, settings);
-            let at_held = |chain: &Chain| chain.flying.iter().any(|frame| frame.to == held);
+            let at_held = |chain: &Bench| chain.flying.iter().any(|frame| frame.to == held + 1);
             chain.until(5_000, at_held).unwrap();
-            let late = chain.flying.pop_back().unwrap();
+            let late = chain.bench.flying.pop_back().unwrap();
             chain.reboot(0, seed);
             // The pass arrives during the last round.
-            let stops = |chain: &Chain| {
+            let stops = |chain: &Bench| {
                 let mut flying = chain.flying.iter();
-                flying.any(|frame| frame.to == held && frame.is_stop())
+                flying.any(|frame| frame.to == held + 1 && is_stop(frame))
             };
             let reached = chain.until(600_000, stops);
             assert!(reached.is_some(), "relay {}, seed {seed}", held + 1);
-            chain.flying.push_front(late);
-            let settled = chain.until(60_000, Chain::holds);
+            chain.bench.flying.push_front(late);
+            let settled = chain.until(60_000, Bench::holds);
             assert!(settled.is_some(), "relay {}, seed {seed}", held + 1);
             let (above, _) = chain.margin();
             assert!(above >= -2e-4, "relay {}, seed {seed}: {above}", held + 1);
@@ -44,61 +45,57 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
 #[test]
 fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
-    chain.until(5_000, Chain::holds).unwrap();
+    chain.until(5_000, Bench::holds).unwrap();
     chain.reboot(1, 3);
-    let calls = |chain: &Chain| {
+    let calls = |chain: &Bench| {
         let mut flying = chain.flying.iter();
-        flying.any(|frame| frame.to == 2 && frame.is(|m| matches!(m, Message::Proposal(_))))
+        flying.any(|frame| frame.to == 3 && frame.is(|m| matches!(m, Message::Proposal(_))))
     };
     chain.until(10_000, calls).unwrap();
     // The lost request is repeated; relay 2 then reboots once more for a second view.
-    let late = chain.flying.pop_back().unwrap();
-    chain.until(10_000, Chain::holds).unwrap();
-    assert_eq!(chain.relays[2].view().number(), 1);
+    let late = chain.bench.flying.pop_back().unwrap();
+    chain.until(10_000, Bench::holds).unwrap();
+    assert_eq!(chain.bench.relays[2].view().number(), 1);
     chain.reboot(1, 4);
-    let second = |chain: &Chain| chain.holds() && chain.relays[2].view().number() == 2;
+    let second = |chain: &Bench| chain.holds() && chain.relays[2].view().number() == 2;
     // Relay 2 forgot a view that needs it, whose lease must expire first, 15 s after a renewal.
     chain.until(10_000 + 16_000, second).unwrap();
-    let before: Vec<_> = chain
-        .relays
-        .iter()
-        .map(uav_relay::Relay::setpoint)
-        .collect();
-    let stale = chain.relays[2].stats().stale;
-    chain.flying.push_front(late);
+    let before = chain.bench.setpoints();
+    let stale = chain.bench.relays[2].stats().stale;
+    chain.bench.flying.push_front(late);
     chain.step();
-    assert_eq!(chain.relays[2].stats().stale, stale + 1);
+    assert_eq!(chain.bench.relays[2].stats().stale, stale + 1);
     for _ in 0..200 {
         chain.step();
-        assert!(second(&chain));
+        assert!(second(&chain.bench));
     }
-    let after: Vec<_> = chain
-        .relays
-        .iter()
-        .map(uav_relay::Relay::setpoint)
-        .collect();
-    assert_eq!(after, before);
+    assert_eq!(chain.bench.setpoints(), before);
 }
 
 /// Checks that a relay requests a view when an incompatible neighbour reports a newer one.
 #[test]
 fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
-    chain.until(5_000, Chain::holds).unwrap();
+    chain.until(5_000, Bench::holds).unwrap();
     chain.reboot(1, 3);
     // The tail accepted the new view, but the result is lost because the others reboot.
-    let agreed = |chain: &Chain| chain.relays[2].view().number() == 1;
+    let agreed = |chain: &Bench| chain.relays[2].view().number() == 1;
     chain.until(10_000, agreed).unwrap();
-    chain.flying.clear();
+    chain.bench.flying.clear();
     chain.reboot(0, 8);
     chain.reboot(1, 9);
     // The tail rejects passes of view 0 and reports its view. It is a member elsewhere until its lease expires.
     let took = chain.until(10_000 + 16_000, |chain| {
         chain.holds() && chain.relays[0].view().number() == 2
     });
-    let views: Vec<_> = chain.relays.iter().map(uav_relay::Relay::view).collect();
+    let views: Vec<_> = chain
+        .bench
+        .relays
+        .iter()
+        .map(uav_relay::Relay::view)
+        .collect();
     println!("{took:?} ms, {views:?}");
     assert!(took.is_some());
-    assert!(chain.relays[2].stats().view > 0);
+    assert!(chain.bench.relays[2].stats().view > 0);
     assert!(chain.margin().0 >= -2e-4);
 }

@@ -3,6 +3,7 @@
 use uav_relay::{Method, Phase, Settings};
 
 use crate::hand::{Chain, LOW, WIDE};
+use host_tests::bench::Bench;
 
 /// Checks that a rebooted leader with any pass number agrees within a second at a `hop_time` of 30 ms.
 #[test]
@@ -17,14 +18,14 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
         let mut insisted = 0;
         for seed in 0..2_000 {
             let mut chain = Chain::new(2, 20.0, LOW, settings);
-            chain.until(5_000, Chain::holds).unwrap();
-            let before = chain.relays[1].setpoint();
+            chain.until(5_000, Bench::holds).unwrap();
+            let before = chain.bench.relays[1].setpoint();
             chain.reboot(0, seed);
-            let took = chain.until(1_000, Chain::holds);
+            let took = chain.until(1_000, Bench::holds);
             let took = took.unwrap_or_else(|| panic!("seed {seed} is never answered"));
             longest = longest.max((took, seed));
-            insisted += u32::from(chain.relays[1].stats().stale >= 4);
-            assert_eq!(chain.relays[1].setpoint(), before, "seed {seed}");
+            insisted += u32::from(chain.bench.relays[1].stats().stale >= 4);
+            assert_eq!(chain.bench.relays[1].setpoint(), before, "seed {seed}");
         }
         println!("predict {predict}: at most {longest:?} (ms, seed); {insisted} insisted");
         assert!(predict || insisted > 0, "no number was just behind");
@@ -33,22 +34,22 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
 
 /// Reboots a relay during the leader's second pass: it gets its position by a new view.
 #[test]
-fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
+fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
     let settings = Settings {
         predict: false,
         ..Settings::default()
     };
     for rebooted in 1..3 {
         let mut chain = Chain::new(3, 20.0, LOW, settings);
-        let second = |chain: &Chain| chain.relays[0].stats().passes_begun == 2;
+        let second = |chain: &Bench| chain.relays[0].stats().sweeps == 2;
         chain.until(1_000, second).unwrap();
-        assert!(!chain.holds());
-        chain.flying.clear();
+        assert!(!chain.bench.holds());
+        chain.bench.flying.clear();
         chain.reboot(rebooted, 77);
-        let took = chain.until(5_000, Chain::holds);
+        let took = chain.until(5_000, Bench::holds);
         println!("relay {}: {took:?} ms", rebooted + 1);
         assert!(took.is_some(), "relay {}", rebooted + 1);
-        for (relay, index) in chain.relays.iter().zip(1..) {
+        for (relay, index) in chain.bench.relays.iter().zip(1..) {
             assert_eq!((relay.view().number(), relay.index()), (1, index));
             assert_eq!(relay.mission().relays(), 3);
         }
@@ -58,22 +59,28 @@ fn a_relay_rebooted_in_the_midst_of_a_pass_gets_a_place_by_a_new_view() {
 
 /// Reboots a relay of a settled chain: it requests a view at the first unknown renewal, or on its own.
 #[test]
-fn a_relay_rebooted_in_a_settled_chain_gets_a_place_by_a_new_view() {
+fn a_relay_rebooted_later_gets_a_place_by_a_new_view() {
     for rebooted in 1..4 {
         let mut chain = Chain::new(4, 20.0, LOW, Settings::default());
-        chain.until(5_000, Chain::holds).unwrap();
+        chain.until(5_000, Bench::holds).unwrap();
         chain.reboot(rebooted, 5);
         // The limit is `quiet`, and two hops for each relay.
-        let took = chain.until(5_000 + 2 * 4 * 30 + 500, Chain::holds);
+        let took = chain.until(5_000 + 2 * 4 * 30 + 500, Bench::holds);
         println!("relay {}: {took:?} ms", rebooted + 1);
         assert!(took.is_some(), "{took:?}");
-        assert!(chain.relays.iter().all(|relay| relay.view().number() == 1));
+        assert!(
+            chain
+                .bench
+                .relays
+                .iter()
+                .all(|relay| relay.view().number() == 1)
+        );
         assert!(chain.margin().0 >= -2e-4);
     }
 }
 
 #[test]
-fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
+fn a_relay_rebooted_in_a_joint_agreement_meets_the_target() {
     let settings = Settings {
         method: Method::Joint,
         ..Settings::default()
@@ -84,12 +91,12 @@ fn a_relay_rebooted_in_the_agreement_on_altitudes_still_meets_the_target() {
             for rebooted in 1..relays - 1 {
                 let name = format!("{relays} relays at {altitude_m} m, {}", rebooted + 1);
                 let mut chain = Chain::new(relays, altitude_m, WIDE, settings);
-                let tail = |chain: &Chain| chain.relays[relays - 1].phase() == Phase::Holding;
+                let tail = |chain: &Bench| chain.relays[relays - 1].phase() == Phase::Holding;
                 // Each relay knows its position by then, and one sweep confirms it.
                 chain.until(60_000, tail).unwrap();
-                chain.flying.clear();
+                chain.bench.flying.clear();
                 chain.reboot(rebooted, 99);
-                let took = chain.until(60_000, Chain::holds);
+                let took = chain.until(60_000, Bench::holds);
                 longest = longest.max(took.unwrap_or_else(|| panic!("{name}: stuck")));
                 let (above, apart_m) = chain.margin();
                 assert!(above >= -2e-4, "{name}: {above}");

@@ -1,13 +1,16 @@
 //! Two drones with equal index, number, key and epoch, as from a cloned image; `COUNT` sets the chains.
 
+use std::cell::Cell;
+use std::rc::Rc;
+
+use host_tests::bench::{Bench, between_neighbours};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::MAX_FRAME;
 use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
 
 use super::*;
 
-/// Step of the medium, ms; a frame arrives one step after it was sent.
+/// Latency of a frame, and interval of the observations, ms.
 const STEP_MS: u64 = 10;
 
 /// Time limit for one duplicate to give up its setpoint after it has received the other, ms.
@@ -37,13 +40,12 @@ enum Medium {
 }
 
 impl Medium {
-    /// Returns the port at which drone `receiver` receives a frame of `sender`, if any. `port` is the port of the sender.
-    fn carries(self, sender: u16, port: Port, receiver: u16) -> Option<Port> {
+    /// Returns the port at which relay `to` receives a frame that relay `from` sends at `port`, if any.
+    fn carries(self, from: usize, port: Port, to: usize) -> Option<Port> {
         match port {
-            Port::Shared => Some(Port::Shared),
-            _ if sender == receiver => (self == Self::Links).then_some(port),
-            Port::Upstream => (receiver + 1 == sender).then_some(Port::Downstream),
-            Port::Downstream => (receiver == sender + 1).then_some(Port::Upstream),
+            Port::Shared => Some(port),
+            _ if from == to => (self == Self::Links).then_some(port),
+            _ => between_neighbours(from, port, to),
         }
     }
 }
@@ -71,34 +73,8 @@ struct Found {
     flies: u64,
     /// True if the duplicate that started first has the setpoint in the end.
     first_stays: bool,
-    /// Records for each duplicate that it raised `Event::DuplicateIndex`.
+    /// Records for each duplicate that it raised `Event::IndexTaken`.
     reported: [bool; 2],
-}
-
-struct Drone {
-    index: u16,
-    relay: Relay,
-    on_at: u64,
-}
-
-/// Creates a drone for each index and start time, ms, each with its own random seed.
-fn switched_on(
-    mission: Mission,
-    settings: Settings,
-    starts: &[(u16, u64)],
-    rng: &mut ChaCha8Rng,
-) -> Vec<Drone> {
-    let drone = |&(index, on_at)| {
-        let identity = Identity { network: 7, index };
-        let at = Instant::from_millis(on_at);
-        let relay = Relay::new(mission, identity, settings, rng.random(), at).unwrap();
-        Drone {
-            index,
-            relay,
-            on_at,
-        }
-    };
-    starts.iter().map(drone).collect()
 }
 
 fn flown(case: Case) -> Found {
@@ -123,64 +99,41 @@ fn flown(case: Case) -> Found {
     } else {
         10 * rng.random_range(1..6_000)
     };
-    let starts = (1..=relays).map(|index| (index, 0)).chain([(twice, later)]);
-    let starts: Vec<_> = starts.collect();
-    let mut drones = switched_on(mission, settings, &starts, rng);
-    let (first, second) = (usize::from(twice) - 1, drones.len() - 1);
-    let mut flying: Vec<(usize, Port, Vec<u8>)> = Vec::new();
+    let mut relay = |index, at| {
+        let identity = Identity { network: 7, index };
+        Relay::new(mission, identity, settings, rng.random(), at).unwrap()
+    };
+    let relays_on = (1..=relays)
+        .map(|index| relay(index, Instant::ZERO))
+        .collect();
+    let copy = relay(twice, Instant::from_millis(later));
+    let mut bench = Bench::new(relays_on, Instant::ZERO);
+    bench.latency = Duration::from_millis(STEP_MS);
+    bench.route = Box::new(move |from, port, to| case.medium.carries(from, port, to));
+    // Time of the first frame between the duplicates.
+    let heard = Rc::new(Cell::new(None));
+    let (first, second) = (usize::from(twice) - 1, usize::from(relays));
+    let (first_heard, mut losses) = (Rc::clone(&heard), ChaCha8Rng::seed_from_u64(case.seed));
+    bench.fate = Box::new(move |frame| {
+        let arrives = !losses.random_bool(case.loss);
+        let is_between = [frame.from, frame.to]
+            .iter()
+            .all(|node| [first, second].contains(&(node - 1)));
+        if arrives && is_between && first_heard.get().is_none() {
+            first_heard.set(Some(frame.at.as_micros() / 1_000));
+        }
+        arrives
+    });
     let mut found = Found::default();
-    let (mut heard, mut run, mut run_at_all) = (None, 0, 0);
-    let mut reported = [false; 2];
-    for step in 0..(later + WATCHED_MS) / STEP_MS {
+    let (mut run, mut run_at_all) = (0, 0);
+    bench.run(Instant::from_millis(later));
+    bench.switch_on(copy);
+    for step in later / STEP_MS..(later + WATCHED_MS) / STEP_MS {
         let ms = step * STEP_MS;
-        let now = Instant::from_millis(ms);
-        for (from, port, bytes) in std::mem::take(&mut flying) {
-            let sender = drones[from].index;
-            for (at, drone) in drones.iter_mut().enumerate() {
-                if at == from || drone.on_at > ms {
-                    continue;
-                }
-                let Some(through) = case.medium.carries(sender, port, drone.index) else {
-                    continue;
-                };
-                if rng.random_bool(case.loss) {
-                    continue;
-                }
-                if drone.index == sender {
-                    heard.get_or_insert(ms);
-                }
-                drone.relay.handle_bytes(now, through, &bytes);
-            }
-        }
-        for (at, drone) in drones.iter_mut().enumerate() {
-            if drone.on_at > ms {
-                continue;
-            }
-            let relay = &mut drone.relay;
-            if relay.poll_timeout().is_some_and(|due| due <= now) {
-                relay.handle_timeout(now);
-            }
-            let mut frame = [0; MAX_FRAME];
-            relay.persist(|_| true);
-            while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
-                flying.push((at, transmit.port, frame[..transmit.len].to_vec()));
-            }
-            while let Some(event) = relay.poll_event() {
-                let taken = event == Event::DuplicateIndex { node: twice };
-                if taken && at == first {
-                    reported[0] = true;
-                } else if taken && at == second {
-                    reported[1] = true;
-                }
-            }
-            assert!(relay.poll_timeout().is_none_or(|due| due > now), "it spins");
-        }
-        if ms < later {
-            continue;
-        }
-        let has = |at: usize| drones[at].relay.setpoint().is_some();
+        bench.run(Instant::from_millis(ms));
+        let has = |at: usize| bench.relays[at].setpoint().is_some();
         let both = has(first) && has(second);
-        let limited = heard.is_some_and(|heard| ms > heard + LIMIT_MS);
+        let limited = heard.get().is_some_and(|heard| ms > heard + LIMIT_MS);
         run_at_all = if both { run_at_all + STEP_MS } else { 0 };
         run = if both && limited { run + STEP_MS } else { 0 };
         found.both = found.both.max(run);
@@ -195,18 +148,15 @@ fn flown(case: Case) -> Found {
             found.flies = ms + STEP_MS - later;
         }
     }
-    found.first_stays = drones[first].relay.setpoint().is_some();
-    found.reported = reported;
+    found.first_stays = bench.relays[first].setpoint().is_some();
+    let taken = Event::IndexTaken { node: twice };
+    found.reported = [first, second].map(|at| bench.has_raised(at, taken));
     found
-}
-
-fn count() -> u64 {
-    std::env::var("COUNT").map_or(12, |text| text.parse().unwrap())
 }
 
 /// Flies `count` chains of one kind and prints the results.
 fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Found)> {
-    let found: Vec<(u64, Found)> = (0..count())
+    let found: Vec<(u64, Found)> = (0..number("COUNT", 12))
         .map(|seed| {
             let case = Case {
                 medium,
@@ -238,18 +188,11 @@ fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Foun
     found
 }
 
-fn kinds() -> impl Iterator<Item = (bool, f64, bool)> {
-    [false, true].into_iter().flat_map(|signed| {
-        [0.0, 0.3]
-            .into_iter()
-            .flat_map(move |loss| [true, false].map(move |at_once| (signed, loss, at_once)))
-    })
-}
-
 /// Checks the time limits, the report of a duplicate, and that the chain flies within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
-    for (signed, loss, at_once) in kinds() {
+    for kind in 0..8 {
+        let (signed, loss, at_once) = (kind & 4 > 0, [0.0, 0.3][kind >> 1 & 1], kind & 1 == 0);
         for (seed, found) in fly(medium, signed, loss, at_once) {
             let reported = found.reported.contains(&true);
             let both = found.both > 0 || found.both_at_all > most_ms;
@@ -267,7 +210,7 @@ fn at_most_one_flies(medium: Medium, most_ms: u64) {
 }
 
 #[test]
-fn of_two_with_one_index_on_a_shared_channel_one_has_a_setpoint() {
+fn of_two_with_one_index_on_a_channel_one_has_a_setpoint() {
     at_most_one_flies(Medium::Shared, HEARD_MS);
 }
 
@@ -277,6 +220,6 @@ fn of_two_with_one_index_on_links_one_has_a_setpoint() {
 }
 
 #[test]
-fn of_two_with_one_index_that_do_not_hear_each_other_one_has_a_setpoint() {
+fn of_two_hidden_ones_with_one_index_one_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }

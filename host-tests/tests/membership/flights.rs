@@ -1,25 +1,17 @@
 //! Flights with a guard. No two drones come nearer than the separation, whatever is lost, late or silent.
 
-use host_tests::flights::{eight_apart, exact};
+use host_tests::flights::{APART_M, SEPARATION_M, eight_apart, guard};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::GuardConfig;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-const SEPARATION_M: f32 = 5.0;
-
-/// Rounding error of a position, m: positions are f32 of up to 1 km.
-const ROUNDING_M: f64 = 2e-3;
-
-/// Returns a guarded flight of eight drones that start at least the separation apart.
+/// Returns a guarded flight of eight drones on one radio channel.
 fn guarded(rng: &mut ChaCha8Rng) -> Setup {
-    let mission = eight_apart(SEPARATION_M);
-    let mut setup = Setup::on_shared_channel(mission);
-    setup.settings.guard = Some(GuardConfig::of(&mission, mission.config().common));
-    setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
+    let mut setup = Setup::on_shared_channel(eight_apart(SEPARATION_M));
+    guard(&mut setup, rng);
     setup.seed = rng.random();
     setup
 }
@@ -39,10 +31,7 @@ fn without_losses_all_arrive_and_none_come_close() {
             outcome.ended.as_micros() / 1_000_000
         );
         assert_eq!(outcome.ending, Ending::Settled, "SEED={seed}");
-        assert!(
-            nearest >= f64::from(SEPARATION_M) - ROUNDING_M,
-            "SEED={seed}"
-        );
+        assert!(nearest >= APART_M, "SEED={seed}");
         assert_eq!(outcome.unsafe_setpoints, 0, "SEED={seed}");
     }
 }
@@ -71,7 +60,7 @@ fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
         setup.deadline = seconds(241);
         let outcome = run(setup.clone()).unwrap();
         assert!(
-            outcome.nearest_m() >= f64::from(SEPARATION_M) - ROUNDING_M,
+            outcome.nearest_m() >= APART_M,
             "SEED={seed}: {} m, {:?} {:?}",
             outcome.nearest_m(),
             setup.kills,
@@ -90,7 +79,7 @@ fn without_a_guard_some_come_close() {
         setup.settings.guard = None;
         setup.deadline = seconds(2_000);
         let outcome = run(setup).unwrap();
-        outcome.nearest_m() < f64::from(SEPARATION_M) - ROUNDING_M
+        outcome.nearest_m() < APART_M
     });
     assert!(close);
 }

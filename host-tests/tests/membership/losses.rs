@@ -4,7 +4,6 @@ use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::Station;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
@@ -46,10 +45,8 @@ fn any_one_two_or_three_of_eight_may_be_lost_at_once() {
         let mut setup = paper(8);
         setup.kills = gone.iter().map(|index| (*index, seconds(20))).collect();
         setup.deadline = seconds(120);
-        let outcome = run(setup.clone()).unwrap();
-        assert_eq!(outcome.ending, Ending::Settled, "{gone:?} lost");
-        let left = left(&outcome);
-        judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{gone:?} lost: {what}"));
+        let left = without(&gone);
+        let outcome = settles(&setup, &left, &format!("{gone:?} lost"));
         let (took, sweeps) = recovery(&outcome, 1);
         slowest = slowest.max(took);
         most = most.max(sweeps);
@@ -75,32 +72,22 @@ fn a_relay_that_comes_back_takes_its_place_again() {
             setup.kills = vec![(index, seconds(20))];
             setup.boots = vec![(index, Instant::from_millis(20_000 + off))];
             setup.deadline = seconds(200);
-            let outcome = run(setup.clone()).unwrap();
-            assert_eq!(outcome.ending, Ending::Settled, "{index} off for {off} ms");
-            judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8])
-                .unwrap_or_else(|what| panic!("{index} off for {off} ms: {what}"));
+            settles(&setup, &ALL, &format!("{index} off for {off} ms"));
         }
     }
 }
 
 /// Checks that one of two adjacent lost relays returns into the closed gap while the other stays off.
 #[test]
-fn one_of_two_in_a_row_that_comes_back_is_taken_between_those_who_have_closed_up() {
+fn one_of_two_in_a_row_returns_into_the_closed_gap() {
     for (index, off) in [(2, 3), (3, 2), (4, 5), (5, 4), (6, 7), (7, 6)] {
         for seconds_off in [15, 17, 20, 30, 60] {
             let mut setup = paper(8);
             setup.kills = vec![(index, seconds(20)), (off, seconds(20))];
             setup.boots = vec![(index, seconds(20 + seconds_off))];
             setup.deadline = seconds(300);
-            let outcome = run(setup.clone()).unwrap();
-            assert_eq!(
-                outcome.ending,
-                Ending::Settled,
-                "{index} off for {seconds_off} s"
-            );
-            let left: Vec<u16> = (1..=8).filter(|node| *node != off).collect();
-            judge(&setup, &outcome, &left)
-                .unwrap_or_else(|what| panic!("{index} off for {seconds_off} s: {what}"));
+            let left = without(&[off]);
+            settles(&setup, &left, &format!("{index} off for {seconds_off} s"));
         }
     }
 }
@@ -114,9 +101,7 @@ fn all_of_them_are_switched_on_again_one_after_the_other() {
         setup.boots.push((index, seconds(at + 3)));
     }
     setup.deadline = seconds(700);
-    let outcome = run(setup.clone()).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
+    settles(&setup, &ALL, "all");
 }
 
 #[test]
@@ -128,9 +113,7 @@ fn one_after_the_other_until_two_are_left() {
         .map(|(n, index)| (index, seconds(60 * n)))
         .collect();
     setup.deadline = seconds(600);
-    let outcome = run(setup.clone()).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    judge(&setup, &outcome, &[2, 6]).unwrap();
+    settles(&setup, &[2, 6], "two are left");
 }
 
 #[test]
@@ -150,9 +133,7 @@ fn over_two_wires_a_break_is_reported_and_a_reboot_is_mended() {
         setup.kills = vec![(index, seconds(20))];
         setup.boots = vec![(index, seconds(21))];
         setup.deadline = seconds(100);
-        let outcome = run(setup.clone()).unwrap();
-        assert_eq!(outcome.ending, Ending::Settled, "{index}");
-        judge(&setup, &outcome, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
+        settles(&setup, &ALL, &format!("{index} rebooted"));
     }
 }
 
@@ -176,9 +157,7 @@ fn a_chain_in_a_field_forms_anew_from_the_other_end() {
         let mut setup = Setup::on_shared_channel(of_stochastic_link(&link, 2.0).unwrap());
         setup.kills = gone.iter().map(|index| (*index, seconds(20))).collect();
         setup.deadline = seconds(120);
-        let outcome = run(setup.clone()).unwrap();
-        assert_eq!(outcome.ending, Ending::Settled, "{gone:?} lost");
-        judge(&setup, &outcome, &left(&outcome)).unwrap_or_else(|what| panic!("{gone:?}: {what}"));
+        settles(&setup, &without(&gone), &format!("{gone:?} lost"));
     }
 }
 
@@ -203,10 +182,8 @@ fn a_chain_that_chooses_altitudes_or_takes_turns_forms_anew() {
             setup.settings.method = method;
             setup.kills = vec![(index, seconds(60))];
             setup.deadline = seconds(400);
-            let outcome = run(setup.clone()).unwrap();
-            assert_eq!(outcome.ending, Ending::Settled, "{method:?}, {index} lost");
-            judge(&setup, &outcome, &left(&outcome))
-                .unwrap_or_else(|what| panic!("{method:?}, {index} lost: {what}"));
+            let left: Vec<u16> = (1..=5).filter(|number| *number != index).collect();
+            settles(&setup, &left, &format!("{method:?}, {index} lost"));
         }
     }
 }

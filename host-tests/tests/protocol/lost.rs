@@ -121,6 +121,10 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
 fn what_a_relay_is_set_to_is_checked() {
     use uav_relay::SetupError;
     use uav_relay::{Profile, Schedule};
+    const UNKNOWN: Profile = Profile {
+        altitude_m: f32::NAN,
+        power_w: 1.0,
+    };
     let with = |index, change: fn(&mut Settings)| {
         let mut settings = Settings::default();
         change(&mut settings);
@@ -133,37 +137,30 @@ fn what_a_relay_is_set_to_is_checked() {
         )
         .map(|_| ())
     };
+    type Change = fn(&mut Settings);
+    let wrong: [(u16, Change, SetupError); 7] = [
+        (0, |_| (), SetupError::Index),
+        (4, |_| (), SetupError::Index),
+        (1, |s| s.profile = Some(UNKNOWN), SetupError::Profile),
+        (
+            1,
+            |s| s.schedule = Schedule::FixedStep { step: 0.0 },
+            SetupError::Step,
+        ),
+        (
+            1,
+            |s| s.schedule = Schedule::FixedStep { step: f64::NAN },
+            SetupError::Step,
+        ),
+        (
+            1,
+            |s| s.hop_time = Duration::from_micros(0),
+            SetupError::HopTime,
+        ),
+        (1, |s| s.dead_after = s.probe_after, SetupError::Silence),
+    ];
     assert_eq!(with(1, |_| ()), Ok(()));
-    assert_eq!(with(0, |_| ()), Err(SetupError::Index));
-    assert_eq!(with(4, |_| ()), Err(SetupError::Index));
-    let profile = |altitude_m, power_w| {
-        Some(Profile {
-            altitude_m,
-            power_w,
-        })
-    };
-    assert_eq!(
-        with(1, |s| s.profile = Some(Profile {
-            altitude_m: f32::NAN,
-            power_w: 1.0
-        })),
-        Err(SetupError::Profile)
-    );
-    assert!(profile(1.0, 1.0).unwrap().is_valid());
-    assert_eq!(
-        with(1, |s| s.schedule = Schedule::FixedStep { step: 0.0 }),
-        Err(SetupError::Step)
-    );
-    assert_eq!(
-        with(1, |s| s.schedule = Schedule::FixedStep { step: f64::NAN }),
-        Err(SetupError::Step)
-    );
-    assert_eq!(
-        with(1, |s| s.hop_time = Duration::from_micros(0)),
-        Err(SetupError::HopTime)
-    );
-    assert_eq!(
-        with(1, |s| s.dead_after = s.probe_after),
-        Err(SetupError::Silence)
-    );
+    for (index, change, error) in wrong {
+        assert_eq!(with(index, change), Err(error));
+    }
 }

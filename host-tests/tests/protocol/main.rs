@@ -1,13 +1,14 @@
 //! State table of a relay, row by row, through its public interface.
 
+use host_tests::bench::{self, Bench};
 use host_tests::fixtures::{self, NETWORK, mission};
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::frame::{self, Header, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Phase, Port, Relay,
-    Settings,
+    Duration, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Phase,
+    Port, Relay, Settings,
 };
 
 mod lost;
@@ -19,19 +20,11 @@ fn relay(mission: Mission, index: u16) -> Relay {
 
 /// Returns the port, message and bytes of each pending frame.
 fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
-    let mut buffer = [0; MAX_FRAME];
-    let mut sent = Vec::new();
-    relay.persist(|_| true);
-    while let Some(transmit) = relay.poll_transmit(now, &mut buffer) {
-        let bytes = buffer[..transmit.len].to_vec();
-        let mut deframer = Deframer::new();
-        let message = bytes.iter().find_map(|&byte| {
-            let plain = deframer.push(byte)?.unwrap().to_vec();
-            Some(frame::decode(plain.leak()).unwrap().1)
-        });
-        sent.push((transmit.port, message.expect("a whole frame"), bytes));
-        assert!(sent.len() < 16, "the relay never stops sending");
-    }
+    let sent = bench::sent(relay, now).into_iter();
+    let sent: Vec<_> = sent
+        .map(|(port, bytes)| (port, message(&bytes), bytes))
+        .collect();
+    assert!(sent.len() < 16, "the relay never stops sending");
     assert!(
         relay.poll_timeout().is_none_or(|at| at > now),
         "a drained relay wants to be called at once"
@@ -39,8 +32,18 @@ fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
     sent
 }
 
+/// Returns the message of an intact frame.
+fn message(bytes: &[u8]) -> Message {
+    let mut deframer = Deframer::new();
+    let message = bytes.iter().find_map(|&byte| {
+        let plain = deframer.push(byte)?.unwrap();
+        Some(frame::decode(plain).unwrap().1)
+    });
+    message.expect("a whole frame")
+}
+
 fn events(relay: &mut Relay) -> Vec<Event> {
-    std::iter::from_fn(|| relay.poll_event()).collect()
+    bench::events(relay).collect()
 }
 
 /// Runs the leader's prediction until it sends its sweep.
@@ -71,7 +74,7 @@ fn encode(sender: u16, destination: u16, message: &Message) -> Vec<u8> {
 }
 
 #[test]
-fn two_relays_agree_in_two_frames_and_the_answer_is_repeated_for_a_repeated_sweep() {
+fn two_agree_in_two_frames_and_the_answer_is_repeated() {
     let (mut head, mut tail) = (relay(mission(2), 1), relay(mission(2), 2));
     assert_eq!((head.phase(), tail.phase()), (Phase::Planning, Phase::Idle));
     let (now, sweep) = first_sweep(&mut head);
@@ -115,7 +118,7 @@ fn two_relays_agree_in_two_frames_and_the_answer_is_repeated_for_a_repeated_swee
 }
 
 #[test]
-fn a_sweep_is_repeated_until_it_is_answered_and_a_waiting_relay_says_busy() {
+fn a_sweep_is_repeated_and_a_waiting_relay_says_busy() {
     let (mut head, mut middle) = (relay(mission(3), 1), relay(mission(3), 2));
     let (mut now, sweep) = first_sweep(&mut head);
     middle.handle_bytes(now, Port::Upstream, &sweep);
@@ -147,57 +150,23 @@ fn a_sweep_is_repeated_until_it_is_answered_and_a_waiting_relay_says_busy() {
 }
 
 #[test]
-fn a_relay_rebooted_while_the_chain_waits_takes_up_where_it_left() {
-    let mission = mission(3);
-    let (mut head, mut middle, mut tail) =
-        (relay(mission, 1), relay(mission, 2), relay(mission, 3));
-    let (mut now, sweep) = first_sweep(&mut head);
-    middle.handle_bytes(now, Port::Upstream, &sweep);
-    drain(&mut middle, now);
-    middle = Relay::new(
-        mission,
-        Identity {
-            network: NETWORK,
-            index: 2,
-        },
-        Settings::default(),
-        77,
-        now,
-    )
-    .unwrap();
-    for _ in 0..100 {
-        now = [&head, &middle, &tail]
-            .iter()
-            .filter_map(|relay| relay.poll_timeout())
-            .min()
-            .unwrap();
-        for _ in 0..4 {
-            let mut sent = Vec::new();
-            for (index, relay) in [&mut head, &mut middle, &mut tail].into_iter().enumerate() {
-                relay.handle_timeout(now);
-                sent.extend(
-                    drain(relay, now)
-                        .into_iter()
-                        .map(|(port, _, bytes)| (index, port, bytes)),
-                );
-            }
-            for (from, port, bytes) in sent {
-                match (from, port) {
-                    (0, Port::Downstream) => middle.handle_bytes(now, Port::Upstream, &bytes),
-                    (1, Port::Upstream) => head.handle_bytes(now, Port::Downstream, &bytes),
-                    (1, Port::Downstream) => tail.handle_bytes(now, Port::Upstream, &bytes),
-                    (2, Port::Upstream) => middle.handle_bytes(now, Port::Downstream, &bytes),
-                    other => panic!("nobody is there: {other:?}"),
-                }
-            }
-        }
-        if head.phase() == Phase::Holding {
-            break;
-        }
-    }
-    let phases = [head.phase(), middle.phase(), tail.phase()];
-    assert_eq!(phases, [Phase::Holding; 3]);
-    assert!(head.setpoint().unwrap().x_m < middle.setpoint().unwrap().x_m);
+fn a_relay_rebooted_during_a_pass_takes_part_again() {
+    let mut bench = Bench::of(mission(3), |_| Settings::default());
+    let waits = |bench: &Bench| bench.relays[1].phase() == Phase::Waiting;
+    bench
+        .run_until(Duration::from_millis(5_000), waits)
+        .unwrap();
+    bench.flying.clear();
+    let identity = Identity {
+        network: NETWORK,
+        index: 2,
+    };
+    let rebooted = Relay::new(mission(3), identity, Settings::default(), 77, bench.now);
+    bench.relays[1] = rebooted.unwrap();
+    let took = bench.run_until(Duration::from_millis(60_000), Bench::holds);
+    assert!(took.is_some());
+    let x_m = |at: usize| bench.relays[at].setpoint().unwrap().x_m;
+    assert!(x_m(0) < x_m(1));
 }
 
 #[test]
@@ -242,7 +211,7 @@ fn relays_of_different_missions_ignore_each_other_and_say_so() {
 }
 
 #[test]
-fn a_foreign_a_misaddressed_and_a_misdirected_frame_are_counted_and_nothing_else() {
+fn foreign_misaddressed_and_misdirected_frames_are_counted() {
     let beat = Message::Heartbeat {
         mission: digest(&mission(3)),
         request: 300,

@@ -1,20 +1,13 @@
 //! Pass numbers: new, over, or of another life of the leader; equal numbers are compared by content.
 
-use uav_relay::wire::deframe::Deframer;
-use uav_relay::wire::frame;
 use uav_relay::wire::message::{Message, Sweep};
 use uav_relay::{Duration, Instant, Phase, Port, Relay};
 
-use crate::{drain, encode, first_sweep, mission, relay};
+use crate::{drain, encode, first_sweep, message, mission, relay};
 
 fn sweep_in(bytes: &[u8]) -> Sweep {
-    let mut deframer = Deframer::new();
-    let plain = bytes.iter().find_map(|&byte| {
-        let plain = deframer.push(byte)?.unwrap();
-        Some(plain.to_vec())
-    });
-    match frame::decode(&plain.unwrap()).unwrap() {
-        (_, Message::Sweep(sweep)) => sweep,
+    match message(bytes) {
+        Message::Sweep(sweep) => sweep,
         other => panic!("no sweep: {other:?}"),
     }
 }
@@ -47,7 +40,7 @@ fn calls(relay: &mut Relay, now: Instant) -> bool {
 }
 
 #[test]
-fn the_next_number_is_new_those_before_are_over_and_no_other_can_be_taken_part_in() {
+fn only_the_next_number_is_new_and_those_before_are_over() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     let number = sweep_in(&sweep).number;
     assert!(number.is_multiple_of(64), "{number}");
@@ -84,7 +77,7 @@ fn the_next_number_is_new_those_before_are_over_and_no_other_can_be_taken_part_i
 }
 
 #[test]
-fn the_first_pass_of_another_life_is_never_taken_for_the_next_one() {
+fn the_first_pass_of_another_life_is_never_the_next_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     // The chain is `last` passes beyond its first; the next first number is 64 after it.
     for last in [32, 62, 63] {
@@ -117,7 +110,7 @@ fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
 
 /// Checks other content with the same number, as from a relay that rebooted.
 #[test]
-fn the_same_number_with_other_reaches_or_another_profile_is_not_the_same_pass() {
+fn the_same_number_with_other_content_is_another_pass() {
     let changes: [fn(&mut Sweep); 4] = [
         |_| {},
         |sweep| sweep.reaches[0] += 1.0,

@@ -9,7 +9,7 @@ use uav_relay::{
 
 use crate::draw::{mission, scaled, settings, signed};
 use crate::each;
-use crate::line::Line;
+use crate::line::{check, has_agreed, line};
 
 /// Draws a power: any float, more often within the accepted range.
 fn power_w(rng: &mut ChaCha8Rng) -> f32 {
@@ -43,7 +43,7 @@ fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
 /// Measures random powers for a minute at all nodes, and then those of a 1 W source at 300 m.
 fn fly(seed: u64, mission: Mission, settings: Settings) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let Some(mut line) = Line::new(mission, Instant::ZERO, |_| settings) else {
+    let Some(mut line) = line(mission, Instant::ZERO, |_| settings) else {
         return;
     };
     let distance_m = mission.config().distance_m;
@@ -80,19 +80,19 @@ fn fly(seed: u64, mission: Mission, settings: Settings) {
             relay.handle_sample(now, Sample::Receiver { power_w: ends[1] });
         }
         line.run_for(Duration::from_millis(1_000));
-        line.check();
+        check(&line);
     }
     // A new estimate may be in transit just then.
     for _ in 0..80 {
         line.run_for(Duration::from_millis(370));
-        line.check();
-        if line.has_agreed() {
+        check(&line);
+        if has_agreed(&line) {
             return;
         }
     }
     let phases: Vec<_> = line.relays.iter().map(uav_relay::Relay::phase).collect();
     assert!(
-        line.has_agreed(),
+        has_agreed(&line),
         "seed {seed}: {phases:?}, {own:?}, {mission:?}"
     );
 }
@@ -148,7 +148,7 @@ fn one_power_everywhere_over_the_accepted_range() {
     let decades: Vec<i32> = (-300..=60).collect();
     decades.into_par_iter().for_each(|tenths| {
         let power_w = 10_f32.powf(0.1 * tenths as f32);
-        let mut line = Line::new(paper(5), Instant::ZERO, |_| listening()).unwrap();
+        let mut line = line(paper(5), Instant::ZERO, |_| listening()).unwrap();
         for _ in 0..60 {
             for at in 0..line.relays.len() {
                 let now = line.now;
@@ -157,8 +157,8 @@ fn one_power_everywhere_over_the_accepted_range() {
                 }
             }
             line.run_for(Duration::from_millis(1_000));
-            line.check();
+            check(&line);
         }
-        assert!(line.has_agreed(), "{power_w} W");
+        assert!(has_agreed(&line), "{power_w} W");
     });
 }

@@ -6,7 +6,7 @@ use uav_relay::{Duration, Instant, Placement};
 
 use crate::draw::{mission, own, settings};
 use crate::each;
-use crate::line::Line;
+use crate::line::{check, has_agreed, is_infeasible, line};
 
 /// Time limit for an agreement, in addition to the chain's hop times and probing periods.
 const PATIENCE: Duration = Duration::from_millis(600_000);
@@ -31,7 +31,7 @@ fn fly(seed: u64) -> Came {
         .collect();
     // A clock may start at any time.
     let begin = Instant::from_micros([0, 1, 1 << 32, 1 << 62][rng.random_range(0..4)]);
-    let Some(mut line) = Line::new(mission, begin, |index| each[usize::from(index) - 1]) else {
+    let Some(mut line) = line(mission, begin, |index| each[usize::from(index) - 1]) else {
         return Came::Refused;
     };
     if guarded {
@@ -48,17 +48,17 @@ fn fly(seed: u64) -> Came {
     }
     for _ in 0..60 {
         line.run_for(Duration::from_micros(PATIENCE.as_micros() / 60));
-        line.check();
-        if line.has_agreed() {
+        check(&line);
+        if has_agreed(&line) {
             break;
         }
     }
     let phases: Vec<_> = line.relays.iter().map(uav_relay::Relay::phase).collect();
     assert!(
-        line.has_agreed(),
+        has_agreed(&line),
         "seed {seed}: {phases:?}, {mission:?}, {common:?}"
     );
-    if line.is_infeasible() {
+    if is_infeasible(&line) {
         Came::Infeasible
     } else {
         Came::Agreed
@@ -66,7 +66,7 @@ fn fly(seed: u64) -> Came {
 }
 
 #[test]
-fn every_mission_and_every_setting_ends_in_places_or_in_a_word_that_there_are_none() {
+fn every_mission_and_setting_ends_in_places_or_infeasible() {
     let came = each(2_000, fly);
     let of = |what| came.iter().filter(|came| **came == what).count();
     println!(

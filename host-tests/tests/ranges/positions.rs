@@ -7,7 +7,7 @@ use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
 
 use crate::draw::signed;
 use crate::each;
-use crate::line::Line;
+use crate::line::{check, has_agreed, line};
 
 /// Draws a position anywhere, more often near the line.
 fn anywhere(rng: &mut ChaCha8Rng) -> Placement {
@@ -36,7 +36,7 @@ fn fly(seed: u64) {
         ..Settings::default()
     };
     let begin = Instant::from_micros([0, 1 << 40, 1 << 62][rng.random_range(0..3)]);
-    let mut line = Line::new(mission, begin, |_| settings).unwrap();
+    let mut line = line(mission, begin, |_| settings).unwrap();
     for _ in 0..60 {
         let now = line.now;
         for relay in &mut line.relays {
@@ -55,7 +55,7 @@ fn fly(seed: u64) {
             }
         }
         line.run_for(Duration::from_millis(rng.random_range(1..2_000)));
-        line.check();
+        check(&line);
     }
     for _ in 0..120 {
         let now = line.now;
@@ -69,10 +69,10 @@ fn fly(seed: u64) {
             relay.handle_position(now, now, at);
         }
         line.run_for(Duration::from_millis(1_000));
-        line.check();
+        check(&line);
     }
     let phases: Vec<_> = line.relays.iter().map(uav_relay::Relay::phase).collect();
-    assert!(line.has_agreed(), "seed {seed}: {phases:?}");
+    assert!(has_agreed(&line), "seed {seed}: {phases:?}");
 }
 
 #[test]

@@ -3,90 +3,85 @@
 use uav_relay::{Interference, Interferer};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_tools::figures::error::FigureError;
-use uav_relay_tools::listening::found::{
-    self, LAST, Shares, hypothetical, quantile, shadowed, unknown,
-};
+use uav_relay_tools::listening::found::{self, LAST, hypothetical, quantile, shadowed, unknown};
 use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
 
-fn shares(
-    relays: u16,
-    sources: usize,
-    setup: impl Fn(&RandomScene) -> Result<Setup, FigureError> + Sync,
-) -> Shares {
-    found::shares(count(200), relays, sources, setup).unwrap()
+type Setups = fn(&RandomScene) -> Result<Setup, FigureError>;
+
+/// Least fraction of the optimum after some agreements, and the quantile of the scenes that it is for.
+type Limits = &'static [(usize, f64, f64)];
+
+/// Tells the relays a source that is mirrored, a hundred times as strong, and nearer.
+fn guessed(wild: &RandomScene) -> Result<Setup, FigureError> {
+    let source = wild.scene()?.sources[0].clone();
+    wild.setup(Interference::Source(Interferer {
+        power_w: (100.0 * source.power_w) as f32,
+        x_m: (1_000.0 - source.x_m) as f32,
+        y_m: (-0.3 * source.y_m) as f32,
+    }))
 }
 
-fn print(what: &str, shares: &mut Shares) {
-    for at in [0, 1, 2, 3, 5, LAST] {
-        let shares = &mut shares[at];
-        let [least, tenth, median] = [0.0, 0.1, 0.5].map(|part| quantile(shares, part));
-        println!("{what}, after {at}: median {median:.4}, 10 % {tenth:.4}, least {least:.4}");
-    }
+/// Places have a shadow of their own, and the relays also measure in flight.
+fn flown(wild: &RandomScene) -> Result<Setup, FigureError> {
+    let mut setup = wild.flown(Interference::Unknown)?;
+    setup.sky.as_mut().unwrap().shadow_db = 1.0;
+    Ok(setup)
 }
 
+const ONE: Limits = &[
+    (1, 0.5, 0.98),
+    (5, 0.5, 0.99),
+    (5, 0.1, 0.97),
+    (5, 0.0, 0.5),
+];
+const GUESS: Limits = &[
+    (3, 0.5, 0.98),
+    (5, 0.5, 0.99),
+    (5, 0.1, 0.97),
+    (5, 0.0, 0.9),
+];
+
+/// Checks unknown sources, few relays that fly to learn, a wrong guess, shadowed places and two sources.
 #[test]
-fn one_source_is_found() {
-    for relays in [3, 5, 8, 20] {
-        let mut shares = shares(relays, 1, unknown);
-        print(&format!("N = {relays}"), &mut shares);
-        assert!(quantile(&mut shares[1], 0.5) >= 0.98);
-        assert!(quantile(&mut shares[5], 0.5) >= 0.99);
-        assert!(quantile(&mut shares[5], 0.1) >= 0.97);
-        assert!(quantile(&mut shares[5], 0.0) >= 0.5);
-    }
-}
-
-#[test]
-fn one_or_two_relays_fly_to_learn() {
-    for relays in [1, 2] {
-        let mut shares = shares(relays, 1, unknown);
-        print(&format!("N = {relays}"), &mut shares);
-        assert!(quantile(&mut shares[5], 0.5) >= 0.98);
-    }
-}
-
-#[test]
-fn places_with_a_shadow_of_their_own() {
-    let mut hovering = shares(8, 1, shadowed);
-    print("N = 8, 1 dB, hovering alone", &mut hovering);
-    let mut flown = shares(8, 1, |wild| {
-        let mut setup = wild.flown(Interference::Unknown)?;
-        setup.sky.as_mut().unwrap().shadow_db = 1.0;
-        Ok(setup)
-    });
-    print("N = 8, 1 dB, on their way too", &mut flown);
-    assert!(quantile(&mut hovering[5], 0.5) >= 0.94);
-    assert!(quantile(&mut flown[LAST], 0.5) >= 0.95);
-}
-
-#[test]
-fn two_sources_are_met_by_the_one_that_comes_nearest() {
-    let mut heard = shares(8, 2, unknown);
-    print("N = 8, two sources", &mut heard);
-    let mut told = shares(8, 2, hypothetical);
-    print("N = 8, two sources, the paper's way", &mut told);
-    assert!(quantile(&mut heard[5], 0.5) >= 0.98);
-    assert!(quantile(&mut heard[5], 0.1) >= 0.9);
-}
-
-#[test]
-fn a_wrong_guess_is_unlearned() {
-    for relays in [3, 8] {
-        let mut shares = shares(relays, 1, |wild| {
-            // The guess is mirrored, a hundred times as strong, and nearer.
-            let source = wild.scene()?.sources[0].clone();
-            wild.setup(Interference::Source(Interferer {
-                power_w: (100.0 * source.power_w) as f32,
-                x_m: (1_000.0 - source.x_m) as f32,
-                y_m: (-0.3 * source.y_m) as f32,
-            }))
-        });
-        print(&format!("N = {relays}, a wrong guess"), &mut shares);
-        assert!(quantile(&mut shares[3], 0.5) >= 0.98);
-        assert!(quantile(&mut shares[5], 0.5) >= 0.99);
-        assert!(quantile(&mut shares[5], 0.1) >= 0.97);
-        assert!(quantile(&mut shares[5], 0.0) >= 0.9);
+fn sources_are_found() {
+    let rows: [(&str, &[u16], usize, Setups, Limits); 7] = [
+        ("one source", &[3, 5, 8, 20], 1, unknown, ONE),
+        ("few relays", &[1, 2], 1, unknown, &[(5, 0.5, 0.98)]),
+        ("a wrong guess", &[3, 8], 1, guessed, GUESS),
+        ("1 dB, hovering alone", &[8], 1, shadowed, &[(5, 0.5, 0.94)]),
+        (
+            "1 dB, on their way too",
+            &[8],
+            1,
+            flown,
+            &[(LAST, 0.5, 0.95)],
+        ),
+        // The source that comes nearest to both.
+        (
+            "two sources",
+            &[8],
+            2,
+            unknown,
+            &[(5, 0.5, 0.98), (5, 0.1, 0.9)],
+        ),
+        ("two sources, the paper's way", &[8], 2, hypothetical, &[]),
+    ];
+    for (what, chains, sources, setup, limits) in rows {
+        for &relays in chains {
+            let mut shares = found::shares(count(200), relays, sources, setup).unwrap();
+            for at in [0, 1, 2, 3, 5, LAST] {
+                let [least, tenth, median] =
+                    [0.0, 0.1, 0.5].map(|part| quantile(&mut shares[at], part));
+                println!(
+                    "N = {relays}, {what}, after {at}: median {median:.4}, 10 % {tenth:.4}, least {least:.4}"
+                );
+            }
+            for &(at, part, least) in limits {
+                let share = quantile(&mut shares[at], part);
+                assert!(share >= least, "N = {relays}, {what}, after {at}: {share}");
+            }
+        }
     }
 }

@@ -4,13 +4,13 @@ use rayon::prelude::*;
 use uav_relay::{Duration, Instant, Interference};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::TimelineEvent;
 use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
 
 use uav_relay_tools::listening::found::quantile;
 use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
+use crate::wrong::{named, share};
 
 /// Checks an hour of a static world, measured every second.
 #[test]
@@ -55,7 +55,6 @@ fn under_faults_all_believe_the_same_to_the_bit() {
             let told: Vec<_> = outcome.relays.iter().map(|relay| relay.believed).collect();
             assert!(told.iter().all(|one| one.number > 0));
             // A held position belongs to the current estimate; the last estimate may still be in transit.
-            let last = outcome.stands.last().unwrap();
             let bits = |one: &uav_relay::sensing::belief::Told| format!("{one:?}");
             let alike = told.iter().all(|one| {
                 let same = |other: &&_| bits(one) == bits(other);
@@ -63,10 +62,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
                 numbered.clone().filter(same).count() == numbered.count()
             });
             assert!(alike, "{seed}: {told:?}");
-            wild.scene()
-                .unwrap()
-                .chain_sir(last.goals.as_ref().unwrap())
-                / wild.optimum().unwrap()
+            share(&wild, &outcome)
         })
         .collect();
     assert!(quantile(&mut shares, 0.5) >= 0.98, "{shares:?}");
@@ -101,19 +97,9 @@ fn a_broken_sensor_is_named_and_left_out() {
                     since: Instant::from_millis(since_s * 1_000),
                 }];
                 let outcome = run(setup).unwrap();
-                let named = outcome.moments.iter().any(|moment| {
-                    moment.what == TimelineEvent::SensorOff && moment.other == Some(broken)
-                });
-                let wrong = outcome.moments.iter().any(|moment| {
-                    moment.what == TimelineEvent::SensorOff && moment.other != Some(broken)
-                });
-                let last = outcome.stands.last().unwrap();
-                let share = wild
-                    .scene()
-                    .unwrap()
-                    .chain_sir(last.goals.as_ref().unwrap())
-                    / wild.optimum().unwrap();
-                (named, wrong, share)
+                let named = named(&outcome);
+                let wrong = named.iter().any(|node| *node != broken);
+                (named.contains(&broken), wrong, share(&wild, &outcome))
             })
             .collect();
         let named = outcomes.iter().filter(|it| it.0).count();

@@ -32,7 +32,7 @@ fn setup(wild: &RandomScene) -> Setup {
 }
 
 /// Returns the final fraction of the optimum.
-fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
+pub(crate) fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
     let goals = outcome.stands.last().unwrap().goals.as_ref();
     goals.map_or(0.0, |goals| {
         wild.scene().unwrap().chain_sir(goals) / wild.optimum().unwrap()
@@ -40,7 +40,7 @@ fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
 }
 
 /// Returns the nodes reported as wrong, each once.
-fn named(outcome: &Outcome) -> Vec<u16> {
+pub(crate) fn named(outcome: &Outcome) -> Vec<u16> {
     let off = outcome
         .moments
         .iter()

@@ -1,11 +1,8 @@
 //! Chain of relays on mock ports with a virtual clock, and the same chain without ports.
 
 use host_tests::fixtures;
-use uav_relay::MAX_FRAME;
 use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared};
-use uav_relay::{
-    Duration, Event, Instant, Mission, Placement, Port, Relay, Settings, Side, Wiring,
-};
+use uav_relay::{Duration, Event, Instant, Mission, Placement, Relay, Settings, Side, Wiring};
 
 use crate::pipe::{End, IoEnd, NbEnd, Trouble};
 
@@ -152,34 +149,6 @@ pub(crate) fn run(nodes: &mut [Node], from: Instant, until: Instant) -> Instant 
 
 pub(crate) fn setpoints(nodes: &[Node]) -> Vec<Option<Placement>> {
     nodes.iter().map(|node| node.relay.setpoint()).collect()
-}
-
-/// Returns the positions of the relays when frames are passed directly, without ports.
-pub(crate) fn direct(relays: u16) -> Vec<Option<Placement>> {
-    let mut chain: Vec<Relay> = (1..=relays)
-        .map(|index| relay(relays, index, Wiring::Pair))
-        .collect();
-    let mut now = Instant::ZERO;
-    while chain.iter().any(|relay| relay.setpoint().is_none()) {
-        let mut frame = [0; MAX_FRAME];
-        let mut mail = Vec::new();
-        for (at, relay) in chain.iter_mut().enumerate() {
-            relay.handle_timeout(now);
-            relay.persist(|_| true);
-            while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
-                mail.push((at, transmit.port, frame[..transmit.len].to_vec()));
-            }
-        }
-        for (at, port, bytes) in mail {
-            match port {
-                Port::Upstream => chain[at - 1].handle_bytes(now, Port::Downstream, &bytes),
-                _ => chain[at + 1].handle_bytes(now, Port::Upstream, &bytes),
-            }
-        }
-        now = now + Duration::from_millis(1);
-        assert!(now < Instant::from_millis(5_000));
-    }
-    chain.iter().map(Relay::setpoint).collect()
 }
 
 pub(crate) fn has_lost(node: &Node, side: Side) -> bool {

@@ -5,16 +5,23 @@ mod driver_enable;
 mod pipe;
 mod uart;
 
-use chain::{BYTE_TIME, Kind, Node, chain, direct, has_lost, relay, run, setpoints};
+use chain::{BYTE_TIME, Kind, Node, chain, has_lost, relay, run, setpoints};
+use host_tests::bench::agreed;
+use host_tests::fixtures;
 use pipe::{End, Trouble};
 use uav_relay::serial::{READ_LIMIT, SerialStats};
-use uav_relay::{Instant, Side, Wiring};
+use uav_relay::{Instant, Mission, Placement, Side, Wiring};
+
+/// Returns the positions of relays without ports.
+fn bare(relays: u16) -> Vec<Option<Placement>> {
+    agreed(Mission::try_new(fixtures::paper(relays)).unwrap())
+}
 
 const KINDS: [Kind; 2] = [Kind::Nb, Kind::Io];
 
 #[test]
-fn a_chain_on_ports_of_any_size_settles_where_the_bare_relays_do() {
-    let expected = direct(3);
+fn a_chain_on_ports_of_any_size_settles_like_bare_relays() {
+    let expected = bare(3);
     assert!(expected.iter().all(Option::is_some));
     for kind in KINDS {
         for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -35,7 +42,7 @@ fn a_chain_on_ports_of_any_size_settles_where_the_bare_relays_do() {
 }
 
 #[test]
-fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
+fn an_end_that_never_reads_does_not_starve_the_other_link() {
     for kind in KINDS {
         // Relay 2 of 3; its wire toward relay 1 is never read, relay 3 works.
         let [nobody, deaf] = End::wire(3);
@@ -96,7 +103,7 @@ fn an_end_that_never_reads_neither_blocks_nor_starves_the_other_link() {
 }
 
 #[test]
-fn on_a_shared_channel_frames_wait_in_the_relay_and_none_is_dropped() {
+fn on_a_shared_channel_frames_wait_and_none_is_dropped() {
     for kind in KINDS {
         let mut ends = End::channel(2, 3);
         let (nobody, end) = (ends.remove(0), ends.remove(0));
@@ -120,7 +127,7 @@ fn on_a_shared_channel_frames_wait_in_the_relay_and_none_is_dropped() {
 
 #[test]
 fn read_errors_are_counted_by_kind_and_survived() {
-    let expected = direct(3);
+    let expected = bare(3);
     for kind in KINDS {
         for wiring in [Wiring::Pair, Wiring::Shared] {
             let (mut nodes, _far) = chain(kind, wiring, 3, 16, &Trouble::times(10, 40));
@@ -156,7 +163,7 @@ fn a_port_that_only_fails_gives_the_others_their_turn() {
 }
 
 #[test]
-fn a_poll_reads_no_more_than_its_limit_and_asks_to_be_called_soon() {
+fn a_poll_reads_up_to_its_limit_and_asks_to_be_called_soon() {
     for kind in KINDS {
         let [up, _] = End::wire(16);
         let [down, _] = End::wire(16);

@@ -1,23 +1,17 @@
 //! Guarded flights with an upload.
 
+use host_tests::flights::{APART_M, SEPARATION_M, guard};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::GuardConfig;
 
 use super::*;
-
-const SEPARATION_M: f32 = 5.0;
-
-/// Rounding error of a position, m: positions are f32 of up to 1 km.
-const ROUNDING_M: f64 = 2e-3;
 
 /// Returns eight drones that take off close together, and a mission uploaded in flight or at hover.
 fn flight(seed: u64) -> (Setup, MissionConfig) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let base = eight_apart(SEPARATION_M);
     let mut setup = signed(base, true);
-    setup.settings.guard = Some(GuardConfig::of(&base, base.config().common));
-    setup.flight = Some(exact(&mut rng, f64::from(SEPARATION_M) + 0.01));
+    guard(&mut setup, &mut rng);
     setup.seed = rng.random();
     setup.faults.loss = rng.random_range(0.0..0.4);
     let config = moved(
@@ -38,12 +32,11 @@ fn flight(seed: u64) -> (Setup, MissionConfig) {
 
 #[test]
 fn no_two_come_close_on_their_way_from_one_mission_to_the_next() {
-    let far = f64::from(SEPARATION_M) - ROUNDING_M;
     for seed in 1..=40 {
         let (setup, config) = flight(seed);
         let outcome = run(setup.clone()).unwrap();
         assert!(
-            outcome.nearest_m() >= far,
+            outcome.nearest_m() >= APART_M,
             "SEED={seed}: {}",
             outcome.nearest_m()
         );
@@ -56,7 +49,7 @@ fn no_two_come_close_on_their_way_from_one_mission_to_the_next() {
     let close = (1..=40).any(|seed| {
         let (mut setup, _) = flight(seed);
         setup.settings.guard = None;
-        run(setup).unwrap().nearest_m() < far
+        run(setup).unwrap().nearest_m() < APART_M
     });
     assert!(close);
 }

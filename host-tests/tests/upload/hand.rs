@@ -1,5 +1,6 @@
 //! Single relay with an upload, and the ground station with its answers.
 
+use host_tests::bench;
 use uav_relay::MAX_FRAME;
 use uav_relay::UploadError;
 use uav_relay::ground::Progress;
@@ -59,12 +60,11 @@ fn talk(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec
             relay.handle_bytes(now, port, &frame[..len]);
         }
         relay.handle_timeout(now);
-        relay.persist(|_| true);
-        while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
-            assert_eq!(transmit.port, port);
-            ground.handle_bytes(&frame[..transmit.len]);
+        for (by, bytes) in bench::sent(relay, now) {
+            assert_eq!(by, port);
+            ground.handle_bytes(&bytes);
         }
-        events.extend(std::iter::from_fn(|| relay.poll_event()));
+        events.extend(bench::events(relay));
     }
     events
 }
@@ -155,7 +155,7 @@ fn a_relay_resumes_what_was_made_for_its_mission() {
 }
 
 #[test]
-fn a_relay_alone_flies_what_it_is_uploaded_and_the_ground_hears_of_it() {
+fn a_single_relay_flies_an_upload_and_the_ground_hears_of_it() {
     let base = mission(1);
     for (wiring, port, end) in [
         (Wiring::Pair, Port::Upstream, Side::Upstream),
@@ -239,7 +239,7 @@ fn nobody_answers_a_ground_of_another_key_network_or_mission() {
 }
 
 #[test]
-fn the_ground_goes_on_to_the_next_relay_when_the_nearest_is_silent() {
+fn the_ground_asks_the_next_relay_when_the_nearest_is_silent() {
     let base = mission(6);
     let mut ground = Ground::new(&base, Side::Downstream, 7, Wiring::Shared, auth(1));
     ground.upload(Instant::ZERO, new_place(&base, 1)).unwrap();

@@ -12,7 +12,8 @@ mod wires;
 use std::collections::{BTreeMap, BTreeSet};
 
 use host_tests::fixtures::mission;
-use host_tests::flights::{bad_day, eight_apart, exact, own_profiles, seconds};
+use host_tests::flights::{bad_day, eight_apart, own_profiles, seconds};
+use host_tests::ledger::{self, left};
 use uav_relay::{Instant, Interference, Interferer, Mission, MissionConfig, Side, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
@@ -89,43 +90,15 @@ fn judge(
             _ => {}
         }
     }
-    if outcome.unsafe_setpoints > 0 {
-        return Err(format!("{} unsafe setpoints", outcome.unsafe_setpoints));
-    }
     if outcome.ending != Ending::Settled {
         return Err(format!("{:?}", outcome.ending));
     }
-    let left: Vec<_> = (1_u16..)
-        .zip(&outcome.relays)
-        .filter(|(_, relay)| relay.killed.is_none())
-        .collect();
-    let relays = u16::try_from(left.len()).unwrap();
-    let mission = Mission::try_new(config).unwrap();
-    let mut clean = Setup::new(mission.with_relays(relays).unwrap());
-    clean.settings = setup.settings;
-    clean.settings.wiring = uav_relay::Wiring::Pair;
-    for (index, (number, _)) in (1..).zip(&left) {
-        let own = setup.profiles.iter().find(|(of, _)| of == number);
-        let own = own.map(|(_, profile)| (index, *profile));
-        clean.profiles.extend(own);
-        clean
-            .held
-            .extend(setup.held.contains(number).then_some(index));
-    }
-    let clean = run(clean).unwrap();
-    assert_eq!(clean.ending, Ending::Settled);
-    let target =
-        |relay: &uav_relay_sim::simulator::outcome::RelayEnd| relay.target.map(f32::to_bits);
-    for ((number, relay), alone) in left.into_iter().zip(&clean.relays) {
-        if relay.version != version {
-            return Err(format!("relay {number} flies mission {}", relay.version));
-        }
-        if relay.setpoint != alone.setpoint || target(relay) != target(alone) {
-            return Err(format!(
-                "relay {number} is at {:?}, not at {:?}",
-                relay.setpoint, alone.setpoint
-            ));
-        }
-    }
-    Ok(())
+    ledger::judge(setup, outcome, &left(outcome), version, config)
+}
+
+/// Runs `setup`, which ends with `version` and `config` flown by all that are left.
+fn flies(setup: &Setup, version: u16, config: MissionConfig, name: &str) -> Outcome {
+    let outcome = run(setup.clone()).unwrap();
+    judge(setup, &outcome, version, config).unwrap_or_else(|what| panic!("{name}: {what}"));
+    outcome
 }

@@ -32,7 +32,7 @@ fn views(outcome: &Outcome) -> usize {
 }
 
 #[test]
-fn a_chain_that_stores_what_was_uploaded_flies_it_at_once_when_it_is_switched_on_again() {
+fn a_rebooted_chain_flies_a_stored_upload_at_once() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let (setup, outcome) = power_cut(wiring, &[]);
         let config = *setup.uploads[0].upload.config();
@@ -59,7 +59,7 @@ fn one_relay_that_has_stored_it_is_enough() {
 }
 
 #[test]
-fn a_chain_that_has_stored_nothing_flies_what_it_was_loaded_with() {
+fn a_chain_that_has_stored_nothing_flies_the_loaded_mission() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let all: Vec<u16> = (1..=8).collect();
         let (setup, outcome) = power_cut(wiring, &all);
@@ -69,7 +69,7 @@ fn a_chain_that_has_stored_nothing_flies_what_it_was_loaded_with() {
 }
 
 #[test]
-fn whoever_is_rebooted_at_any_moment_of_an_upload_flies_it_with_the_others() {
+fn a_relay_rebooted_during_an_upload_flies_it_with_the_others() {
     let base = mission(5);
     let config = moved(&base, 700.0, -300.0);
     for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -85,10 +85,12 @@ fn whoever_is_rebooted_at_any_moment_of_an_upload_flies_it_with_the_others() {
                         setup.boots = vec![(relay, on)];
                         setup.forgetful = forgetful.clone();
                         setup.deadline = seconds(200);
-                        let outcome = run(setup.clone()).unwrap();
-                        judge(&setup, &outcome, 1, config).unwrap_or_else(|what| {
-                            panic!("{wiring:?} {end:?} {relay} at {ms} {forgetful:?}: {what}")
-                        });
+                        flies(
+                            &setup,
+                            1,
+                            config,
+                            &format!("{wiring:?} {end:?} {relay} at {ms} {forgetful:?}"),
+                        );
                     }
                 }
             }
@@ -97,7 +99,7 @@ fn whoever_is_rebooted_at_any_moment_of_an_upload_flies_it_with_the_others() {
 }
 
 #[test]
-fn the_others_fly_it_without_a_relay_that_is_lost_in_the_midst_of_it() {
+fn the_others_fly_an_upload_without_a_lost_relay() {
     let base = mission(8);
     let config = moved(&base, 700.0, -300.0);
     for relay in 1..=8 {
@@ -106,9 +108,7 @@ fn the_others_fly_it_without_a_relay_that_is_lost_in_the_midst_of_it() {
             setup.uploads = vec![upload(&base, Side::Upstream, seconds(20), 1, config)];
             setup.kills = vec![(relay, Instant::from_millis(20_000 + ms))];
             setup.deadline = seconds(200);
-            let outcome = run(setup.clone()).unwrap();
-            judge(&setup, &outcome, 1, config)
-                .unwrap_or_else(|what| panic!("{relay} at {ms}: {what}"));
+            flies(&setup, 1, config, &format!("{relay} at {ms}"));
         }
     }
 }

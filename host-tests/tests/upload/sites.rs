@@ -77,7 +77,7 @@ fn a_receiver_that_moves_is_flown_to_by_all_and_back_again() {
 }
 
 #[test]
-fn a_receiver_that_moves_is_flown_to_by_all_or_by_none_whatever_is_lost() {
+fn a_moved_receiver_is_flown_to_by_all_in_spite_of_losses() {
     for seed in 1..=60 {
         let (base, mut setup) = sited(8, seed % 2 == 0);
         setup.seed = seed;
@@ -95,7 +95,7 @@ fn a_receiver_that_moves_is_flown_to_by_all_or_by_none_whatever_is_lost() {
 }
 
 #[test]
-fn whoever_is_rebooted_while_the_receiver_moves_flies_to_it_with_the_others() {
+fn a_relay_rebooted_while_the_receiver_moves_flies_to_it() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         for relay in 1..=5 {
             for ms in (0..400).step_by(40) {
@@ -116,7 +116,7 @@ fn whoever_is_rebooted_while_the_receiver_moves_flies_to_it_with_the_others() {
 }
 
 #[test]
-fn a_chain_that_is_rebooted_as_a_whole_flies_to_the_receiver_where_it_was_last() {
+fn a_rebooted_chain_flies_to_the_receivers_last_site() {
     for shared in [false, true] {
         let (base, mut setup) = sited(8, shared);
         setup.uploads = vec![to_another_place(&base, seconds(20), 1, Side::Upstream)];
