@@ -9,5 +9,7 @@ pub mod firmware;
 pub mod fixtures;
 #[cfg(not(target_os = "none"))]
 pub mod flights;
+#[cfg(not(target_os = "none"))]
+pub mod placing;
 #[cfg(target_os = "linux")]
 pub mod python;

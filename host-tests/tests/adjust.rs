@@ -2,6 +2,8 @@
 
 use core::task::Poll;
 
+use host_tests::flights::settle;
+use host_tests::placing::{reference, setpoints};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::local::{HopEnd, Hops, LocalSearch};
@@ -10,10 +12,10 @@ use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random;
-use uav_relay_oracle::reference::{Link, Station};
-use uav_relay_sim::simulator::chain::run;
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{Place, sir};
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Returns the chain of X = 500, Y = 150, relays at 220 m, a band of 20 m to 300 m. The least separation is 4 m.
@@ -39,40 +41,12 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-fn settle(setup: Setup) -> Outcome {
-    let outcome = run(setup).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    assert_eq!(outcome.unsafe_setpoints, 0);
-    outcome
-}
-
 /// Returns the chain's SIR by the reference, and the least distance of neighbours, m.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
-    let places: Vec<Placement> = outcome
-        .relays
-        .iter()
-        .map(|relay| relay.setpoint.unwrap())
-        .collect();
-    let link = Link {
-        relays: places
-            .iter()
-            .zip(&link.relays)
-            .map(|(place, relay)| Station {
-                altitude_m: f64::from(place.altitude_m),
-                ..*relay
-            })
-            .collect(),
-        ..link.clone()
-    };
-    let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
-    let apart = places.windows(2).map(|pair| {
-        let (dx, dh) = (
-            f64::from(pair[1].x_m - pair[0].x_m),
-            f64::from(pair[1].altitude_m - pair[0].altitude_m),
-        );
-        dx.hypot(dh)
-    });
-    (link.chain_sir(&x), apart.fold(f64::INFINITY, f64::min))
+    let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
+    let apart = places.windows(2).map(|pair| pair[0].distance_m(&pair[1]));
+    let apart = apart.fold(f64::INFINITY, f64::min);
+    (sir(link, &places).unwrap(), apart)
 }
 
 fn rises(outcome: &Outcome) -> bool {
@@ -323,11 +297,7 @@ fn it_ends_where_nobody_can_do_better() {
         let outcome = settle(setup);
         let rounds = outcome.rounds.len() - 1;
         assert!(rounds < 2_000, "it never ended");
-        let places: Vec<Placement> = outcome
-            .relays
-            .iter()
-            .map(|relay| relay.setpoint.unwrap())
-            .collect();
+        let places = setpoints(&outcome);
         for at in 0..relays {
             let hops = hops_of(&mission, &places, at);
             let mut search = LocalSearch::new(local, hops, places[at], 10.0, (20.0, 300.0));

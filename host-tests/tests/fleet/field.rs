@@ -5,11 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::fleet::{self, Fewest};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
-use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::random::{self, count, log_uniform};
 use uav_relay_oracle::reference::Station;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
-use super::{ROUNDING, count, round};
+use super::{ROUNDING, round};
 
 pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink {
     StochasticLink {

@@ -1,24 +1,20 @@
 //! Numbers of relays with one interferer.
 
+use host_tests::placing::profile_of;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::fleet::{Fewest, Most};
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
-use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-use super::{ROUNDING, count, round};
+use super::{ROUNDING, round};
 
 /// Returns the mission of `link` and its relays' profiles by index. Further relays are like the last one.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
-    let common = mission.config().common;
-    let of = move |index: u16| {
-        own.iter()
-            .find(|(at, _)| *at == index)
-            .map_or(common, |(_, profile)| *profile)
-    };
+    let of = move |index: u16| profile_of(&mission, &own, index);
     (mission, of)
 }
 
@@ -132,7 +128,7 @@ fn as_few_as_an_exhaustive_count() {
 }
 
 #[test]
-fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
+fn with_a_separation_what_is_proven_is_the_fewest() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(602));
     let (mut proven, mut not, mut none) = (0, 0, 0);
     for _ in 0..count(10_000) / 5 {

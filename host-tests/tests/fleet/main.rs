@@ -7,11 +7,6 @@ mod known;
 /// Relative loss of a target by f32 rounding: half a step of x is 6e-8 D, over an altitude of 0.002 D.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
-pub(crate) fn count(default: usize) -> usize {
-    let count = std::env::var("COUNT").ok();
-    count.and_then(|text| text.parse().ok()).unwrap_or(default)
-}
-
 pub(crate) fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }

@@ -16,12 +16,12 @@ fn pairs() -> impl Iterator<Item = (u16, u16)> {
 }
 
 #[test]
-fn all_are_in_one_view_soon_after_the_last_of_two_cuts_has_healed() {
+fn all_are_in_one_view_soon_after_two_cuts() {
     judge(&[[20, 120, 60, 160], [20, 60, 40, 90], [20, 200, 100, 150]]);
 }
 
 #[test]
-fn all_are_in_one_view_soon_after_two_cuts_that_heal_a_second_apart() {
+fn all_are_in_one_view_after_two_cuts_that_heal_together() {
     judge(&[[30, 200, 31, 201]]);
 }
 
