@@ -14,7 +14,6 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Place, sir};
-use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
@@ -227,25 +226,6 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
     assert!(higher > 200);
     // Next to the interferer a row may have two maxima, of which bisection finds one.
     assert!(far <= 3, "{far}");
-}
-
-#[test]
-fn faults_change_nothing() {
-    for seed in 0..20 {
-        let adjust = Adjust {
-            rounds: 8,
-            ..Adjust::default()
-        };
-        let (_, mut setup) = setup(2 + seed % 7, adjust);
-        let clean = settle(setup.clone());
-        setup.faults = Faults::BAD_DAY;
-        setup.seed = seed as u64;
-        let faulty = settle(setup);
-        let injected = faulty.injected;
-        assert!(injected.lost > 0 && injected.corrupted > 0 && injected.reordered > 0);
-        assert!(rises(&faulty));
-        assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
-    }
 }
 
 /// Returns the hops of relay `at` (from 0) in a chain of 1 W relays at `places`.

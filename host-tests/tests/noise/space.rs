@@ -2,7 +2,7 @@
 
 use std::task::Poll;
 
-use host_tests::flights::with_room;
+use host_tests::flights::{unharmed, with_room};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -12,8 +12,6 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random::joint::{CROWDED, Scenario, in_space, scenario};
 use uav_relay_oracle::random::{count, in_noise};
 use uav_relay_oracle::recorded::optimum;
-use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::setup::Setup;
 
 fn noisy(number: u64, space: bool) -> Scenario {
@@ -84,13 +82,7 @@ fn joint_chains_in_noise_settle_to_the_bit_despite_faults() {
         };
         let mut setup = Setup::new(mission);
         setup.settings.method = Method::Joint;
-        let clean = run(setup.clone()).unwrap();
-        setup.faults = Faults::BAD_DAY;
-        setup.seed = number;
-        let faulty = run(setup).unwrap();
-        assert_eq!(clean.ending, faulty.ending, "{number}");
-        assert_eq!(clean.bits(), faulty.bits(), "{number}");
-        assert_eq!((clean.unsafe_setpoints, faulty.unsafe_setpoints), (0, 0));
+        let faulty = unharmed(setup, number);
         injected += faulty.injected.lost + faulty.injected.corrupted;
     }
     println!("{injected} frames lost or corrupted");
