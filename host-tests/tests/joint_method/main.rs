@@ -56,6 +56,20 @@ struct Result {
     bytes: u64,
 }
 
+/// Returns the scene in units of D.
+fn described(link: &Link, corridor: Corridor) -> String {
+    let d = link.distance_m;
+    format!(
+        "N = {}, D = {d:.0}, X = {:.3} D, Y = {:.4} D, band {:.4} D to {:.4} D, d_min {:.4} D",
+        link.len(),
+        link.x_i / d,
+        link.y_i / d,
+        corridor.least_m / d,
+        corridor.most_m / d,
+        link.min_separation_m / d,
+    )
+}
+
 fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut results = Vec::new();
@@ -73,16 +87,7 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
             continue;
         };
         let outcome = run(setup).unwrap();
-        let of = format!(
-            "N = {}, D = {:.0}, X = {:.3} D, Y = {:.4} D, band {:.4} D to {:.4} D, d_min {:.4} D",
-            link.len(),
-            link.distance_m,
-            link.x_i / link.distance_m,
-            link.y_i / link.distance_m,
-            corridor.least_m / link.distance_m,
-            corridor.most_m / link.distance_m,
-            link.min_separation_m / link.distance_m,
-        );
+        let of = described(&link, corridor);
         assert_eq!(outcome.ending, Ending::Settled, "{of}");
         assert_eq!(outcome.unsafe_setpoints, 0, "{of}");
         let places = places(&outcome);

@@ -80,27 +80,18 @@ fn relays_that_differ_come_near_the_joint_optimum() {
         given.settings.method = Method::Align;
         let given = run(given).unwrap();
         let outcome = run(joint_setup).unwrap();
-        let short = |place: &Place| {
-            format!(
-                "{:.3}/{:.4}",
-                place.x_m / link.distance_m,
-                place.altitude_m / link.distance_m
-            )
+        let list = |places: &[Place]| -> String {
+            let d = link.distance_m;
+            let each = places.iter();
+            each.map(|at| format!("{:.3}/{:.4} ", at.x_m / d, at.altitude_m / d))
+                .collect()
         };
-        let list = |places: &[Place]| places.iter().map(short).collect::<Vec<_>>().join(" ");
+        let powers = link.relays.iter().map(|relay| relay.power_w);
         let of = format!(
-            "N = {}, X {:.3} Y {:.4}, band {:.3} {:.3}, apart {:.4}, held {:?}, pw {:?}\n   best {}\n   ours {}",
-            link.len(),
-            link.x_i / link.distance_m,
-            link.y_i / link.distance_m,
-            corridor.least_m / link.distance_m,
-            corridor.most_m / link.distance_m,
-            link.min_separation_m / link.distance_m,
+            "{}, held {:?}, W {:.2?}\n   best {}\n   ours {}",
+            described(link, corridor),
             drawn.held.iter().map(|h| h.relay + 1).collect::<Vec<_>>(),
-            link.relays
-                .iter()
-                .map(|r| (r.power_w / link.relays[0].power_w * 100.0).round() / 100.0)
-                .collect::<Vec<_>>(),
+            powers.collect::<Vec<_>>(),
             list(&best.places),
             list(&places(&outcome)),
         );
