@@ -80,15 +80,14 @@ fn relays_that_differ_come_near_the_joint_optimum() {
         given.settings.method = Method::Align;
         let given = run(given).unwrap();
         let outcome = run(joint_setup).unwrap();
-        let list = |places: &[Place]| -> String {
+        let list = |places: &[Place]| -> Vec<String> {
             let d = link.distance_m;
-            let each = places.iter();
-            each.map(|at| format!("{:.3}/{:.4} ", at.x_m / d, at.altitude_m / d))
-                .collect()
+            let short = |at: &Place| format!("{:.3}/{:.4}", at.x_m / d, at.altitude_m / d);
+            places.iter().map(short).collect()
         };
         let powers = link.relays.iter().map(|relay| relay.power_w);
         let of = format!(
-            "{}, held {:?}, W {:.2?}\n   best {}\n   ours {}",
+            "{}, held {:?}, W {:.2?}\n   best {:?}\n   ours {:?}",
             described(link, corridor),
             drawn.held.iter().map(|h| h.relay + 1).collect::<Vec<_>>(),
             powers.collect::<Vec<_>>(),
