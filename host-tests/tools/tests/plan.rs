@@ -12,8 +12,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 use uav_relay_oracle::cases::{self, Case};
-use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::recorded::optimum;
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::Corridor;
 
 fn plan(arguments: &[&str]) -> Output {

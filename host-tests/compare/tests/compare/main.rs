@@ -15,8 +15,8 @@ use std::process::{Command, Output};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use uav_relay_oracle::cases;
-use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::recorded::optimum;
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::Corridor;
 
 fn compare(arguments: &[&str]) -> Output {
