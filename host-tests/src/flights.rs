@@ -43,6 +43,24 @@ pub fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
+/// Runs `setup` without faults and on a [`Faults::BAD_DAY`], which must change neither the ending nor a bit of the positions.
+///
+/// Returns the run with faults.
+///
+/// # Panics
+/// The runs differ, a setpoint has left its limits, or a round of Algorithm 2 has made the chain worse.
+pub fn unharmed(mut setup: Setup, seed: u64) -> Outcome {
+    let clean = run(setup.clone()).unwrap();
+    setup.faults = Faults::BAD_DAY;
+    setup.seed = seed;
+    let faulty = run(setup).unwrap();
+    assert_eq!(clean.ending, faulty.ending, "seed {seed}");
+    assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
+    assert_eq!((clean.unsafe_setpoints, faulty.unsafe_setpoints), (0, 0));
+    assert!(faulty.rounds.windows(2).all(|pair| pair[1] >= pair[0]));
+    faulty
+}
+
 /// Returns the paper's mission of eight relays with a minimum separation.
 ///
 /// # Panics

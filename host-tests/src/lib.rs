@@ -5,6 +5,7 @@
 //! | [`bench`] | relays and ground stations in virtual time, whose frames a test can see, delay, change and drop |
 //! | [`fixtures`], [`flights`] | missions, relays, and simulated flights that several tests use |
 //! | [`ledger`] | random schedules of faults for simulated chains, and the judgement of their results |
+//! | [`placing`] | random scenes of placements, and chains that place themselves |
 //! | [`firmware`] | firmware images, their flash, and emulated drones |
 //! | [`python`] | independent peers in Python |
 
@@ -21,5 +22,7 @@ pub mod fixtures;
 pub mod flights;
 #[cfg(not(target_os = "none"))]
 pub mod ledger;
+#[cfg(not(target_os = "none"))]
+pub mod placing;
 #[cfg(target_os = "linux")]
 pub mod python;

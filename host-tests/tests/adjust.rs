@@ -2,18 +2,18 @@
 
 use core::task::Poll;
 
+use host_tests::flights::settle;
+use host_tests::placing::{reference, setpoints};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::local::{HopEnd, Hops, LocalSearch};
-use uav_relay::power_ratio::PowerRatio;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random;
-use uav_relay_oracle::reference::{Link, Station};
-use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_oracle::reference::Link;
+use uav_relay_oracle::reference::joint::{Place, sir};
+use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Returns the chain of X = 500, Y = 150, relays at 220 m, a band of 20 m to 300 m. The least separation is 4 m.
@@ -39,40 +39,21 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-fn settle(setup: Setup) -> Outcome {
-    let outcome = run(setup).unwrap();
-    assert_eq!(outcome.ending, Ending::Settled);
-    assert_eq!(outcome.unsafe_setpoints, 0);
-    outcome
-}
-
 /// Returns the chain's SIR by the reference, and the least distance of neighbours, m.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
-    let places: Vec<Placement> = outcome
-        .relays
-        .iter()
-        .map(|relay| relay.setpoint.unwrap())
-        .collect();
-    let link = Link {
-        relays: places
-            .iter()
-            .zip(&link.relays)
-            .map(|(place, relay)| Station {
-                altitude_m: f64::from(place.altitude_m),
-                ..*relay
-            })
-            .collect(),
-        ..link.clone()
-    };
-    let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
-    let apart = places.windows(2).map(|pair| {
-        let (dx, dh) = (
-            f64::from(pair[1].x_m - pair[0].x_m),
-            f64::from(pair[1].altitude_m - pair[0].altitude_m),
-        );
-        dx.hypot(dh)
-    });
-    (link.chain_sir(&x), apart.fold(f64::INFINITY, f64::min))
+    let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
+    let apart = places.windows(2).map(|pair| pair[0].distance_m(&pair[1]));
+    let apart = apart.fold(f64::INFINITY, f64::min);
+    (sir(link, &places).unwrap(), apart)
+}
+
+/// Returns the better position that a local search finds, if any.
+fn searched(mut search: LocalSearch) -> Option<Placement> {
+    loop {
+        if let Poll::Ready(found) = search.step(500) {
+            return found;
+        }
+    }
 }
 
 fn rises(outcome: &Outcome) -> bool {
@@ -127,8 +108,6 @@ fn the_grid_moves_where_a_separate_program_moves() {
         ..Link::paper(4)
     };
     let (mission, _) = of_link(&link, 1e-4).unwrap();
-    let interferer = *mission.interferer().unwrap();
-    let apart_m = 4.0;
     let mut places = [300.0_f32, 400.0, 500.0, 600.0].map(|x_m| Placement::on_line(x_m, 100.0));
     let how = Local::Grid {
         columns: 41,
@@ -153,30 +132,8 @@ fn the_grid_moves_where_a_separate_program_moves() {
     let mut history = vec![chain(&places)];
     for _ in 0..5 {
         for at in 0..4 {
-            let (before, gain): (HopEnd, PowerRatio) = match at {
-                0 => (
-                    HopEnd {
-                        place: Placement::default(),
-                        apart_m: 0.0,
-                    },
-                    mission.tx_gain(),
-                ),
-                _ => (
-                    HopEnd {
-                        place: places[at - 1],
-                        apart_m,
-                    },
-                    mission.relay_gain(1.0),
-                ),
-            };
-            let after = places.get(at + 1).map(|&place| HopEnd { place, apart_m });
-            let hops = Hops::new(&mission, &interferer, before, gain, 1.0, after);
-            let mut search = LocalSearch::new(how, hops, places[at], 10.0, (20.0, 300.0));
-            let found = loop {
-                if let Poll::Ready(found) = search.step(100) {
-                    break found;
-                }
-            };
+            let hops = hops_of(&mission, &places, at);
+            let found = searched(LocalSearch::new(how, hops, places[at], 10.0, (20.0, 300.0)));
             if let Some(better) = found {
                 assert!(hops.worse(better) > hops.worse(places[at]));
                 places[at] = better;
@@ -225,18 +182,13 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
         let gain = mission.relay_gain(1.0);
         let hops = Hops::new(&mission, &interferer, beside(a), gain, 1.0, Some(beside(c)));
         let mut find = |local| {
-            let mut search = LocalSearch::new(local, hops, b, 20.0, (30.0, 200.0));
-            loop {
-                if let Poll::Ready(found) = search.step(500) {
-                    let to = found.unwrap_or(b);
-                    for neighbour in [a, c] {
-                        let (dx, dh) =
-                            (to.x_m - neighbour.x_m, to.altitude_m - neighbour.altitude_m);
-                        nearest = nearest.min(dx.hypot(dh));
-                    }
-                    break hops.worse(to);
-                }
+            let search = LocalSearch::new(local, hops, b, 20.0, (30.0, 200.0));
+            let to = searched(search).unwrap_or(b);
+            for neighbour in [a, c] {
+                let (dx, dh) = (to.x_m - neighbour.x_m, to.altitude_m - neighbour.altitude_m);
+                nearest = nearest.min(dx.hypot(dh));
             }
+            hops.worse(to)
         };
         let fine = find(Local::Fine);
         let grid = find(Local::Grid {
@@ -253,25 +205,6 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
     assert!(higher > 200);
     // Next to the interferer a row may have two maxima, of which bisection finds one.
     assert!(far <= 3, "{far}");
-}
-
-#[test]
-fn faults_change_nothing() {
-    for seed in 0..20 {
-        let adjust = Adjust {
-            rounds: 8,
-            ..Adjust::default()
-        };
-        let (_, mut setup) = setup(2 + seed % 7, adjust);
-        let clean = settle(setup.clone());
-        setup.faults = Faults::BAD_DAY;
-        setup.seed = seed as u64;
-        let faulty = settle(setup);
-        let injected = faulty.injected;
-        assert!(injected.lost > 0 && injected.corrupted > 0 && injected.reordered > 0);
-        assert!(rises(&faulty));
-        assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
-    }
 }
 
 /// Returns the hops of relay `at` (from 0) in a chain of 1 W relays at `places`.
@@ -323,19 +256,16 @@ fn it_ends_where_nobody_can_do_better() {
         let outcome = settle(setup);
         let rounds = outcome.rounds.len() - 1;
         assert!(rounds < 2_000, "it never ended");
-        let places: Vec<Placement> = outcome
-            .relays
-            .iter()
-            .map(|relay| relay.setpoint.unwrap())
-            .collect();
+        let places = setpoints(&outcome);
         for at in 0..relays {
             let hops = hops_of(&mission, &places, at);
-            let mut search = LocalSearch::new(local, hops, places[at], 10.0, (20.0, 300.0));
-            let better = loop {
-                if let Poll::Ready(found) = search.step(500) {
-                    break found;
-                }
-            };
+            let better = searched(LocalSearch::new(
+                local,
+                hops,
+                places[at],
+                10.0,
+                (20.0, 300.0),
+            ));
             assert_eq!(
                 better,
                 None,

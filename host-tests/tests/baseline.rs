@@ -120,7 +120,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
 
 /// Checks a chain with a relay above Rx: all other hops are shortened in proportion.
 #[test]
-fn a_chain_with_more_relays_than_the_signal_needs_keeps_its_proportions() {
+fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);
     let places = blind::places(&scene(&link));
     assert!(off(places[49], link.distance_m) < 1e-12);

@@ -2,16 +2,16 @@
 //!
 //! `COUNT` and `SEED` select other scenes.
 
-use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use host_tests::placing::{generator, profile_of, setpoints, xs};
+use rand::{Rng, RngExt};
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::pass::{self, Behind};
 use uav_relay::optimiser::plan;
 use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
-use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station, joint};
+use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
@@ -22,17 +22,6 @@ const NEAR: f64 = 1e-3;
 
 /// Relative error by which a bound may be too low: the search's tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
-
-fn count() -> usize {
-    let count = std::env::var("COUNT").ok();
-    count.and_then(|text| text.parse().ok()).unwrap_or(1000)
-}
-
-fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
-    own.iter()
-        .find(|(of, _)| *of == index)
-        .map_or(mission.config().common, |(_, profile)| *profile)
-}
 
 /// Returns true if the farthest chain meets the target.
 fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
@@ -172,15 +161,20 @@ fn spread(of: &mut [f64]) -> String {
     )
 }
 
-fn on_line(places: &[Placement]) -> Vec<f64> {
-    places.iter().map(|place| f64::from(place.x_m)).collect()
+fn keep_apart(places: &[Placement], least_m: f64, told: &str) {
+    for pair in places.windows(2) {
+        let apart = f64::from(pair[1].x_m - pair[0].x_m)
+            .hypot(f64::from(pair[1].altitude_m - pair[0].altitude_m));
+        assert!(apart >= least_m * (1.0 - 1e-5), "{apart} {places:?} {told}");
+        assert!(pair[0].x_m <= pair[1].x_m && pair[0].x_m >= 0.0);
+    }
 }
 
 #[test]
 fn at_mixed_altitudes() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(901));
+    let mut rng = generator(901);
     let mut tally = Tally::default();
-    while tally.scenes < count() {
+    while tally.scenes < count(1000) {
         let style = Style {
             relays: 2..=50,
             chain: Chain::Own,
@@ -189,7 +183,7 @@ fn at_mixed_altitudes() {
         let (Some((mission, own)), Some(best)) = (of_link(&link, 1e-4), link.optimum()) else {
             continue;
         };
-        let sir = |places: &[Placement]| link.chain_sir(&on_line(places));
+        let sir = |places: &[Placement]| link.chain_sir(&xs(places));
         tally.judge(&mission, &own, best, sir, &format!("{link:?}"));
     }
     tally.tell("mixed altitudes");
@@ -199,10 +193,10 @@ fn at_mixed_altitudes() {
 
 #[test]
 fn with_a_separation_that_binds() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(902));
+    let mut rng = generator(902);
     let mut tally = Tally::default();
     let mut binding = 0;
-    while tally.scenes < count() {
+    while tally.scenes < count(1000) {
         let style = Style {
             relays: 2..=50,
             chain: if tally.scenes % 2 == 0 {
@@ -220,22 +214,14 @@ fn with_a_separation_that_binds() {
         let Some((mission, own)) = of_link(&link, 1e-4) else {
             continue;
         };
-        let Some(best) = joint::at_their_altitudes(&link) else {
+        let Some(best) = link.optimum_apart() else {
             continue;
         };
         binding += usize::from(as_relays_know_it(&free).optimum().unwrap() > best * (1.0 + NEAR));
         let told = format!("{link:?}");
         let sir = |places: &[Placement]| {
-            for pair in places.windows(2) {
-                let apart = f64::from(pair[1].x_m - pair[0].x_m)
-                    .hypot(f64::from(pair[1].altitude_m - pair[0].altitude_m));
-                assert!(
-                    apart >= link.min_separation_m * (1.0 - 1e-5),
-                    "{apart} {places:?} {told}"
-                );
-                assert!(pair[0].x_m <= pair[1].x_m && pair[0].x_m >= 0.0);
-            }
-            link.chain_sir(&on_line(places))
+            keep_apart(places, link.min_separation_m, &told);
+            link.chain_sir(&xs(places))
         };
         tally.judge(&mission, &own, best, sir, &told);
     }
@@ -273,20 +259,14 @@ fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
 
 #[test]
 fn in_uneven_fields() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(903));
+    let mut rng = generator(903);
     let mut tally = Tally::default();
-    while tally.scenes < count() {
+    while tally.scenes < count(1000) {
         let relays = log_uniform(&mut rng, 1.0, 40.99) as usize;
         let link = uneven(&mut rng, relays);
         let mission = of_stochastic_link(&link, 0.0).unwrap();
-        let best = link.best();
-        // Both reference methods agree.
-        let other = link.best_apart(0.0);
-        assert!(
-            (other / best - 1.0).abs() < 1e-5,
-            "{other} {best}: {link:?}"
-        );
-        let sir = |places: &[Placement]| link.chain_sir(&on_line(places));
+        let best = link.best_apart(0.0);
+        let sir = |places: &[Placement]| link.chain_sir(&xs(places));
         tally.judge(&mission, &[], best, sir, &format!("{link:?}"));
     }
     tally.tell("uneven fields");
@@ -297,9 +277,9 @@ fn in_uneven_fields() {
 /// Checks relays of different altitude and power, half with a separation or hop-sized altitudes.
 #[test]
 fn in_uneven_fields_by_relays_that_differ() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(905));
+    let mut rng = generator(905);
     let mut tally = Tally::default();
-    while tally.scenes < count() {
+    while tally.scenes < count(1000) {
         let round = |value: f64| f64::from(value as f32);
         let relays = log_uniform(&mut rng, 2.0, 40.99) as usize;
         let mut link = uneven(&mut rng, relays);
@@ -328,13 +308,8 @@ fn in_uneven_fields_by_relays_that_differ() {
         }
         let told = format!("{apart_m} {link:?}");
         let sir = |places: &[Placement]| {
-            for pair in places.windows(2) {
-                let apart = f64::from(pair[1].x_m - pair[0].x_m)
-                    .hypot(f64::from(pair[1].altitude_m - pair[0].altitude_m));
-                assert!(apart >= apart_m * (1.0 - 1e-5), "{apart} {places:?} {told}");
-                assert!(pair[0].x_m <= pair[1].x_m && pair[0].x_m >= 0.0);
-            }
-            link.chain_sir(&on_line(places))
+            keep_apart(places, apart_m, &told);
+            link.chain_sir(&xs(places))
         };
         tally.judge(&mission, &own, best, sir, &told);
     }
@@ -345,9 +320,9 @@ fn in_uneven_fields_by_relays_that_differ() {
 /// Checks chains by messages, with and without prediction and losses: equal results within the bound.
 #[test]
 fn by_messages() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(904));
+    let mut rng = generator(904);
     let (mut settled, mut near, mut most) = (0, 0, 0);
-    while settled < 60.min(count()) {
+    while settled < 60.min(count(1000)) {
         let style = Style {
             relays: 2..=16,
             chain: Chain::Own,
@@ -361,7 +336,7 @@ fn by_messages() {
         let Some((mission, own)) = of_link(&link, 1e-4) else {
             continue;
         };
-        let Some(best) = joint::at_their_altitudes(&link) else {
+        let Some(best) = link.optimum_apart() else {
             continue;
         };
         let mut setup = Setup::new(mission);
@@ -372,13 +347,9 @@ fn by_messages() {
         }
         let outcome = run(setup).unwrap();
         assert_eq!(outcome.ending, Ending::Settled, "{link:?}");
-        let places: Vec<Placement> = outcome
-            .relays
-            .iter()
-            .map(|relay| relay.setpoint.unwrap())
-            .collect();
+        let places = setpoints(&outcome);
         let target = f64::from(outcome.relays[0].target.unwrap());
-        let sir = link.chain_sir(&on_line(&places));
+        let sir = link.chain_sir(&xs(&places));
         assert!(sir >= target * (1.0 - 3e-5), "{sir} of {target}: {link:?}");
         let bound = f64::from(outcome.relays[0].bound.unwrap());
         assert!(

@@ -1,4 +1,4 @@
-//! Test oracles for placements. Independent f64 optimisers, values of an independent program, and random scenarios.
+//! Test oracles for placements. Independent f64 optimisers, recorded optima, values of an independent program, random scenarios.
 //!
 //! The optimisers share no formula with `uav-relay`; the scenarios are weighted toward where formulas break. No product depends
 //! on this crate.
@@ -6,6 +6,7 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`mod@reference`] | reference optimisers |
+//! | [`recorded`] | recorded optima of the joint problem |
 //! | [`cases`] | values of an independent program, as data |
 //! | [`random`] | random scenarios |
 //! | [`mission`] | the mission that relays fly for a reference link |
@@ -13,4 +14,5 @@
 pub mod cases;
 pub mod mission;
 pub mod random;
+pub mod recorded;
 pub mod reference;

@@ -43,6 +43,21 @@ impl Beside {
         Axis::try_new(tx, rx).unwrap()
     }
 
+    /// Returns the line by the geodesic library, and its length, m.
+    fn line(&self) -> (Line, f64) {
+        let earth = Geodesic::wgs84();
+        let [tx_lat, tx_lon, rx_lat, rx_lon] =
+            [self.tx_lat, self.tx_lon, self.rx_lat, self.rx_lon].map(degrees);
+        let (length, azimuth, _, _): (f64, f64, f64, f64) =
+            earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
+        let line = Line {
+            earth,
+            tx: [tx_lat, tx_lon],
+            azimuth,
+        };
+        (line, length)
+    }
+
     /// Returns the errors of D, x and y beyond f32 rounding, m.
     fn off(&self) -> [f64; 3] {
         let axis = self.axis();
@@ -93,48 +108,45 @@ fn unit(degrees: f64) -> i32 {
     (degrees * 1e7).round() as i32
 }
 
+fn degrees(unit: i32) -> f64 {
+    f64::from(unit) / 1e7
+}
+
 fn around(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
 /// Draws a line of that length anywhere on earth, and a point up to 500 m beside it.
 fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
-    let earth = Geodesic::wgs84();
-    let degrees = |unit: i32| f64::from(unit) / 1e7;
     let tx = [
         unit(rng.random_range(-89.9..89.9)),
         unit(rng.random_range(-180.0..180.0)),
     ];
     let heading = rng.random_range(0.0..360.0);
-    let (lat, lon): (f64, f64) = earth.direct(degrees(tx[0]), degrees(tx[1]), heading, length);
-    let rx = [unit(lat), unit(around(lon))];
-    let [tx_lat, tx_lon, rx_lat, rx_lon] = [tx[0], tx[1], rx[0], rx[1]].map(degrees);
-    let (distance_m, azimuth, _, _): (f64, f64, f64, f64) =
-        earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
-    let line = Line {
-        earth,
-        tx: [tx_lat, tx_lon],
-        azimuth,
+    let (lat, lon): (f64, f64) =
+        Geodesic::wgs84().direct(degrees(tx[0]), degrees(tx[1]), heading, length);
+    let mut point = Beside {
+        tx_lat: tx[0],
+        tx_lon: tx[1],
+        rx_lat: unit(lat),
+        rx_lon: unit(around(lon)),
+        lat: 0,
+        lon: 0,
+        distance_m: 0.0,
+        x_m: 0.0,
+        y_m: 0.0,
     };
+    let (line, distance_m) = point.line();
     let (x, y) = (
         rng.random_range(0.0..length),
         rng.random_range(-500.0..500.0),
     );
     let [lat, lon, along] = line.at(x);
     let (lat, lon): (f64, f64) = line.earth.direct(lat, lon, along + 90.0, y);
-    let point = [unit(lat), unit(around(lon))];
-    let [x_m, y_m] = line.foot(degrees(point[0]), degrees(point[1]), x);
-    Beside {
-        tx_lat: tx[0],
-        tx_lon: tx[1],
-        rx_lat: rx[0],
-        rx_lon: rx[1],
-        lat: point[0],
-        lon: point[1],
-        distance_m,
-        x_m,
-        y_m,
-    }
+    (point.lat, point.lon) = (unit(lat), unit(around(lon)));
+    point.distance_m = distance_m;
+    [point.x_m, point.y_m] = line.foot(degrees(point.lat), degrees(point.lon), x);
+    point
 }
 
 /// Compares the crate, and the port of GeographicLib, with the points that GeographicLib computed.
@@ -143,18 +155,8 @@ fn the_points_that_geographiclib_made() {
     let mut reader = csv::Reader::from_reader(&include_bytes!("points.csv")[..]);
     let points: Vec<Beside> = reader.deserialize().map(Result::unwrap).collect();
     assert_eq!(points.len(), 300);
-    let degrees = |unit: i32| f64::from(unit) / 1e7;
     for point in points {
-        let earth = Geodesic::wgs84();
-        let [tx_lat, tx_lon, rx_lat, rx_lon] =
-            [point.tx_lat, point.tx_lon, point.rx_lat, point.rx_lon].map(degrees);
-        let (distance_m, azimuth, _, _): (f64, f64, f64, f64) =
-            earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
-        let line = Line {
-            earth,
-            tx: [tx_lat, tx_lon],
-            azimuth,
-        };
+        let (line, distance_m) = point.line();
         let [x, y] = line.foot(degrees(point.lat), degrees(point.lon), point.x_m);
         for (is, said) in [
             (distance_m, point.distance_m),
@@ -255,17 +257,7 @@ fn distances_agree_with_geodesics() {
             let mut worst = 0.0_f64;
             for _ in 0..LINES / 10 {
                 let beside = beside(&mut rng, length);
-                let degrees = |unit: i32| f64::from(unit) / 1e7;
-                let earth = Geodesic::wgs84();
-                let [tx_lat, tx_lon, rx_lat, rx_lon] =
-                    [beside.tx_lat, beside.tx_lon, beside.rx_lat, beside.rx_lon].map(degrees);
-                let (length, azimuth, _, _): (f64, f64, f64, f64) =
-                    earth.inverse(tx_lat, tx_lon, rx_lat, rx_lon);
-                let line = Line {
-                    earth,
-                    tx: [tx_lat, tx_lon],
-                    azimuth,
-                };
+                let (line, length) = beside.line();
                 let [lat, lon, _] = line.at(length / 2.0);
                 // The distance is log-uniform from 10 m.
                 let away = 10.0 * (rng.random_range(0.0..1.0) * (most / 10.0).ln()).exp();

@@ -140,6 +140,8 @@ fn under_constant_interference_all_optima_are_one() {
         let ceiling = link.ceiling();
         let found = link.backward_best(400);
         assert!(off(found, closed) < 1e-6, "{link:?}: {found:e} {closed:e}");
+        let apart = link.best_apart(0.0);
+        assert!(off(apart, closed) < 1e-6, "{link:?}: {apart:e} {closed:e}");
         // A fixed step is never better, and at most one step worse.
         let step = closed * 0.01;
         if ceiling / step < 1e5 {
@@ -180,6 +182,8 @@ fn one_relay_in_any_field_is_found_by_going_backward() {
         assert_eq!(link.iid_optimum(), None);
         let (x, best) = link.single_optimum(500).unwrap();
         assert!(off(link.chain_sir(&[x]), best) < 1e-12);
+        let apart = link.best_apart(0.0);
+        assert!(off(apart, best) < 1e-5, "{link:?}: {apart:e} {best:e}");
         let backward = link.backward_best(2000);
         assert!(
             backward <= best * (1.0 + 1e-6),

@@ -5,11 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::fleet::{self, Fewest};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
-use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::random::{self, count, log_uniform};
 use uav_relay_oracle::reference::Station;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
-use super::{ROUNDING, count, round};
+use super::{ROUNDING, chain, round};
 
 pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink {
     StochasticLink {
@@ -128,17 +128,11 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
             between += 1;
         }
         // The positions form such a chain.
-        let mut places = vec![Placement::default(); told];
-        let mission = mission.with_relays(told as u16).unwrap();
-        assert!(
-            mission.places_for(target as f32, |_| common, &mut places),
-            "{link:?} {target}"
-        );
+        let x = chain(&mission, told as u16, target, |_| common);
         let all = StochasticLink {
             relays: vec![link.relays[0]; told],
             ..link.clone()
         };
-        let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
         assert!(x.is_sorted());
         let sir = all.chain_sir(&x);
         assert!(
@@ -188,9 +182,7 @@ fn the_best_of_equals_in_a_field() {
             gain = gain.max(best / backward - 1.0);
         }
         // The target is met, and a slightly higher one is not even with the grid's longer hops.
-        let mut places = vec![Placement::default(); n];
-        assert!(mission.places_for(best as f32, |_| mission.config().common, &mut places));
-        let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
+        let x = chain(&mission, n as u16, best, |_| mission.config().common);
         assert!(link.chain_sir(&x) >= best * (1.0 - 5e-6));
         let fewest = on_a_grid(&link, best * 1.03, n, 0.0);
         assert_eq!(fewest, 0, "{best} {link:?}");

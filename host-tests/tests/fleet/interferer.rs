@@ -1,24 +1,20 @@
 //! Numbers of relays with one interferer.
 
+use host_tests::placing::profile_of;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::fleet::{Fewest, Most};
-use uav_relay::{Mission, Placement, Profile};
+use uav_relay::{Mission, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
-use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-use super::{ROUNDING, count, round};
+use super::{ROUNDING, chain, round};
 
 /// Returns the mission of `link` and its relays' profiles by index. Further relays are like the last one.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
-    let common = mission.config().common;
-    let of = move |index: u16| {
-        own.iter()
-            .find(|(at, _)| *at == index)
-            .map_or(common, |(_, profile)| *profile)
-    };
+    let of = move |index: u16| profile_of(&mission, &own, index);
     (mission, of)
 }
 
@@ -69,14 +65,14 @@ fn as_few_as_an_exhaustive_count() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(601));
     let (mut met, mut none, mut ties, mut largest, mut fewer) = (0, 0, 0, 0, 0);
     while met + none < count(10_000) {
-        let chain = if rng.random_bool(0.3) {
+        let kind = if rng.random_bool(0.3) {
             Chain::OwnPower
         } else {
             Chain::Alike
         };
         let style = Style {
             relays: 1..=20,
-            chain,
+            chain: kind,
         };
         let link = as_relays_know_it(&random::link(&mut rng, &style));
         let Some(target) = target(&mut rng, &link) else {
@@ -111,10 +107,7 @@ fn as_few_as_an_exhaustive_count() {
         assert!(found.unwrap().proven);
         largest = largest.max(told);
         // The positions form such a chain.
-        let mission = mission.with_relays(found.unwrap().relays).unwrap();
-        let mut places = vec![Placement::default(); told];
-        assert!(mission.places_for(target as f32, &profile_of, &mut places));
-        let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
+        let x = chain(&mission, found.unwrap().relays, target, &profile_of);
         let sir = with(&link, told).chain_sir(&x);
         assert!(sir >= target * (1.0 - ROUNDING), "{sir} {target} {link:?}");
         // One relay fewer is not enough, by each relay's set of possible positions.
@@ -132,7 +125,7 @@ fn as_few_as_an_exhaustive_count() {
 }
 
 #[test]
-fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
+fn with_a_separation_what_is_proven_is_the_fewest() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(602));
     let (mut proven, mut not, mut none) = (0, 0, 0);
     for _ in 0..count(10_000) / 5 {
@@ -159,10 +152,7 @@ fn where_they_keep_a_distance_places_do_and_what_is_proven_is_the_fewest() {
         } else {
             not += 1;
         }
-        let mut places = vec![Placement::default(); n];
-        let mission = mission.with_relays(found.relays).unwrap();
-        assert!(mission.places_for(target as f32, &profile_of, &mut places));
-        let x: Vec<f64> = places.iter().map(|place| f64::from(place.x_m)).collect();
+        let x = chain(&mission, found.relays, target, &profile_of);
         let sir = with(&link, n).chain_sir(&x);
         assert!(
             sir >= target * (1.0 - ROUNDING),

@@ -1,12 +1,12 @@
 //! Values of an independent program, and errors of the printed rules.
 
-use uav_relay::Placement;
 use uav_relay::planning::fleet::Fewest;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
 
+use super::chain;
 use super::field::field;
 use super::interferer::briefed;
 
@@ -22,19 +22,13 @@ fn the_reference_cases_hold() {
             "{}",
             case.id
         );
-        let mission = mission.with_relays(found.relays).unwrap();
-        let mut places = vec![Placement::default(); usize::from(found.relays)];
-        assert!(mission.places_for(target as f32, &profile_of, &mut places));
+        let x = chain(&mission, found.relays, target, &profile_of);
         let expected = case.part_list("x").unwrap();
-        assert_eq!(expected.len(), places.len());
-        for (place, expected) in places.iter().zip(expected) {
-            let apart = (f64::from(place.x_m) - expected).abs();
-            assert!(
-                apart < 1e-5 * link.distance_m,
-                "{}: {} {expected}",
-                case.id,
-                place.x_m
-            );
+        assert_eq!(expected.len(), x.len());
+        for (x, expected) in x.iter().zip(expected) {
+            let apart = (x - expected).abs();
+            let near = apart < 1e-5 * link.distance_m;
+            assert!(near, "{}: {x} {expected}", case.id);
         }
     }
     for case in cases::of("problem1").unwrap() {
@@ -59,19 +53,12 @@ fn the_reference_cases_hold() {
             "{}",
             case.id
         );
-        let mission = mission.with_relays(found.relays).unwrap();
-        let mut places = vec![Placement::default(); usize::from(found.relays)];
-        assert!(mission.places_for(target as f32, |_| common, &mut places));
-        let sirs = StochasticLink {
-            relays: vec![link.relays[0]; places.len()],
+        let x = chain(&mission, found.relays, target, |_| common);
+        let link = StochasticLink {
+            relays: vec![link.relays[0]; x.len()],
             ..link
-        }
-        .hop_sirs(
-            &places
-                .iter()
-                .map(|place| f64::from(place.x_m))
-                .collect::<Vec<_>>(),
-        );
+        };
+        let sirs = link.hop_sirs(&x);
         assert!(
             sirs.iter().all(|sir| *sir >= target * (1.0 - 1e-5)),
             "{}: {sirs:?}",

@@ -4,14 +4,28 @@ mod field;
 mod interferer;
 mod known;
 
+use host_tests::placing::xs;
+use uav_relay::{Mission, Placement, Profile};
+
 /// Relative loss of a target by f32 rounding: half a step of x is 6e-8 D, over an altitude of 0.002 D.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
-pub(crate) fn count(default: usize) -> usize {
-    let count = std::env::var("COUNT").ok();
-    count.and_then(|text| text.parse().ok()).unwrap_or(default)
-}
-
 pub(crate) fn round(value: f64) -> f64 {
     f64::from(value as f32)
+}
+
+/// Returns the positions along Tx-Rx, m, of `relays` relays that meet `target`.
+pub(crate) fn chain(
+    mission: &Mission,
+    relays: u16,
+    target: f64,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Vec<f64> {
+    let mission = mission.with_relays(relays).unwrap();
+    let mut places = vec![Placement::default(); usize::from(relays)];
+    assert!(
+        mission.places_for(target as f32, profile_of, &mut places),
+        "{target} {mission:?}"
+    );
+    xs(&places)
 }

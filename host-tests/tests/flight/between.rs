@@ -20,7 +20,7 @@ fn undisturbed(setup: &Setup) -> Vec<f32> {
 
 /// Checks a relay that returns after its neighbours have closed up as far as its silent drone permits.
 #[test]
-fn one_that_comes_back_between_two_that_closed_up_gets_its_place() {
+fn a_relay_that_returns_between_two_others_gets_its_place() {
     for silent in 1..=8 {
         for off in [17, 60, 200] {
             let seed = u64::from(silent) * 1_000 + off;

@@ -83,7 +83,7 @@ fn storm(seed: u64) -> Setup {
 }
 
 #[test]
-fn no_drone_comes_near_another_one_whatever_happens_to_their_relays() {
+fn drones_keep_apart_whatever_happens_to_their_relays() {
     let first = seed(1);
     let count = number("COUNT", 300);
     let storms = (first..first + count).into_par_iter().map(|seed| {

@@ -2,6 +2,7 @@
 
 use std::task::Poll;
 
+use host_tests::flights::unharmed;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::joint::{Seat, Solver};
@@ -9,10 +10,10 @@ use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
 use uav_relay_oracle::mission::as_relays_know_it;
 use uav_relay_oracle::random::joint::{CROWDED, ROOMY, Scenario, scenario, with_own};
 use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::Link;
-use uav_relay_oracle::reference::joint::{self, Corridor, Effort, Place};
+use uav_relay_oracle::reference::joint::{self, Corridor, Place};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
@@ -63,7 +64,7 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
 
 /// Compares unlike chains with the optimiser and with the configured positions.
 #[test]
-fn relays_that_differ_come_near_the_joint_optimum_and_never_below_their_given_places() {
+fn relays_that_differ_come_near_the_joint_optimum() {
     let count = count(200);
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(45));
     let (mut results, mut below) = (Vec::new(), Vec::new());
@@ -72,34 +73,24 @@ fn relays_that_differ_come_near_the_joint_optimum_and_never_below_their_given_pl
             continue;
         };
         let (link, corridor) = (&drawn.link, drawn.corridor);
-        let Some(best) = joint::optimum(link, corridor, &drawn.held, Effort::usual(45)) else {
+        let Some(best) = optimum(link, corridor, &drawn.held).unwrap() else {
             continue;
         };
         let mut given = joint_setup.clone();
         given.settings.method = Method::Align;
         let given = run(given).unwrap();
         let outcome = run(joint_setup).unwrap();
-        let short = |place: &Place| {
-            format!(
-                "{:.3}/{:.4}",
-                place.x_m / link.distance_m,
-                place.altitude_m / link.distance_m
-            )
+        let list = |places: &[Place]| -> Vec<String> {
+            let d = link.distance_m;
+            let short = |at: &Place| format!("{:.3}/{:.4}", at.x_m / d, at.altitude_m / d);
+            places.iter().map(short).collect()
         };
-        let list = |places: &[Place]| places.iter().map(short).collect::<Vec<_>>().join(" ");
+        let powers = link.relays.iter().map(|relay| relay.power_w);
         let of = format!(
-            "N = {}, X {:.3} Y {:.4}, band {:.3} {:.3}, apart {:.4}, held {:?}, pw {:?}\n   best {}\n   ours {}",
-            link.len(),
-            link.x_i / link.distance_m,
-            link.y_i / link.distance_m,
-            corridor.least_m / link.distance_m,
-            corridor.most_m / link.distance_m,
-            link.min_separation_m / link.distance_m,
+            "{}, held {:?}, W {:.2?}\n   best {:?}\n   ours {:?}",
+            described(link, corridor),
             drawn.held.iter().map(|h| h.relay + 1).collect::<Vec<_>>(),
-            link.relays
-                .iter()
-                .map(|r| (r.power_w / link.relays[0].power_w * 100.0).round() / 100.0)
-                .collect::<Vec<_>>(),
+            powers.collect::<Vec<_>>(),
             list(&best.places),
             list(&places(&outcome)),
         );
@@ -122,24 +113,6 @@ fn relays_that_differ_come_near_the_joint_optimum_and_never_below_their_given_pl
     assert!(near * 100 >= 98 * count, "{near} of {count}");
     assert!(best <= 1.0 + 1e-5, "{best}");
     assert!(f64::from(passes) <= 3.5 * count as f64, "{passes}");
-}
-
-#[test]
-fn faults_change_nothing() {
-    let mut hurt = 0;
-    for seed in 0..20 {
-        let (link, corridor) = close_by(2 + seed % 7);
-        let mut setup = setup(&link, corridor).unwrap();
-        setup.settings.predict = seed % 2 > 0;
-        let clean = settle(setup.clone());
-        setup.faults = Faults::BAD_DAY;
-        setup.seed = seed as u64;
-        let faulty = settle(setup);
-        let injected = faulty.injected;
-        hurt += injected.lost + injected.corrupted + injected.reordered;
-        assert_eq!(clean.bits(), faulty.bits(), "seed {seed}");
-    }
-    assert!(hurt > 100, "{hurt}");
 }
 
 /// Checks that a relay keeps its held altitude, and the others choose around it.
@@ -170,7 +143,7 @@ fn a_relay_may_hold_its_altitude() {
 ///
 /// An unlike leader starts with the collection.
 #[test]
-fn relays_that_differ_take_three_round_trips_and_one_more_for_every_eight() {
+fn relays_that_differ_take_three_round_trips_or_more() {
     for (relays, own, trips) in [
         (5, &[3][..], 3),
         (5, &[1], 2),
@@ -221,7 +194,7 @@ fn own_powers_are_found_out_about() {
         real.relays[usize::from(*index) - 1].power_w = f64::from(own.power_w);
     }
     let outcome = settle(setup);
-    let best = joint::optimum(&real, corridor, &[], Effort::usual(1)).unwrap();
+    let best = optimum(&real, corridor, &[]).unwrap().unwrap();
     let ratio = joint::sir(&real, &places(&outcome)).unwrap() / best.sir;
     println!("{ratio:.6} of the optimum in {} passes", outcome.sweeps);
     assert!((0.99..=1.0 + 1e-6).contains(&ratio), "{ratio}");
@@ -243,7 +216,7 @@ fn a_band_of_one_altitude_is_algorithm_1() {
 fn faults_change_nothing_on_random_links() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(44));
     let mut injected = 0;
-    for round in 0..120 {
+    for round in 0..160 {
         let drawn = scenario(&mut rng, &(1..=12), CROWDED);
         let link = as_relays_know_it(&drawn.link);
         let Some(mut setup) = setup(&link, drawn.corridor) else {
@@ -270,14 +243,7 @@ fn faults_change_nothing_on_random_links() {
             });
         }
         setup.settings.predict = rng.random();
-        let clean = run(setup.clone()).unwrap();
-        setup.faults = Faults::BAD_DAY;
-        setup.seed = round;
-        let faulty = run(setup).unwrap();
-        assert_eq!(clean.ending, faulty.ending);
-        assert_eq!(clean.bits(), faulty.bits(), "round {round}");
-        assert_eq!((clean.unsafe_setpoints, faulty.unsafe_setpoints), (0, 0));
-        assert!(faulty.rounds.windows(2).all(|pair| pair[1] >= pair[0]));
+        let faulty = unharmed(setup, round);
         injected += faulty.injected.lost + faulty.injected.corrupted;
     }
     println!("{injected} frames lost or corrupted");

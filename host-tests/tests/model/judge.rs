@@ -67,7 +67,7 @@ impl Judge {
                     even.iid_optimum()
                         .is_some_and(|best| target <= best * (1.0 + ABOVE))
                 }
-                None => target <= link.best() * (1.0 + ABOVE),
+                None => target <= link.best_apart(0.0) * (1.0 + ABOVE),
             },
         }
     }

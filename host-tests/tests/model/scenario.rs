@@ -10,7 +10,8 @@ use uav_relay::{Auth, Key};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::joint::scenario as joint_scenario;
 use uav_relay_oracle::random::{Chain, Style, link as random_link, log_uniform};
-use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
+use uav_relay_oracle::recorded::optimum;
+use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
 
@@ -22,6 +23,9 @@ pub(crate) const SAMPLES: u32 = 100;
 
 /// Range of the separation, as a fraction of D / (N + 1), in half of the chains with free altitudes.
 const TIGHT: (f64, f64) = (0.05, 0.95);
+
+/// Number of scenes with free altitudes whose optima are recorded.
+const SCENES: u64 = 400;
 
 /// Optimisation method of the leader.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -192,8 +196,11 @@ fn aligned(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     Some((mission, settings, Judge::Source { link, optimum }))
 }
 
-fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
-    let drawn = joint_scenario(rng, &(2..=6), TIGHT);
+/// Returns the link and corridor of a scene below [`SCENES`], whose optimum is recorded.
+fn numbered(number: u64) -> (Link, Corridor) {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    rng.set_stream(number);
+    let drawn = joint_scenario(&mut rng, &(2..=6), TIGHT);
     let narrow = uav_relay::Band {
         least_m: drawn.corridor.least_m as f32,
         most_m: drawn.corridor.most_m as f32,
@@ -201,21 +208,29 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     let corridor = Corridor::plane(f64::from(narrow.least_m), f64::from(narrow.most_m));
     let mut link = drawn.link;
     // All relays start at one altitude, except single ones.
-    let common_m = log_uniform(rng, corridor.least_m, corridor.most_m);
+    let common_m = log_uniform(&mut rng, corridor.least_m, corridor.most_m);
     for relay in &mut link.relays {
         let own = rng.random_bool(0.2);
         relay.altitude_m = if own {
-            log_uniform(rng, corridor.least_m, corridor.most_m)
+            log_uniform(&mut rng, corridor.least_m, corridor.most_m)
         } else {
             common_m
         };
         relay.power_w *= if rng.random_bool(0.1) {
-            log_uniform(rng, 0.3, 3.0)
+            log_uniform(&mut rng, 0.3, 3.0)
         } else {
             1.0
         };
     }
-    let link = as_relays_know_it(&link);
+    (as_relays_know_it(&link), corridor)
+}
+
+fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
+    let (link, corridor) = numbered(rng.random_range(0..SCENES));
+    let narrow = uav_relay::Band {
+        least_m: corridor.least_m as f32,
+        most_m: corridor.most_m as f32,
+    };
     let (mission, own) = of_link(&link, 1e-4)?;
     let config = MissionConfig {
         band: narrow,
@@ -235,12 +250,12 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     for one in &mut settings {
         one.hold_altitude = rng.random_bool(0.1);
     }
-    // A search without the separation finds a better optimum than any with it, and finds it reliably.
+    // Recorded without the separation: that optimum is above any with it, and a search finds it reliably.
     let unseparated = Link {
         min_separation_m: 0.0,
         ..link.clone()
     };
-    let optimum = optimum(&unseparated, corridor, &[], Effort::usual(1))?.sir;
+    let optimum = optimum(&unseparated, corridor, &[]).unwrap()?.sir;
     Some((mission, settings, Judge::Source { link, optimum }))
 }
 

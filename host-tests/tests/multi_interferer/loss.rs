@@ -1,10 +1,11 @@
 //! SIR lost by placing a chain with the hypothetical interferer. `COUNT` scenes of each kind (30 if unset).
 
+use host_tests::placing::profile_of;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use uav_relay::Schedule;
 use uav_relay::optimiser::plan::{place, solve};
-use uav_relay::{Profile, Schedule};
-use uav_relay_oracle::random::seed;
+use uav_relay_oracle::random::{count, seed};
 use uav_relay_scenario::hypothetical::hypothetical;
 use uav_relay_scenario::mission;
 use uav_relay_scenario::scene::Scene;
@@ -28,10 +29,7 @@ struct Outcome {
 /// Returns the relays' positions in a scenario of one interferer.
 fn placed(scenario: &Scenario, n: u16) -> Option<Vec<(f64, f64)>> {
     let (mission, own) = mission::mission(scenario, n, TOLERANCE).ok()?;
-    let of = |index: u16| {
-        let own = own.iter().find(|(at, _): &&(u16, Profile)| *at == index);
-        own.map_or(mission.config().common, |(_, profile)| *profile)
-    };
+    let of = |index: u16| profile_of(&mission, &own, index);
     let agreed = solve(&mission, Schedule::Bracketed, of).ok()?;
     (1..=n)
         .map(|index| {
@@ -42,10 +40,7 @@ fn placed(scenario: &Scenario, n: u16) -> Option<Vec<(f64, f64)>> {
 }
 
 fn outcomes(default_seed: u64, kind: Sources) -> Vec<Outcome> {
-    let count = std::env::var("COUNT")
-        .ok()
-        .and_then(|text| text.parse().ok());
-    let count = count.unwrap_or(30);
+    let count = count(30);
     let mut rng = ChaCha8Rng::seed_from_u64(seed(default_seed));
     let mut outcomes = Vec::new();
     while outcomes.len() < count {

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::joint::{CROWDED, scenario};
 use uav_relay_oracle::random::seed;
-use uav_relay_oracle::reference::joint::{self, Effort};
+use uav_relay_oracle::recorded;
 use uav_relay_scenario::scene::{Corridor, Place, Scene};
 use uav_relay_tools::multi_interferer::{Polished, best_common_altitude, optimum, polish};
 
@@ -76,16 +76,16 @@ fn at_one_altitude_it_stays_below_the_optimum() {
 /// Checks that the chain approaches the joint optimum of one source without exceeding it.
 #[test]
 fn in_a_band_it_comes_near_the_joint_optimum() {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed(80));
+    let mut rng = ChaCha8Rng::seed_from_u64(80);
     let (mut near, mut common_near, mut compared) = (0, 0, 0);
     while compared < 20 {
-        let drawn = scenario(&mut rng, &(1..=12), CROWDED);
+        let drawn = scenario(&mut rng, &(1..=12), CROWDED).as_relays_know_it();
         let band = Corridor::plane(drawn.corridor.least_m, drawn.corridor.most_m);
         let scene = Scene {
             band,
             ..of_link(&drawn.link)
         };
-        let joint = joint::optimum(&drawn.link, drawn.corridor, &[], Effort::usual(1));
+        let joint = recorded::optimum(&drawn.link, drawn.corridor, &[]).unwrap();
         let (Some(start), Some(joint)) = (best_common_altitude(&scene), joint) else {
             continue;
         };

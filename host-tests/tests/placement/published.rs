@@ -1,12 +1,10 @@
 //! Worked cases of one hop, of a chain, and of the fixed step.
 
 use uav_relay::Schedule;
-use uav_relay::optimiser::plan::{self};
-use uav_relay::optimiser::spacing::{Hop, receiver_reach};
+use uav_relay::optimiser::plan;
+use uav_relay::optimiser::spacing::Hop;
 use uav_relay::sir::Sender;
 use uav_relay_oracle::cases;
-use uav_relay_oracle::mission::of_link;
-use uav_relay_oracle::reference::Link;
 
 use super::*;
 

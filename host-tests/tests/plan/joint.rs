@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use host_tests::placing::{profile_of, reference};
 use uav_relay::{Method, Profile};
 use uav_relay_oracle::random::joint::Scenario as Drawn;
 use uav_relay_oracle::random::joint::judged::{COUNT, numbered, optima};
+use uav_relay_oracle::recorded;
 use uav_relay_oracle::reference::Link;
-use uav_relay_oracle::reference::joint::{self, Corridor, Effort};
+use uav_relay_oracle::reference::joint::{self, Corridor};
 use uav_relay_scenario::mission;
 use uav_relay_scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
 use uav_relay_sim::report::hop_sirs;
@@ -47,8 +49,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
         .zip(&outcome.relays)
         .map(|(index, relay)| {
             let place = relay.setpoint.unwrap();
-            let own = own.iter().find(|(at, _)| *at == index);
-            let profile = own.map_or(mission.config().common, |(_, own)| *own);
+            let profile = profile_of(&mission, &own, index);
             let altitude_m = place.altitude_m;
             (
                 place,
@@ -162,7 +163,7 @@ fn a_plan_for_relays_that_differ_is_what_they_agree_on() {
 
 /// Checks that a relay held at a high altitude makes the chain choose another side of the interferer.
 #[test]
-fn a_relay_that_holds_its_altitude_has_the_others_take_the_side_that_suits_it() {
+fn the_others_take_the_side_that_suits_a_held_altitude() {
     for altitude_m in [60.0, 120.0, 200.0, 300.0] {
         let mut scenario = example("side.toml");
         let own = RelayOverride {
@@ -187,15 +188,7 @@ fn over_the_judge(number: u32, optimum: f64) -> f64 {
     let plan = free(&of_link(&link, corridor), Number::Of(relays));
     // Only a single relay right above the line is proven, by a theorem.
     assert!(!plan.proven || relays == 1);
-    let places: Vec<_> = plan
-        .places
-        .iter()
-        .map(|(at, _)| joint::Place {
-            x_m: f64::from(at.x_m),
-            y_m: f64::from(at.y_m),
-            altitude_m: f64::from(at.altitude_m),
-        })
-        .collect();
+    let places: Vec<_> = plan.places.iter().map(|(at, _)| reference(*at)).collect();
     // The f32 rounding of two positions reduces the separation.
     let rounded = Link {
         min_separation_m: (link.min_separation_m - 1e-6 * link.distance_m).max(0.0),
@@ -314,7 +307,7 @@ fn two_interferers_in_one_place_are_one() {
             left_m: scenario.lateral_min_m,
             right_m: scenario.lateral_max_m,
         };
-        let judge = joint::optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+        let judge = recorded::optimum(&link, corridor, &[]).unwrap().unwrap();
         let plan = free(&halves, Number::Of(relays));
         let ratio = plan.sir() / judge.sir;
         println!("{relays} relays: {ratio}");

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use host_tests::placing::reference;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
-use uav_relay_oracle::reference::joint::{self, Corridor, Effort, Place};
+use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
+use uav_relay_oracle::recorded;
+use uav_relay_oracle::reference::joint::{self, Corridor, Place};
 use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
@@ -148,10 +150,7 @@ fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
 fn plans_keep_every_limit_and_what_is_proven_is() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(701));
     let (mut planned, mut unmet, mut proven, mut one_proven) = (0, 0, 0, 0);
-    let count = std::env::var("COUNT")
-        .ok()
-        .and_then(|text| text.parse().ok());
-    for _ in 0..count.unwrap_or(250) {
+    for _ in 0..count(250) {
         let scenario = scenario(&mut rng);
         let ask = ask(&mut rng);
         let plan = match plan(&scenario, &ask) {
@@ -248,17 +247,13 @@ fn keeps_the_limits(scenario: &Scenario, ask: &PlanRequest, plan: &Plan) {
 }
 
 fn places(plan: &Plan) -> impl Iterator<Item = Place> + '_ {
-    plan.places.iter().map(|(place, _)| Place {
-        x_m: f64::from(place.x_m),
-        y_m: f64::from(place.y_m),
-        altitude_m: f64::from(place.altitude_m),
-    })
+    plan.places.iter().map(|(place, _)| reference(*place))
 }
 
 /// Checks that plans with lateral room have the stated SIR and come near the reference's optimum.
 #[test]
 fn plans_beside_the_line_are_worth_what_they_say() {
-    let mut rng = ChaCha8Rng::seed_from_u64(random::seed(702));
+    let mut rng = ChaCha8Rng::seed_from_u64(702);
     let mut ratios: Vec<f64> = Vec::new();
     let mut aside = 0;
     while ratios.len() < 40 {
@@ -296,7 +291,7 @@ fn plans_beside_the_line_are_worth_what_they_say() {
             "{} {sir} {scenario:?}",
             plan.sir()
         );
-        let Some(best) = joint::optimum(&link, corridor, &[], Effort::usual(1)) else {
+        let Some(best) = recorded::optimum(&link, corridor, &[]).unwrap() else {
             continue;
         };
         aside += usize::from(

@@ -82,19 +82,27 @@ fn reaches_agree_with_a_scan() {
     assert!(inside > 500 && hills > 100 && blocked > 100);
 }
 
-/// Compares with brute force. Returns the number of links whose farthest chain is below the optimum.
-fn search_agrees(seed: u64, count: u32, n: u32, chain: Chain, points: u32) -> u32 {
-    let (mut mixed_gains, mut dead) = (0, 0);
-    for_links(
-        seed,
-        count,
-        &Style {
-            relays: n..=n,
-            chain,
-        },
-        |link, _| {
+/// Compares the optimum with brute force, with and without a least separation.
+///
+/// At different altitudes the optimum needs sets of positions: the farthest chain is sometimes below it.
+#[test]
+fn one_and_two_relays_agree_with_brute_force() {
+    for (seed, count, n, chain, points, apart) in [
+        (21, 400, 1, Chain::Any, 100, false),
+        (22, 200, 2, Chain::Any, 32, false),
+        (23, 300, 2, Chain::Own, 32, false),
+        (24, 200, 2, Chain::Any, 32, true),
+        (25, 200, 2, Chain::Own, 32, true),
+    ] {
+        let (mut mixed_gains, mut dead, mut costs) = (0, 0, 0);
+        let relays = n..=n;
+        for_links(seed, count, &Style { relays, chain }, |link, rng| {
+            let mut link = link.clone();
+            if apart {
+                link.min_separation_m = link.distance_m * log_uniform(rng, 0.01, 1.2);
+            }
             let found = link.optimum_by_search(points);
-            let Some(optimum) = link.optimum() else {
+            let Some(optimum) = link.optimum_apart() else {
                 dead += 1;
                 assert_eq!(found, 0.0);
                 return;
@@ -107,32 +115,19 @@ fn search_agrees(seed: u64, count: u32, n: u32, chain: Chain, points: u32) -> u3
                 found >= optimum * (1.0 - 1e-6),
                 "search {found:e} misses {optimum:e}: {link:?}"
             );
-            mixed_gains += u32::from(
-                link.farthest_optimum()
-                    .is_none_or(|greedy| greedy < optimum * (1.0 - 1e-9)),
-            );
-        },
-    );
-    println!(
-        "N = {n}: greedy below the optimum in {mixed_gains} of {count}, SIR of zero in {dead}"
-    );
-    mixed_gains
-}
-
-#[test]
-fn one_relay_agrees_with_brute_force() {
-    assert_eq!(search_agrees(21, 400, 1, Chain::Any, 100), 0);
-}
-
-#[test]
-fn two_relays_agree_with_brute_force() {
-    search_agrees(22, 200, 2, Chain::Any, 32);
-}
-
-/// Checks different altitudes, where the optimum needs sets of positions.
-#[test]
-fn two_relays_at_different_altitudes_agree_with_brute_force() {
-    assert!(search_agrees(23, 300, 2, Chain::Own, 32) > 0);
+            let free = link.optimum().unwrap();
+            assert!(apart || optimum == free);
+            costs += u32::from(optimum < free * 0.999);
+            let greedy = link.farthest_optimum();
+            mixed_gains += u32::from(greedy.is_none_or(|greedy| greedy < free * (1.0 - 1e-9)));
+        });
+        println!(
+            "N = {n}, {chain:?}: greedy below the optimum in {mixed_gains} of {count}, separation costs SIR in {costs}, SIR of zero in {dead}"
+        );
+        assert!(n > 1 || mixed_gains == 0);
+        assert!(chain != Chain::Own || mixed_gains > 0);
+        assert!(!apart || costs > 20);
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use roxmltree::Document;
 use uav_relay_sim::svg::{Picture, draw};
 
-use super::{SIZE, all, extent, has_text, level, number, tip};
+use super::{SIZE, all, assert_apart, has_text, level, number, tip};
 
 #[test]
 fn hops_pass_by_relays_that_are_not_in_the_chain_any_more() {
@@ -38,7 +38,7 @@ fn hops_pass_by_relays_that_are_not_in_the_chain_any_more() {
 }
 
 #[test]
-fn what_happened_stands_in_a_strip_below_that_is_there_only_then() {
+fn events_are_listed_in_a_strip_below() {
     let event = |number: u32| (f64::from(number), format!("what number {number} of all"));
     for (count, shown) in [(1, 1), (2, 2), (8, 8), (9, 8), (1000, 8)] {
         let picture = Picture {
@@ -57,13 +57,8 @@ fn what_happened_stands_in_a_strip_below_that_is_there_only_then() {
             assert!(has_text(&document, &format!("{} more", count - 7)));
         }
         assert!(has_text(&document, &format!("{count}.000 s")));
-        let extents: Vec<[f64; 4]> = texts.iter().map(|text| extent(text, 10.0)).collect();
-        for (index, a) in extents.iter().enumerate() {
+        for a in assert_apart(&document, &[("event", 10.0)]) {
             assert!(a[0] >= 0.0 && a[1] <= SIZE.0 && a[3] <= height, "{a:?}");
-            for b in &extents[..index] {
-                let apart = a[1] <= b[0] || b[1] <= a[0] || a[3] <= b[2] || b[3] <= a[2];
-                assert!(apart, "{a:?} covers {b:?} of {count}");
-            }
         }
     }
 }

@@ -125,31 +125,56 @@ fn extent(node: &Node, size: f64) -> [f64; 4] {
     [x - half, x + half, y - 0.72 * size, y]
 }
 
+/// Returns the drawing, after a check that it contains finite numbers only.
+fn drawn(picture: &Picture) -> String {
+    let svg = draw(picture);
+    assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    svg
+}
+
+/// Asserts that all coordinates are within the width and height. Returns their number.
+fn assert_inside(document: &Document, (width, height): (f64, f64)) -> usize {
+    let mut checked = 0;
+    for node in document.descendants() {
+        for (names, limit) in [
+            (["x1", "x2", "cx", "x"], width),
+            (["y1", "y2", "cy", "y"], height),
+        ] {
+            for value in names.iter().filter_map(|name| node.attribute(*name)) {
+                let value: f64 = value.parse().unwrap();
+                assert!((0.0..=limit).contains(&value), "{node:?}");
+                checked += 1;
+            }
+        }
+    }
+    checked
+}
+
+/// Asserts that no two texts of these classes, with their font sizes, cover each other. Returns their rectangles.
+fn assert_apart(document: &Document, classes: &[(&str, f64)]) -> Vec<[f64; 4]> {
+    let mut extents: Vec<([f64; 4], String)> = Vec::new();
+    for (class, size) in classes {
+        let texts = all(document, "text", class);
+        extents.extend(texts.iter().map(|text| (extent(text, *size), words(text))));
+    }
+    for (index, (a, one)) in extents.iter().enumerate() {
+        for (b, other) in &extents[..index] {
+            let apart = a[1] <= b[0] || b[1] <= a[0] || a[3] <= b[2] || b[3] <= a[2];
+            assert!(apart, "{one} at {a:?} covers {other} at {b:?}");
+        }
+    }
+    extents.into_iter().map(|(extent, _)| extent).collect()
+}
+
 #[test]
 fn every_picture_is_well_formed_and_stays_in_its_frame() {
     for picture in gallery() {
-        let svg = draw(&picture);
-        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        let svg = drawn(&picture);
         let document = Document::parse(&svg).unwrap();
-        assert_eq!(document.root_element().tag_name().name(), "svg");
-        assert_eq!(
-            document.root_element().attribute("viewBox"),
-            Some("0 0 480 330")
-        );
-        let mut checked = 0;
-        for node in document.descendants() {
-            for (names, limit) in [
-                (["x1", "x2", "cx", "x"], SIZE.0),
-                (["y1", "y2", "cy", "y"], SIZE.1),
-            ] {
-                for value in names.iter().filter_map(|name| node.attribute(*name)) {
-                    let value: f64 = value.parse().unwrap();
-                    assert!((0.0..=limit).contains(&value), "{node:?}");
-                    checked += 1;
-                }
-            }
-        }
-        assert!(checked > 50);
+        let root = document.root_element();
+        assert_eq!(root.tag_name().name(), "svg");
+        assert_eq!(root.attribute("viewBox"), Some("0 0 480 330"));
+        assert!(assert_inside(&document, SIZE) > 50);
     }
 }
 
@@ -179,8 +204,7 @@ fn hostile_input_still_makes_a_picture() {
     let huge = chain(3, 1e308, |_| 1e308);
     let tiny = chain(3, 1e-300, |_| 1e-300);
     for (picture, circles) in [(picture, 3), (empty, 0), (nan, 0), (huge, 3), (tiny, 3)] {
-        let svg = draw(&picture);
-        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        let svg = drawn(&picture);
         let document = Document::parse(&svg).unwrap();
         let count = all(&document, "circle", "relay").len();
         assert!(

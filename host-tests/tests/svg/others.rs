@@ -6,7 +6,7 @@ use uav_relay_sim::svg::{OtherInterferers, Picture, draw};
 use super::{all, level, number, tip};
 
 #[test]
-fn the_interferer_of_the_mission_before_is_faint_and_said_to_be_that() {
+fn the_interferer_of_the_previous_mission_is_faint() {
     let mut picture = level(8);
     let without = draw(&picture);
     picture.others = vec![(30.0, 200.0, -100.0)];

@@ -42,7 +42,7 @@ fn the_axes_have_units_and_round_ticks_from_the_ground_up() {
 }
 
 #[test]
-fn relays_all_at_one_altitude_are_neither_at_the_top_nor_at_the_bottom() {
+fn relays_at_one_altitude_are_in_the_middle_of_the_plot() {
     for picture in [level(8), chain(8, 1e5, |_| 1e5), chain(8, 10.0, |_| 0.1)] {
         let svg = draw(&picture);
         let document = Document::parse(&svg).unwrap();

@@ -10,8 +10,3 @@ mod scene;
 
 /// Largest relative shortfall from the best SIR.
 const ALLOWED: f64 = 1e-4;
-
-fn count() -> usize {
-    let count = std::env::var("COUNT").ok();
-    count.and_then(|text| text.parse().ok()).unwrap_or(100_000)
-}

@@ -3,10 +3,10 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::single::{Found, theorems, without_interferer};
-use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_oracle::random::{self, count, log_uniform};
 
+use super::ALLOWED;
 use super::scene::Scene;
-use super::{ALLOWED, count};
 
 /// Compares the positions of `best` with brute force over the box of `over`, and counts the cases.
 fn no_worse_than_brute_force(
@@ -18,7 +18,7 @@ fn no_worse_than_brute_force(
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(seed));
     let mut seen = std::collections::BTreeMap::new();
     let (mut worst, mut above, mut missed) = (0.0_f64, 0.0_f64, 0);
-    for _ in 0..count() {
+    for _ in 0..count(100_000) {
         let mut scene = draw(&mut rng);
         let (x, h) = over(&mut rng, &scene);
         let (found, case) = best(&scene, x, h);
@@ -56,26 +56,26 @@ fn no_worse_than_brute_force(
     seen
 }
 
-#[test]
-fn theorem_1_is_no_worse_than_brute_force() {
-    let seen = no_worse_than_brute_force(
-        501,
-        Scene::random,
+type Draw = fn(&mut ChaCha8Rng) -> Scene;
+type Cases = std::collections::BTreeMap<String, u32>;
+
+fn theorem_1(seed: u64, draw: Draw) -> Cases {
+    no_worse_than_brute_force(
+        seed,
+        draw,
         |_, scene| ((0.0, scene.link.distance_m), (scene.band.0, scene.band.0)),
         |scene, _, h| {
-            let (found, case) =
-                theorems::best_at_altitude(&scene.mission, scene.profile(h.0)).unwrap();
+            let profile = scene.profile(h.0);
+            let (found, case) = theorems::best_at_altitude(&scene.mission, profile).unwrap();
             (found, format!("{case:?}"))
         },
-    );
-    assert_eq!(seen.len(), 10, "every case: {seen:?}");
+    )
 }
 
-#[test]
-fn theorem_2_is_no_worse_than_brute_force() {
-    let seen = no_worse_than_brute_force(
-        502,
-        Scene::random,
+fn theorem_2(seed: u64, draw: Draw) -> Cases {
+    no_worse_than_brute_force(
+        seed,
+        draw,
         |rng, scene| {
             let d = scene.link.distance_m;
             let x = match rng.random_range(0..8) {
@@ -90,15 +90,14 @@ fn theorem_2_is_no_worse_than_brute_force() {
             let (found, case) = theorems::best_at_x(&scene.mission, x.0 as f32, power_w).unwrap();
             (found, format!("{case:?}"))
         },
-    );
-    assert_eq!(seen.len(), 4, "every case: {seen:?}");
+    )
 }
 
-#[test]
-fn theorem_3_is_no_worse_than_brute_force() {
+/// Checks Theorem 3, and that the named edges occur.
+fn theorem_3(seed: u64, draw: Draw, edges: &[&str]) {
     let seen = no_worse_than_brute_force(
-        503,
-        Scene::random,
+        seed,
+        draw,
         |_, scene| ((0.0, scene.link.distance_m), scene.band),
         |scene, _, _| {
             let power_w = scene.mission.config().common.power_w;
@@ -106,72 +105,47 @@ fn theorem_3_is_no_worse_than_brute_force() {
             (found, format!("{case:?}"))
         },
     );
-    for edge in ["Lowest", "Highest", "AboveRx"] {
-        assert!(
-            seen.keys().any(|case| case.starts_with(edge)),
-            "{edge}: {seen:?}"
-        );
+    for edge in edges {
+        let is_seen = seen.keys().any(|case| case.starts_with(edge));
+        assert!(is_seen, "{edge}: {seen:?}");
     }
 }
 
 #[test]
+fn theorem_1_is_no_worse_than_brute_force() {
+    let seen = theorem_1(501, Scene::random);
+    assert_eq!(seen.len(), 10, "every case: {seen:?}");
+}
+
+#[test]
 fn theorem_1_in_noise_is_no_worse_than_brute_force() {
-    let seen = no_worse_than_brute_force(
-        521,
-        Scene::noisy,
-        |_, scene| ((0.0, scene.link.distance_m), (scene.band.0, scene.band.0)),
-        |scene, _, h| {
-            let (found, case) =
-                theorems::best_at_altitude(&scene.mission, scene.profile(h.0)).unwrap();
-            (found, format!("{case:?}"))
-        },
-    );
+    let seen = theorem_1(521, Scene::noisy);
     // Every case occurs but a constant SIR_1, and the one that noise adds.
     assert_eq!(seen.len(), 10, "every case: {seen:?}");
     assert!(!seen.contains_key("Level") && seen.contains_key("SecondHill"));
 }
 
 #[test]
-fn theorem_2_in_noise_is_no_worse_than_brute_force() {
-    let seen = no_worse_than_brute_force(
-        522,
-        Scene::noisy,
-        |rng, scene| {
-            let d = scene.link.distance_m;
-            let x = match rng.random_range(0..8) {
-                0 => 0.0,
-                1 => d,
-                _ => f64::from(rng.random_range(0.0..=d) as f32).min(d),
-            };
-            ((x, x), scene.band)
-        },
-        |scene, x, _| {
-            let power_w = scene.mission.config().common.power_w;
-            let (found, case) = theorems::best_at_x(&scene.mission, x.0 as f32, power_w).unwrap();
-            (found, format!("{case:?}"))
-        },
-    );
+fn theorem_2_is_no_worse_than_brute_force() {
+    let seen = theorem_2(502, Scene::random);
     assert_eq!(seen.len(), 4, "every case: {seen:?}");
 }
 
 #[test]
+fn theorem_2_in_noise_is_no_worse_than_brute_force() {
+    let seen = theorem_2(522, Scene::noisy);
+    assert_eq!(seen.len(), 4, "every case: {seen:?}");
+}
+
+#[test]
+fn theorem_3_is_no_worse_than_brute_force() {
+    theorem_3(503, Scene::random, &["Lowest", "Highest", "AboveRx"]);
+}
+
+#[test]
 fn theorem_3_in_noise_is_no_worse_than_brute_force() {
-    let seen = no_worse_than_brute_force(
-        523,
-        Scene::noisy,
-        |_, scene| ((0.0, scene.link.distance_m), scene.band),
-        |scene, _, _| {
-            let power_w = scene.mission.config().common.power_w;
-            let (found, case) = theorems::best_free(&scene.mission, power_w).unwrap();
-            (found, format!("{case:?}"))
-        },
-    );
-    for edge in ["Lowest", "Highest", "AboveRx", "Touching"] {
-        assert!(
-            seen.keys().any(|case| case.starts_with(edge)),
-            "{edge}: {seen:?}"
-        );
-    }
+    let edges = ["Lowest", "Highest", "AboveRx", "Touching"];
+    theorem_3(523, Scene::noisy, &edges);
 }
 
 #[test]

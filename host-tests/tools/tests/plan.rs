@@ -12,8 +12,9 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 use uav_relay_oracle::cases::{self, Case};
+use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::Link;
-use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
+use uav_relay_oracle::reference::joint::Corridor;
 
 fn plan(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plan"))
@@ -138,7 +139,7 @@ fn one_relay_aside_is_the_judges_of_three_dimensions() {
         left_m: -280.0,
         right_m: 280.0,
     };
-    let best = optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+    let best = optimum(&link, corridor, &[]).unwrap().unwrap();
     let sir = number(&report["sir"]);
     assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
     // With a given altitude it stays above the line.

@@ -15,8 +15,9 @@ use std::process::{Command, Output};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use uav_relay_oracle::cases;
+use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::Link;
-use uav_relay_oracle::reference::joint::{self, Corridor, Effort};
+use uav_relay_oracle::reference::joint::Corridor;
 
 fn compare(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_compare"))
@@ -188,7 +189,7 @@ fn the_altitudes_that_were_chosen_are_judged() {
         min_separation_m: 4.0,
         ..Link::paper(8)
     };
-    let best = joint::optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+    let best = optimum(&link, corridor, &[]).unwrap().unwrap();
     let mut chain: Vec<[f64; 3]> = best
         .places
         .iter()
@@ -285,7 +286,7 @@ fn the_sides_that_were_chosen_are_judged() {
         min_separation_m: 4.0,
         ..Link::paper(8)
     };
-    let best = joint::optimum(&link, corridor, &[], Effort::usual(1)).unwrap();
+    let best = optimum(&link, corridor, &[]).unwrap().unwrap();
     let mut chain: Vec<[f64; 3]> = best
         .places
         .iter()

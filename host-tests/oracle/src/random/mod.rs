@@ -114,6 +114,12 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
+/// Returns the number of scenes of a random test. The environment variable `COUNT` if it is a number, else `usual`.
+pub fn count(usual: usize) -> usize {
+    let count = std::env::var("COUNT").ok();
+    count.and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
 /// Draws a number between `low` and `high`, both > 0, uniform in its logarithm.
 pub fn log_uniform(rng: &mut impl Rng, low: f64, high: f64) -> f64 {
     rng.random_range(low.ln()..=high.ln())

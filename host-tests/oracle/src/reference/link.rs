@@ -14,7 +14,7 @@ pub struct Station {
 pub struct Link {
     /// Tx-Rx distance D, m, > 0.
     pub distance_m: f64,
-    /// Least distance between neighbours, m, >= 0; not enforced by the searches.
+    /// Least distance between neighbours, m, >= 0; most searches ignore it.
     pub min_separation_m: f64,
     /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,

@@ -13,15 +13,15 @@
 //! the interferer is u ahead and a sideways, and b is the difference in height. Over d that is concave for u > 0, so there are at
 //! most two turning points, a valley and then a hill; for u < 0 each of its terms falls, so there is at most one.
 //!
-//! No relay is behind its predecessor (0 <= `x_1` <= ... <= `x_N` <= D). The least separation is stored for the tests that check
-//! it, and ignored by every search here except that of [`joint`].
+//! No relay is behind its predecessor (0 <= `x_1` <= ... <= `x_N` <= D). Only `Link::optimum_apart` and the brute-force search keep
+//! the least separation.
 //!
 //! - `Link::feasible` extends the chain greedily, as the on-board protocol does. It is exact when all altitudes are equal.
 //! - `Link::placement` keeps the whole set of positions each node can reach. It is exact for any altitudes, which the greedy
 //!   chain is not: close to the interferer a climb may be impossible that was possible earlier.
-//! - [`joint::optimum`] also chooses altitudes and lateral positions. It is a numerical search without proof, and it solves
-//!   quadratics
-//!   on the way, but it reports the SIR of the positions it found.
+//! - `Link::optimum_apart` does the same with the least separation.
+//!
+//! [`mod@joint`] evaluates chains that also choose altitudes and lateral positions.
 //!
 //! Cost: a reach takes about 60 SIR evaluations if the node may start where the search starts, at most about 150 if a maximum has
 //! to be found first. An optimum takes about 50 to 60 chains.

@@ -31,7 +31,7 @@ impl Link {
         self.largest_target(|target| self.feasible(target).is_some())
     }
 
-    fn largest_target(&self, feasible: impl Fn(f64) -> bool) -> Option<f64> {
+    pub(super) fn largest_target(&self, feasible: impl Fn(f64) -> bool) -> Option<f64> {
         // No chain is better than the best SIR of its first hop.
         let mut above = 2.0 * Hop::new(self, 1, 0.0)?.peak(0.0, self.distance_m);
         let mut below = above / 16.0;

@@ -8,9 +8,9 @@ const STEPS: usize = 42;
 const PEAKS: usize = 4;
 
 impl Link {
-    /// Returns the best chain SIR (linear) over all ordered placements, on refined nested grids. 0 without relays.
+    /// Returns the best chain SIR (linear) over all ordered placements with the least separation, on refined nested grids.
     ///
-    /// `points` (>= 16) is the number of grid points per relay. Never more than the optimum except for rounding; the grid may
+    /// 0 if there is none. `points` (>= 16) is the number of grid points per relay. Never more than the optimum except for rounding; the grid may
     /// miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
@@ -27,7 +27,8 @@ impl Link {
             };
             here.min(rest)
         };
-        maximum(&self.grid(from_x, points), worst_hop)
+        let from = from_x + self.least_advance(k, self.min_separation_m);
+        maximum(&self.grid(from, points), worst_hop)
     }
 
     /// Returns points from `from_x` to D: evenly spaced, and denser near both ends and the interferer.

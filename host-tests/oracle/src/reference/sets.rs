@@ -3,7 +3,8 @@
 //! A node's set is a sorted list of closed intervals. A position can be reached if the hop from the *nearest* reachable position
 //! at or before it meets the target: a nearer sender is received more strongly, and the interference at the receiver does not
 //! depend on it. So the next set has two kinds of pieces: positions inside an interval of the last set (sender straight below or
-//! above), and positions in the gap after an interval (sender at the interval's end).
+//! above), and positions in the gap after an interval (sender at the interval's end). A least separation shifts both pieces by
+//! the least advance along x.
 
 use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
@@ -16,20 +17,8 @@ impl Link {
     /// `None` only if there is no such chain, whatever the altitudes. Per relay and interval about 300 SIR evaluations; there are
     /// seldom more than three intervals.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
-        let first = Hop::new(self, 1, 0.0)?;
-        let turns = first.turns(0.0, self.distance_m);
-        let mut sets = vec![where_true(0.0, &turns, self.distance_m, |x| {
-            first.meets(x, target)
-        })];
-        for k in 2..=self.len() {
-            let next = self.next_set(k, sets.last()?, target);
-            sets.push(next);
-        }
-        // The SIR at Rx rises all the way to D, so only the last position of the last set needs to be tried.
-        let mut limit = sets.last()?.last()?.1;
-        if !meets(self.sir_rx(limit)?, target) {
-            return None;
-        }
+        let sets = self.sets(target, 0.0)?;
+        let mut limit = self.distance_m;
         let mut x = Vec::with_capacity(self.len());
         for set in sets.iter().rev() {
             limit = last_at_or_before(set, limit)?;
@@ -39,23 +28,63 @@ impl Link {
         Some(x)
     }
 
-    /// Returns the set of relay `k` in 2..=N from that of relay k-1.
-    fn next_set(&self, k: usize, set: &[Interval], target: f64) -> Vec<Interval> {
+    /// Returns the best SIR (linear) of relays at their altitudes that keep the least separation, to 1e-13 relative.
+    ///
+    /// `None` as for [`Link::optimum`], or if the separation leaves no chain.
+    pub fn optimum_apart(&self) -> Option<f64> {
+        self.largest_target(|target| self.sets(target, self.min_separation_m).is_some())
+    }
+
+    /// Returns the least advance along x of relay `k` past relay k-1, m, for neighbours `apart_m` apart. 0 for relay 1.
+    pub(super) fn least_advance(&self, k: usize, apart_m: f64) -> f64 {
+        let altitude = |k: usize| Some(self.relays.get(k.checked_sub(1)?)?.altitude_m);
+        let pair = altitude(k).zip(k.checked_sub(1).and_then(altitude));
+        pair.map_or(0.0, |(own, before)| {
+            (apart_m * apart_m - (own - before).powi(2)).max(0.0).sqrt()
+        })
+    }
+
+    /// Returns the reachable positions of every relay, with neighbours `apart_m` apart; `None` if `target` is missed.
+    fn sets(&self, target: f64, apart_m: f64) -> Option<Vec<Vec<Interval>>> {
+        let first = Hop::new(self, 1, 0.0)?;
+        let turns = first.turns(0.0, self.distance_m);
+        let mut sets = vec![where_true(0.0, &turns, self.distance_m, |x| {
+            first.meets(x, target)
+        })];
+        for k in 2..=self.len() {
+            let next = self.next_set(k, sets.last()?, target, self.least_advance(k, apart_m));
+            sets.push(next);
+        }
+        // The SIR at Rx rises all the way to D, so only the last position of the last set needs to be tried.
+        let tail = sets.last()?.last()?.1;
+        meets(self.sir_rx(tail)?, target).then_some(sets)
+    }
+
+    /// Returns the set of relay `k` in 2..=N from that of relay k-1, at least `advance` m behind.
+    fn next_set(&self, k: usize, set: &[Interval], target: f64, advance: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set
             .iter()
             .skip(1)
             .map(|next| next.0)
             .chain([self.distance_m]);
+        let past = |x: f64| (x + advance).min(self.distance_m);
         for (&(start, end), gap_end) in set.iter().zip(gap_ends) {
-            // Straight above one another the signal is constant, and the interference is largest abreast of the interferer.
-            let abreast = self.x_i.clamp(start, end);
-            pieces.extend(where_true(start, &[abreast], end, |x| {
-                self.sir_relay(k, x, x)
+            if start + advance > self.distance_m {
+                break;
+            }
+            // With the sender as close behind as possible the signal is constant: interference is largest abreast.
+            let (low, high) = (start + advance, past(end));
+            let abreast = self.x_i.clamp(low, high);
+            pieces.extend(where_true(low, &[abreast], high, |x| {
+                self.sir_relay(k, x - advance, x)
                     .is_some_and(|sir| meets(sir, target))
             }));
-            if let Some(hop) = Hop::new(self, k, end) {
-                pieces.extend(where_true(end, &hop.turns(end, gap_end), gap_end, |x| {
+            if end + advance <= self.distance_m
+                && let Some(hop) = Hop::new(self, k, end)
+            {
+                let (low, high) = (end + advance, past(gap_end));
+                pieces.extend(where_true(low, &hop.turns(low, high), high, |x| {
                     hop.meets(x, target)
                 }));
             }

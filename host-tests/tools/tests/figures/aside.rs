@@ -1,6 +1,7 @@
 //! Relay beside the line: positions and gains, against the three-dimensional reference.
 
-use uav_relay_oracle::reference::joint::{Corridor, Effort, Place, optimum, sir};
+use uav_relay_oracle::recorded::optimum;
+use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_tools::figures::aside::{ALTITUDES_M, MOST_ROOM_M, OFFSETS_M, RELAY_W, ROOM_M};
 
@@ -25,7 +26,7 @@ fn judged(y_i: f64, room_m: f64, most_m: f64) -> f64 {
         left_m: -room_m,
         right_m: room_m,
     };
-    let best = optimum(&link(y_i), corridor, &[], Effort::usual(1));
+    let best = optimum(&link(y_i), corridor, &[]).unwrap();
     best.unwrap().sir
 }
 

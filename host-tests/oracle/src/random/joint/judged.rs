@@ -10,8 +10,8 @@ use super::{Scenario, in_space};
 /// Number of scenarios.
 pub const COUNT: u32 = 2000;
 
-/// File with the optima.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
+/// File with the optima; its head names their origin.
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
 const SEED: u64 = 2021;
 
@@ -28,7 +28,11 @@ pub fn numbered(number: u32) -> Scenario {
 /// If the file cannot be read, or a row is not a number and an SIR.
 pub fn optima() -> io::Result<Vec<f64>> {
     let mut optima = Vec::new();
-    for row in csv::Reader::from_path(PATH)?.deserialize() {
+    for row in csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .from_path(PATH)?
+        .deserialize()
+    {
         let (number, sir): (usize, f64) = row?;
         if number != optima.len() {
             return Err(io::Error::other(format!("row of number {number}")));

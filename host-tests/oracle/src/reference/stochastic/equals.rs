@@ -1,4 +1,4 @@
-//! The best chain of identical relays.
+//! The best chain of identical relays under constant interference.
 
 use super::link::StochasticLink;
 
@@ -40,65 +40,5 @@ impl StochasticLink {
             }
         }
         Some(low)
-    }
-
-    /// Returns the SIR (linear) of the worst hop of the best chain of relays like the first, in any field.
-    ///
-    /// Without a least separation; relays need not be as far out as they could be.
-    pub fn best(&self) -> f64 {
-        let Some(relay) = self.relays.first() else {
-            return 0.0;
-        };
-        let d = self.distance_m;
-        let mut cuts: Vec<f64> = self.upsilon.iter().map(|point| point.0).collect();
-        cuts.retain(|x| *x > 0.0 && *x < d);
-        cuts.push(d);
-        let least = |low: f64, value: &dyn Fn(f64) -> f64| {
-            let mut left = low;
-            let mut best = value(low);
-            for &right in cuts.iter().filter(|cut| **cut > low) {
-                let (mut a, mut b) = (left, right);
-                for _ in 0..60 {
-                    let (p, q) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
-                    if value(p) <= value(q) { b = q } else { a = p }
-                }
-                best = best.min(value(0.5 * (a + b))).min(value(right));
-                left = right;
-            }
-            best
-        };
-        let met = |target: f64| {
-            let h2 = relay.altitude_m.powi(2);
-            let last = relay.power_w * self.upsilon_at(d) / (self.eta * target) - h2;
-            if last < 0.0 {
-                return false;
-            }
-            let mut low = (d - last.sqrt()).max(0.0);
-            let hop =
-                |y: f64| y - (relay.power_w * self.upsilon_at(y) / (self.mu_los * target)).sqrt();
-            for _ in 1..self.relays.len() {
-                low = least(low, &hop).max(0.0).min(low);
-            }
-            // Convex where the first hop's square is above 0, which is the relevant part.
-            let head = |x: f64| x * x + h2 - self.tx_w * self.upsilon_at(x) / (self.eta * target);
-            least(low, &head) <= 0.0
-        };
-        let (mut low, mut high) = (0.0, self.ceiling());
-        for k in 0..60 {
-            let middle: f64 = if k < 30 && low <= 0.0 {
-                high / 10.0
-            } else {
-                0.5 * (low + high)
-            };
-            if met(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-            if high - low < 1e-6 * low {
-                break;
-            }
-        }
-        low
     }
 }

@@ -1,0 +1,196 @@
+//! Recorded optima of the joint problem: positions, altitudes and sides that maximise the worst hop's SIR.
+//!
+//! `data/optima.jsonl` has one scene per line after its head: the parameters, the best SIR known, and the positions that reach it.
+//! The problem has many local optima and no proof of the best one, so the optima are those of a search with many starts, which is
+//! no longer part of the project; the file's head names it.
+//!
+//! The tests of the crate's solvers look up the scenes that they draw ([`optimum`]). The test `recorded` checks the file itself.
+
+use std::io::{Error, Result};
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+use uav_relay_scenario::number::narrow;
+
+use crate::random::joint::Scenario;
+use crate::reference::joint::{Corridor, Hold, Place};
+use crate::reference::{Link, Station};
+
+const FILE: &str = include_str!("../data/optima.jsonl");
+
+static ALL: LazyLock<std::result::Result<Vec<Record>, String>> = LazyLock::new(|| {
+    let rows = FILE.lines().skip(1).map(|line| {
+        let row: Row = serde_json::from_str(line).map_err(|error| format!("{error}: {line}"))?;
+        Ok(row.record())
+    });
+    rows.collect()
+});
+
+/// Best chain known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Optimum {
+    /// SIR (linear) of the worst hop.
+    pub sir: f64,
+    /// Positions from Tx to Rx; empty where the file has only the SIR.
+    pub places: Vec<Place>,
+}
+
+/// A scene with its best chain.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Test and random stream that draw the scene.
+    pub set: String,
+    /// Scene; its relays are at the corridor's lowest altitude.
+    pub scene: Scenario,
+    /// Best chain; `None` if no chain has a positive SIR and keeps the least separation.
+    pub best: Option<Optimum>,
+    key: Vec<f32>,
+}
+
+/// One line of the file, in metres and watts.
+#[derive(Deserialize)]
+struct Row {
+    set: String,
+    relays: usize,
+    distance_m: f64,
+    #[serde(default)]
+    apart_m: f64,
+    tx_w: f64,
+    /// Power of every relay; a single one if they are alike.
+    relay_w: Vec<f64>,
+    /// Power, x and y.
+    interferer: [f64; 3],
+    mu_los: f64,
+    mu_nlos: f64,
+    eta: f64,
+    #[serde(default)]
+    noise_w: f64,
+    /// Lowest and highest altitude, least and largest y.
+    corridor: [f64; 4],
+    /// Index from 0, y and altitude of relays with a fixed cross-section position.
+    #[serde(default)]
+    held: Vec<(usize, f64, f64)>,
+    sir: f64,
+    #[serde(default)]
+    places: Vec<[f64; 3]>,
+}
+
+impl Row {
+    fn record(self) -> Record {
+        // The numbers are f32, printed in their shortest form.
+        let single = |value: f64| f64::from(narrow(value));
+        let [least_m, most_m, left_m, right_m] = self.corridor.map(single);
+        let [interferer_w, x_i, y_i] = self.interferer.map(single);
+        let powers = self.relay_w.iter().copied().cycle().take(self.relays);
+        let link = Link {
+            distance_m: single(self.distance_m),
+            min_separation_m: single(self.apart_m),
+            tx_w: single(self.tx_w),
+            interferer_w,
+            x_i,
+            y_i,
+            mu_los: self.mu_los,
+            mu_nlos: self.mu_nlos,
+            eta: self.eta,
+            noise_w: single(self.noise_w),
+            relays: powers
+                .map(|power_w| Station {
+                    altitude_m: least_m,
+                    power_w: single(power_w),
+                })
+                .collect(),
+        };
+        let corridor = Corridor {
+            least_m,
+            most_m,
+            left_m,
+            right_m,
+        };
+        let hold = |&(relay, y_m, altitude_m): &(usize, f64, f64)| Hold {
+            relay,
+            y_m: single(y_m),
+            altitude_m: single(altitude_m),
+        };
+        let held: Vec<Hold> = self.held.iter().map(hold).collect();
+        // Decimals may be rounded to beyond a wall.
+        let place = |(relay, &[x_m, y_m, altitude_m]): (usize, &[f64; 3])| {
+            let room = Hold::room(&held, relay, corridor);
+            Place {
+                x_m: x_m.clamp(0.0, link.distance_m),
+                y_m: y_m.clamp(room.left_m, room.right_m),
+                altitude_m: altitude_m.clamp(room.least_m, room.most_m),
+            }
+        };
+        let places = self.places.iter().enumerate().map(place).collect();
+        Record {
+            set: self.set,
+            key: key(&link, corridor, &held),
+            best: (self.sir > 0.0).then_some(Optimum {
+                sir: self.sir,
+                places,
+            }),
+            scene: Scenario {
+                link,
+                corridor,
+                held,
+            },
+        }
+    }
+}
+
+/// Returns all parameters of a scene in f32, without the altitudes of `link`, which the joint problem ignores.
+fn key(link: &Link, corridor: Corridor, held: &[Hold]) -> Vec<f32> {
+    let common = [
+        link.distance_m,
+        link.min_separation_m,
+        link.tx_w,
+        link.interferer_w,
+        link.x_i,
+        link.y_i,
+        link.mu_los,
+        link.mu_nlos,
+        link.eta,
+        link.noise_w,
+        corridor.least_m,
+        corridor.most_m,
+        corridor.left_m,
+        corridor.right_m,
+    ];
+    let powers = link.relays.iter().map(|relay| relay.power_w);
+    #[expect(clippy::cast_precision_loss, reason = "at most a thousand relays")]
+    let held = held
+        .iter()
+        .flat_map(|hold| [hold.relay as f64, hold.y_m, hold.altitude_m]);
+    common
+        .into_iter()
+        .chain(powers)
+        .chain(held)
+        .map(narrow)
+        .collect()
+}
+
+/// Returns every scene of the file.
+///
+/// # Errors
+/// If a line of the file is not a scene.
+pub fn all() -> Result<&'static [Record]> {
+    let all = ALL.as_ref().map(Vec::as_slice);
+    all.map_err(|error| Error::other(error.clone()))
+}
+
+/// Returns the best chain known of a link in a corridor; the altitudes in `link` are ignored.
+///
+/// `None` if no chain has a positive SIR and keeps the least separation.
+///
+/// # Errors
+/// If the scene is not recorded: `SEED` and `COUNT` of a test can select recorded scenes only.
+pub fn optimum(link: &Link, corridor: Corridor, held: &[Hold]) -> Result<Option<Optimum>> {
+    let wanted = key(link, corridor, held);
+    let found = all()?.iter().find(|record| record.key == wanted);
+    found.map(|record| record.best.clone()).ok_or_else(|| {
+        let scene = format!("{link:?}, {corridor:?}, {held:?}");
+        Error::other(format!(
+            "no recorded optimum of this scene; SEED and COUNT can select recorded ones only: {scene}"
+        ))
+    })
+}
