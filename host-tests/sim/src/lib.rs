@@ -9,7 +9,6 @@
 //! | [`cli`] | `cargo chain` without its file and terminal access |
 //! | [`command`] | code shared by all commands |
 
-pub mod beta;
 pub mod cli;
 pub mod report;
 pub mod simulator;

@@ -2,11 +2,10 @@
 
 use uav_relay::{Interference, Interferer};
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_tools::figures::error::FigureError;
-use uav_relay_tools::listening::found::{
-    self, LAST, Shares, hypothetical, quantile, shadowed, unknown,
+use uav_relay_tools::figures::sheet::FigureError;
+use uav_relay_tools::listening::{
+    self, LAST, RandomScene, Shares, hypothetical, quantile, shadowed, unknown,
 };
-use uav_relay_tools::listening::scene::RandomScene;
 
 use crate::count;
 
@@ -15,7 +14,7 @@ fn shares(
     sources: usize,
     setup: impl Fn(&RandomScene) -> Result<Setup, FigureError> + Sync,
 ) -> Shares {
-    found::shares(count(200), relays, sources, setup).unwrap()
+    listening::shares(count(200), relays, sources, setup).unwrap()
 }
 
 fn print(what: &str, shares: &mut Shares) {

@@ -22,24 +22,12 @@
 //! | [`chain`] | the event loop that connects the relays |
 
 pub mod attack;
-pub mod bursts;
 pub mod chain;
 pub mod drones;
 pub mod faults;
-pub mod film;
 pub mod fleet;
-pub mod flying;
-pub mod forge;
-pub mod link;
-pub mod longest;
 pub mod medium;
-pub mod one_way;
-pub mod optima;
-pub mod optimum;
 pub mod outcome;
-pub mod parallel;
-pub mod queue;
-pub mod record;
 pub mod setup;
 pub mod true_interference;
 pub mod watch;

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{chain, json};
+use super::{chain, json, refusal, refusals};
 
 #[test]
 fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
@@ -178,5 +178,214 @@ fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     assert!(
         attack["formed"].as_u64() > attack["formed_without"].as_u64(),
         "{attack}"
+    );
+}
+
+#[test]
+fn a_shared_channel_is_csma_unless_said_otherwise() {
+    for (extra, access) in [
+        (&["--shared"][..], Some("csma")),
+        (&["--air", "csma"], Some("csma")),
+        (&["--air", "aloha"], Some("aloha")),
+        (&["--air", "ideal"], None),
+        (&["--wires"], None),
+    ] {
+        let report = json(&[&["--uavs", "4", "--loss", "0.2"], extra].concat());
+        assert_eq!(report["air"]["access"].as_str(), access, "{extra:?}");
+        let shared = (extra != ["--wires"]).then_some("shared");
+        assert_eq!(report["channel"].as_str(), shared, "{extra:?}");
+        assert!(report["sir"].as_f64().unwrap() > 1.0, "{extra:?}");
+    }
+}
+
+#[test]
+fn a_slow_link_takes_longer() {
+    let took = |baud| json(&["--baud", baud])["virtual_s"].as_f64().unwrap();
+    let (fast, usual, slow) = (took("1000000"), took("115200"), took("9600"));
+    assert!(fast < usual && 5.0 * usual < slow, "{fast} {usual} {slow}");
+}
+
+#[test]
+fn what_the_channel_cannot_carry_is_refused_before_flight() {
+    for (uavs, sharing, least) in [
+        ("2", "csma", 4_694),
+        ("8", "csma", 32_854),
+        ("8", "aloha", 32_854),
+        ("100", "csma", 37_547),
+    ] {
+        let below = (least - 1).to_string();
+        let arguments = ["--uavs", uavs, "--air", sharing, "--baud", &below];
+        let (status, line) = refusal(&arguments);
+        assert_eq!(status, 2, "{arguments:?}");
+        let says = format!("--baud {below}: must be within {least} to 10000000: ");
+        assert!(line.starts_with(&says), "{line}");
+    }
+    for (sharing, baud) in [("csma", "32854"), ("ideal", "9600")] {
+        let report = json(&["--uavs", "8", "--air", sharing, "--baud", baud]);
+        assert!(report["sir"].as_f64().unwrap() > 1.0, "{sharing}");
+    }
+    assert!(
+        json(&["--baud", "9600", "--wires"])["sir"]
+            .as_f64()
+            .unwrap()
+            > 1.0
+    );
+}
+
+#[test]
+fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
+    let arguments = ["--soak", "200", "--kill", "4@20", "--boot", "4@60"];
+    let report = json(&arguments);
+    assert_eq!(report["virtual_s"], 200.0);
+    let number = |key: &str| report[key].as_f64().unwrap();
+    assert!((0.5..0.98).contains(&number("availability")), "{report}");
+    assert!(number("longest_outage_s") > 5.0 && number("first_agreement_s") < 2.0);
+    assert_eq!(report["most_flying"], 1);
+    assert!(number("least_separation_m") > 0.0);
+    let text = String::from_utf8(chain(&arguments).stdout).unwrap();
+    for line in [
+        "air (csma, 115200 baud): load 0.",
+        "availability: 0.",
+        "at the same time: 1",
+        "least separation of two relays: ",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+}
+
+#[test]
+fn a_soak_of_a_good_chain_is_right_all_the_time_by_any_link() {
+    for extra in [&["--air", "ideal"][..], &["--wires"]] {
+        let report = json(&[&["--soak", "60"], extra].concat());
+        assert_eq!(report["availability"], 1.0, "{extra:?}");
+        assert_eq!(report["longest_outage_s"], 0.0, "{extra:?}");
+    }
+}
+
+#[test]
+fn losses_in_runs_have_the_mean_share_that_was_asked_for() {
+    let soaked = ["--soak", "600", "--air", "ideal", "--loss", "0.3"];
+    for burst in ["1", "20"] {
+        let report = json(&[&soaked[..], &["--burst", burst]].concat());
+        let lost = report["faults"]["lost"].as_f64().unwrap();
+        // On the ideal channel relays 1 to 8 have 4, 5, 6, 7, 7, 6, 5, 4 receivers and send about equally often.
+        let received = report["messages"].as_f64().unwrap() * 5.5;
+        assert!((lost / received - 0.3).abs() < 0.06, "{burst}: {report}");
+    }
+}
+
+#[test]
+fn the_story_tells_who_does_not_hear_whom() {
+    let output = chain(&["--deaf", "4:3@5-9", "--soak", "20"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "5.000 s  relay 4 does not receive relay 3",
+        "9.000 s  relay 4 receives relay 3 again",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let report = json(&["--deaf", "4:3@5", "--soak", "20"]);
+    let deaf: Vec<&Value> = report["timeline"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|moment| moment["what"] == "does not receive")
+        .collect();
+    assert_eq!(deaf.len(), 1);
+    assert_eq!(
+        (deaf[0]["relay"].as_u64(), deaf[0]["other"].as_u64()),
+        (Some(4), Some(3))
+    );
+}
+
+#[test]
+fn wrong_options_of_the_air_are_named_with_what_is_allowed() {
+    insta::assert_snapshot!(refusals(&[
+        "--air csma --wires",
+        "--air tdma",
+        "--baud 299",
+        "--burst 0.5",
+        "--burst 2 --loss 0.7",
+        "--deaf 4:3",
+        "--deaf 4@3",
+        "--deaf 4:4@1",
+        "--deaf 4:3@9-5",
+        "--deaf 9:3@1",
+        "--deaf 3:0@1",
+        "--soak 0",
+    ]));
+}
+
+const TOML: &str =
+    "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[listen]\n";
+
+#[test]
+fn what_is_heard_comes_from_an_interferer() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("listen.toml");
+    std::fs::write(&file, TOML).unwrap();
+    let name = file.to_str().unwrap();
+    let (status, text) = refusal(&["--scenario", name, "--uavs", "3", "--listen"]);
+    assert_eq!(status, 2, "{text}");
+    assert!(text.contains("interferer: is missing"), "{text}");
+    let source = "[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";
+    std::fs::write(&file, format!("{TOML}following = true\n{source}")).unwrap();
+    let options = [
+        "--scenario",
+        name,
+        "--uavs",
+        "3",
+        "--listen",
+        "--listen-for",
+        "30",
+    ];
+    assert!(json(&options)["sir"].is_number());
+}
+
+/// Checks the strip of events of relays that spread evenly at first. They have agreed on no SIR then.
+#[test]
+fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("listen.svg");
+    let name = file.to_str().unwrap();
+    let options = ["--uavs", "3", "--listen", "--listen-for", "30"];
+    let output = chain(&[&options[..], &["--svg", name]].concat());
+    assert!(output.status.success(), "{output:?}");
+    let svg = std::fs::read_to_string(&file).unwrap();
+    assert!(svg.contains(">spread<"), "{svg}");
+    assert!(!svg.contains("SIR 0.000"), "{svg}");
+}
+
+/// The SIR and the optimum are those of the remaining relays.
+#[test]
+fn a_lost_relay_does_not_count() {
+    let options = [
+        "--uavs",
+        "6",
+        "--kill",
+        "4@20",
+        "--listen",
+        "--listen-for",
+        "120",
+    ];
+    let report = json(&options);
+    let of = |name: &str| report[name].as_f64().unwrap();
+    assert_eq!(report["lost"][0]["index"].as_u64(), Some(4), "{report}");
+    let [worst, true_sir, share] = ["sir", "true_sir", "share_of_optimum"].map(of);
+    assert!((true_sir / worst - 1.0).abs() < 0.01, "{report}");
+    assert!(share > 0.99 && share < 1.01, "{report}");
+    assert!((true_sir / of("optimum_sir") - share).abs() < 1e-6);
+    // The optimum is that of five relays, not six.
+    let five = json(&["--uavs", "5"]);
+    let optimum = five["sir"].as_f64().unwrap();
+    assert!((of("optimum_sir") / optimum - 1.0).abs() < 1e-3, "{report}");
+    let table = String::from_utf8(chain(&options).stdout).unwrap();
+    let line = table
+        .lines()
+        .find(|line| line.starts_with("true SIR "))
+        .unwrap();
+    assert!(
+        !line.contains("inf") && !line.contains("0.0000 of"),
+        "{line}"
     );
 }

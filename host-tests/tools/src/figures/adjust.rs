@@ -5,10 +5,9 @@ use serde::Serialize;
 use uav_relay::{Adjust, Local, Method, Mission, Schedule};
 
 use super::chart::{Axis, Chart, Line, Look, Stroke};
-use super::error::FigureError;
-use super::flight::{Flown, fly};
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
+use super::walk::{Flown, fly};
 
 /// Number of relays.
 pub const RELAYS: u16 = 50;

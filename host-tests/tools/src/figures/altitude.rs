@@ -6,8 +6,7 @@ use uav_relay::Schedule;
 use uav_relay::optimiser::plan;
 
 use super::chart::{Axis, Chart, Line, Look, Panel, Stroke};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{convergence, paper, walk};
 
 /// Number of relays.

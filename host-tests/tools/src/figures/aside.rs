@@ -6,9 +6,8 @@ use uav_relay::Mission;
 use uav_relay::planning::single::{Found, aside, theorems};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
 /// Power of the relay, W.

@@ -5,8 +5,7 @@ use serde::Serialize;
 use uav_relay::FieldPoint;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 
 /// Shape parameters alpha and beta.
 pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];

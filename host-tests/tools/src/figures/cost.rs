@@ -5,9 +5,8 @@ use serde::Serialize;
 use uav_relay::{Method, Schedule};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::flight::{Flown, fly};
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
+use super::walk::{Flown, fly};
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 

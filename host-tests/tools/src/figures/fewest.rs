@@ -5,9 +5,8 @@ use serde::Serialize;
 use uav_relay::planning::fleet::Fewest;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
 /// Largest target, linear SIR; every whole number from 1 to it is computed.

@@ -4,11 +4,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{paper, walk};
-use crate::baseline::random::{DRAWS, mean};
-use crate::baseline::{blind, equal};
+use crate::baseline::{DRAWS, blind_places, equal_places, mean};
 use uav_relay_scenario::scene::Scene;
 
 /// Largest number of relays; every N from 1 to it is drawn.
@@ -56,8 +54,8 @@ fn row(relays: u16, draws: u32) -> Result<Row, FigureError> {
     let sir = walk::settled(&mission)?.sir;
     let scene = Scene::new(&paper::multi_hop(), relays).ok_or(FigureError::Unsettled("a scene"))?;
     let random = mean(&scene, draws, SEED + u64::from(relays));
-    let blind = scene.sir_along(&blind::places(&scene));
-    let equal = scene.sir_along(&equal::places(&scene));
+    let blind = scene.sir_along(&blind_places(&scene));
+    let equal = scene.sir_along(&equal_places(&scene));
     let percent = |over: f64| 100.0 * (sir / over - 1.0);
     Ok(Row {
         relays,

@@ -7,10 +7,9 @@ use uav_relay::{Local, Method, Schedule};
 use super::adjust::adjusted;
 use super::altitude::best_common;
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::flight::fly;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
+use super::walk::fly;
 
 /// Numbers of relays.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];

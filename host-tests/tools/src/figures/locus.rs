@@ -5,9 +5,8 @@ use uav_relay::Mission;
 use uav_relay::planning::single::theorems::equal_altitudes;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
 /// Power of Tx, W, and position of the interferer, m, for each line.

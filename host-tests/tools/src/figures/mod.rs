@@ -25,26 +25,18 @@ pub mod chart;
 pub mod convergence;
 pub mod cost;
 pub mod draw;
-pub mod error;
 pub mod fewest;
-pub mod flight;
 pub mod gain;
 pub mod joint;
 pub mod locus;
-pub mod page;
 pub mod paper;
-pub mod scale;
 pub mod sensing;
 pub mod sheet;
-mod signs;
 pub mod single;
-pub mod single_gains;
-pub mod single_sheet;
 pub mod stochastic;
 pub mod walk;
 
-use error::FigureError;
-use sheet::Sheet;
+use sheet::{FigureError, Sheet};
 
 /// A figure.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +50,7 @@ pub struct Figure {
 /// The figures in the order of the paper, then this project's own.
 pub const ALL: [Figure; 16] = [
     figure("locus", locus::sheet),
-    figure("single", single_sheet::sheet),
+    figure("single", single::sheet),
     figure("fewest-by-place", fewest::by_place_sheet),
     figure("fewest-by-power", fewest::by_power_sheet),
     figure("convergence", convergence::sheet),

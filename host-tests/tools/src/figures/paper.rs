@@ -2,9 +2,8 @@
 
 use uav_relay::Mission;
 
-use super::error::FigureError;
-use uav_relay_scenario::mission;
-use uav_relay_scenario::{Interference, Scenario, Source};
+use super::sheet::FigureError;
+use uav_relay_scenario::{Interference, Scenario, Source, mission};
 
 /// Relative target tolerance for chains computed without messages: ten times the resolution of an f32.
 pub(super) const FINE: f64 = 1e-6;

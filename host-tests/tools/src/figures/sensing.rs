@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
-use crate::listening::found::{self, LAST, hypothetical, quantile, shadowed, shares, unknown};
-use crate::listening::moving::{self, mean};
-use crate::listening::scene::RandomScene;
+use super::sheet::{FigureError, Sheet, Table};
+use crate::listening::{
+    LAST, RandomScene, Shares, hypothetical, mean, moving_shares, quantile, shadowed, shares,
+    unknown,
+};
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Random scenes per line.
@@ -65,7 +65,7 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
 pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
-        let each: found::Shares = shares(scenes, relays, sources, run)?;
+        let each: Shares = shares(scenes, relays, sources, run)?;
         for (agreements, mut shares) in each.into_iter().enumerate() {
             rows.push(Found {
                 scene: what,
@@ -87,7 +87,7 @@ pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {
         for speed_mps in SPEEDS_MPS {
-            let shares = moving::shares(scenes, relays, speed_mps)?;
+            let shares = moving_shares(scenes, relays, speed_mps)?;
             rows.push(Followed {
                 relays,
                 speed_mps,

@@ -6,8 +6,7 @@ use serde::Serialize;
 use uav_relay::Mission;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{convergence, paper, walk};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 

@@ -7,8 +7,7 @@
 use serde::Serialize;
 use uav_relay_scenario::{Interference, Scenario};
 
-use super::found::{NoPlan, Plan};
-use super::request::{Number, PlanRequest};
+use super::{NoPlan, Number, Plan, PlanRequest};
 
 /// Largest number of relays tried where a plan takes milliseconds.
 const MOST_FAST: u16 = 200;

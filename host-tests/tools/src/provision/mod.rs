@@ -9,8 +9,6 @@
 //! | [`summary`] | `summary.txt`: the folder's content and the commands to flash it |
 
 pub mod block;
-pub mod firmware;
 pub mod folder;
-pub mod summary;
 
 pub use uav_relay_block as config;

@@ -4,10 +4,7 @@
 use std::process::{Command, Output};
 
 use ihex::{Reader, Record};
-use uav_relay_tools::image::board::Board;
-use uav_relay_tools::image::elf::{Piece, flat, pieces};
-use uav_relay_tools::image::uf2::{Family, PAGE};
-use uav_relay_tools::image::{hex, uf2};
+use uav_relay_tools::image::{Board, Family, PAGE, Piece, flat, hex, pieces, uf2};
 use uav_relay_tools::provision::config::LEN;
 
 fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
@@ -61,7 +58,7 @@ fn an_image_is_stored_where_its_elf_says_and_blank_in_between() {
 #[test]
 fn a_reader_of_intel_hex_finds_the_same_bytes() {
     let example = example();
-    let file = hex::file(&example).unwrap();
+    let file = hex(&example).unwrap();
     let mut found = vec![0xFF; 0x3_0005];
     let mut above = 0;
     let mut ended = false;
@@ -83,7 +80,7 @@ fn a_reader_of_intel_hex_finds_the_same_bytes() {
 #[test]
 fn a_uf2_file_has_whole_blocks_with_whole_pages() {
     let example = example();
-    let file = uf2::file(&example, Family::RP2350).unwrap();
+    let file = uf2(&example, Family::RP2350).unwrap();
     let word = |block: &[u8], at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
     assert_eq!(file.len() % 512, 0);
     let count = u32::try_from(file.len() / 512).unwrap();
