@@ -200,9 +200,6 @@ pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
 const RECORD: u8 = 16;
 
 /// Returns the HEX hex_file, with 32-bit addresses.
-///
-/// # Errors
-/// If `ihex` rejects a record.
 pub fn hex(pieces: &[Piece]) -> Result<String, String> {
     let mut records = Vec::new();
     let mut above = None;

@@ -75,17 +75,11 @@ impl RandomScene {
     }
 
     /// Returns the true scene.
-    ///
-    /// # Errors
-    /// [`FigureError::Unsettled`] if there are no sources.
     pub fn scene(&self) -> Result<Scene, FigureError> {
         Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
     }
 
     /// Returns the mission of the relays, with `guess` as its interference.
-    ///
-    /// # Errors
-    /// [`FigureError::Mission`].
     pub fn mission(&self, guess: Interference) -> Result<Mission, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
         let config = MissionConfig {
@@ -98,9 +92,6 @@ impl RandomScene {
     /// Returns the best SIR with the interferers known, linear.
     ///
     /// For one source it is the SIR of the chain that knows it, for several the exact optimum.
-    ///
-    /// # Errors
-    /// [`FigureError`].
     pub fn optimum(&self) -> Result<f64, FigureError> {
         let scene = self.scene()?;
         if scene.sources.len() > 1 {
@@ -110,9 +101,6 @@ impl RandomScene {
     }
 
     /// Returns the positions of a chain that knows the interferer. For several sources, the paper's hypothetical one.
-    ///
-    /// # Errors
-    /// [`FigureError`].
     pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
@@ -121,9 +109,6 @@ impl RandomScene {
     }
 
     /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.
-    ///
-    /// # Errors
-    /// [`FigureError`].
     pub fn setup(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = Setup::new(self.mission(guess)?);
         setup.seed = self.seed;
@@ -138,9 +123,6 @@ impl RandomScene {
     }
 
     /// Returns a simulation with drones of 10 m/s. They start beside the transmitter and measure every second in flight.
-    ///
-    /// # Errors
-    /// [`FigureError`].
     pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = self.setup(guess)?;
         let start = (1..=self.relays)
@@ -174,9 +156,6 @@ pub const LAST: usize = 8;
 pub type Shares = [Vec<f64>; LAST + 1];
 
 /// Returns the shares in `scenes` random scenes, each run with `setup`.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn shares(
     scenes: u64,
     relays: u16,
@@ -202,17 +181,11 @@ pub fn shares(
 }
 
 /// Setup without prior knowledge of the interference.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn unknown(wild: &RandomScene) -> Result<Setup, FigureError> {
     wild.setup(Interference::Unknown)
 }
 
 /// The setup of [`unknown`] with 1 dB of shadowing, independent at each position.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     if let Some(sky) = &mut setup.sky {
@@ -222,9 +195,6 @@ pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
 }
 
 /// Setup without measurements. The relays know the interferer, or the paper's hypothetical one for several sources.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     (setup.mission, _) = mission(&wild.scenario, wild.relays, 1e-4)?;
@@ -258,9 +228,6 @@ pub struct MovingShares {
 }
 
 /// Returns the ratios in `scenes` scenes while a single interferer passes at a distance of 300 m.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn moving_shares(
     scenes: u64,
     relays: u16,

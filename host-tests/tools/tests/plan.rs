@@ -15,26 +15,24 @@ use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
 
-fn plan(arguments: &[&str]) -> Output {
+fn plan(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plan"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
-fn json(arguments: &[&str]) -> Value {
-    let mut all = vec!["--json"];
-    all.extend(arguments);
-    let output = plan(&all);
+fn json(arguments: &str) -> Value {
+    let output = plan(&format!("--json {arguments}"));
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
         output.status.success() && text.is_empty(),
-        "{arguments:?}: {text}"
+        "{arguments}: {text}"
     );
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-fn refusal(arguments: &[&str]) -> (i32, String) {
+fn refusal(arguments: &str) -> (i32, String) {
     let output = plan(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
@@ -87,18 +85,16 @@ fn with_the_papers_channel(function: &str) -> Vec<Case> {
 #[test]
 fn the_theorems_of_the_reference_come_out_of_the_command() {
     for (function, options) in [
-        ("theorem1", &["--uavs", "1"][..]),
-        ("theorem3", &["--uavs", "1", "--altitude", "free"]),
-        ("theorem2", &["--uavs", "1", "--x-m"]),
+        ("theorem1", "--uavs 1"),
+        ("theorem3", "--uavs 1 --altitude free"),
+        ("theorem2", "--uavs 1 --x-m"),
     ] {
         for mut case in with_the_papers_channel(function) {
             case.params.h = case.arg("h").unwrap_or(case.params.h_min);
-            let x_m = case.arg("x").map(|x| format!("{x:?}"));
+            let x_m = case.arg("x").map(|x| format!("{x:?}")).unwrap_or_default();
             let file = scenario(&case, &interferer(&case));
-            let mut arguments = vec!["--scenario", file.path().to_str().unwrap()];
-            arguments.extend(options);
-            arguments.extend(x_m.as_deref());
-            let report = json(&arguments);
+            let path = file.path().display();
+            let report = json(&format!("--scenario {path} {options} {x_m}"));
             let sir = number(&report["sir"]);
             assert!(
                 (sir / case.part("sir").unwrap() - 1.0).abs() < 1e-5,
@@ -123,7 +119,7 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
 #[test]
 fn one_relay_aside_is_the_judges_of_three_dimensions() {
     let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
-    let report = json(&["--scenario", side, "--uavs", "1", "--altitude", "free"]);
+    let report = json(&format!("--scenario {side} --uavs 1 --altitude free"));
     assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
     assert_eq!(report["how"].as_str(), Some("one relay aside"));
     assert_eq!(report["proven"].as_bool(), Some(true));
@@ -142,7 +138,7 @@ fn one_relay_aside_is_the_judges_of_three_dimensions() {
     let sir = number(&report["sir"]);
     assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
     // With a given altitude it stays above the line.
-    let report = json(&["--scenario", side, "--uavs", "1"]);
+    let report = json(&format!("--scenario {side} --uavs 1"));
     assert_eq!(report["theorem"].as_u64(), Some(1), "{report}");
 }
 
@@ -152,7 +148,7 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
         let file = scenario(&case, &interferer(&case));
         let target = format!("{:?}", case.arg("gamma").unwrap());
         let path = file.path().to_str().unwrap();
-        let report = json(&["--scenario", path, "--target-sir", &target]);
+        let report = json(&format!("--scenario {path} --target-sir {target}"));
         assert!(
             (number(&report["uavs"]) - case.part("N").unwrap()).abs() < 0.5,
             "{}",
@@ -165,12 +161,12 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
         assert!(number(&report["sir"]) >= case.arg("gamma").unwrap() * (1.0 - 1e-5));
         assert_eq!(report["proven"].as_bool(), Some(true));
         let db = format!("{:?}", 10.0 * case.arg("gamma").unwrap().log10());
-        let again = json(&["--scenario", path, "--target-sir-db", &db]);
+        let again = json(&format!("--scenario {path} --target-sir-db {db}"));
         assert_eq!(again["uavs"], report["uavs"], "{}", case.id);
         // One fewer relay misses the target.
         let fewer = report["uavs"].as_u64().unwrap() - 1;
         if fewer > 0 {
-            let best = json(&["--scenario", path, "--uavs", &fewer.to_string()]);
+            let best = json(&format!("--scenario {path} --uavs {}", fewer.to_string()));
             assert!(
                 number(&best["sir"]) < case.arg("gamma").unwrap(),
                 "{}",
@@ -184,7 +180,7 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
 fn rates_are_divided_by_the_slots() {
     for relays in [1_u32, 4, 8] {
         let uavs = relays.to_string();
-        let report = json(&["--uavs", &uavs, "--bandwidth-hz", "1e7"]);
+        let report = json(&format!("--uavs {uavs} --bandwidth-hz 1e7"));
         let hop = 1e7 * (1.0 + number(&report["sir"])).log2();
         let slots = relays + 1;
         assert!((number(&report["hop_rate_bps"]) / hop - 1.0).abs() < 1e-12);
@@ -194,7 +190,7 @@ fn rates_are_divided_by_the_slots() {
         assert!((number(&report["best_rate_bps"]) / 6.58e6 - 1.0).abs() < 1e-3);
         assert_eq!(report["best_is_proven"].as_bool(), Some(true), "{report}");
     }
-    let output = plan(&["--uavs", "12", "--bandwidth-hz", "1e7"]);
+    let output = plan("--uavs 12 --bandwidth-hz 1e7");
     let table = String::from_utf8(output.stdout).unwrap();
     for part in [
         "data rate: 1.57",
@@ -205,16 +201,16 @@ fn rates_are_divided_by_the_slots() {
         assert!(table.contains(part), "{part}: {table}");
     }
     // Without a bandwidth there is no rate.
-    assert!(json(&["--uavs", "2"])["rate_bps"].is_null());
+    assert!(json("--uavs 2")["rate_bps"].is_null());
 }
 
 #[test]
 fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
-    let report = json(&["--target-rate-bps", "6e6", "--bandwidth-hz", "1e7"]);
+    let report = json("--target-rate-bps 6e6 --bandwidth-hz 1e7");
     assert_eq!(report["uavs"].as_u64(), Some(1), "{report}");
     assert!(number(&report["rate_bps"]) >= 6e6);
     // Twelve relays give each hop 20 Mbit/s while it sends, but the chain carries only a thirteenth of it.
-    let (status, line) = refusal(&["--target-rate-bps", "2e7", "--bandwidth-hz", "1e7"]);
+    let (status, line) = refusal("--target-rate-bps 2e7 --bandwidth-hz 1e7");
     assert_eq!(status, 1, "{line}");
     for part in [
         "--target-rate-bps 20000000.0: no number of relays carries it: all hops share one frequency in equal time slots",
@@ -229,30 +225,29 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
                  excess_loss_nlos_db = 50\n[noise]\nbandwidth_hz = 1e7\n[[interferer]]\npower_w = 1e-6\nx_m = 5000\ny_m = 1e6\n";
     std::fs::write(file.path(), noisy).unwrap();
     let path = file.path().to_str().unwrap();
-    let ask =
-        |more: &[&str]| json(&[&["--scenario", path, "--bandwidth-hz", "1e7"], more].concat());
-    let one = ask(&["--uavs", "1"]);
+    let ask = |more: &str| json(&format!("--scenario {path} --bandwidth-hz 1e7 {more}"));
+    let one = ask("--uavs 1");
     let best = one["best_uavs"].as_u64().unwrap();
     assert!(best > 1, "{one}");
     assert!(number(&one["best_rate_bps"]) > number(&one["rate_bps"]));
-    let at_best = ask(&["--uavs", &best.to_string()]);
+    let at_best = ask(&format!("--uavs {}", best.to_string()));
     assert_eq!(at_best["rate_bps"], one["best_rate_bps"]);
     for beside in [best - 1, best + 1] {
-        let rate = number(&ask(&["--uavs", &beside.to_string()])["rate_bps"]);
+        let rate = number(&ask(&format!("--uavs {}", beside.to_string()))["rate_bps"]);
         assert!(rate <= number(&one["best_rate_bps"]), "{beside}: {rate}");
     }
     // The fewest relays that meet the target, not the number with the largest rate.
     let half = 0.5 * (number(&one["rate_bps"]) + number(&one["best_rate_bps"]));
-    let met = ask(&["--target-rate-bps", &format!("{half:?}")]);
+    let met = ask(&format!("--target-rate-bps {half:?}"));
     let uavs = met["uavs"].as_u64().unwrap();
     assert!(uavs > 1 && uavs <= best, "{met}");
-    let fewer = ask(&["--uavs", &(uavs - 1).to_string()]);
+    let fewer = ask(&format!("--uavs {}", uavs - 1));
     assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
 }
 
 #[test]
 fn the_answer_names_what_the_model_leaves_out() {
-    for arguments in [&["--uavs", "3"][..], &["--target-sir", "3"]] {
+    for arguments in ["--uavs 3", "--target-sir 3"] {
         let table = String::from_utf8(plan(arguments).stdout).unwrap();
         assert!(
             table.contains(
@@ -287,13 +282,13 @@ fn wrong_input_is_named_in_one_line_with_status_2() {
         "--uavs 1 --scenario no-such-file.toml",
         "--uavs 1 --svg /no/such/folder/x.svg",
     ] {
-        let (status, line) = refusal(&case.split_whitespace().collect::<Vec<_>>());
+        let (status, line) = refusal(case);
         assert_eq!(status, 2, "{case}: {line}");
         writeln!(all, "{case}\n    {}", line.trim_end()).unwrap();
     }
     insta::assert_snapshot!(all);
     let field = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/field.toml");
-    let (status, line) = refusal(&["--uavs", "1", "--x-m", "3", "--scenario", field]);
+    let (status, line) = refusal(&format!("--uavs 1 --x-m 3 --scenario {field}"));
     assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
 }
 
@@ -307,14 +302,14 @@ fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let wrong = drone.replace(begin, "autopilot = \"udp:localhost:65000\"");
     std::fs::write(&file, wrong).unwrap();
     let name = file.path().to_str().unwrap();
-    let (status, line) = refusal(&["--uavs", "1", "--scenario", name]);
+    let (status, line) = refusal(&format!("--uavs 1 --scenario {name}"));
     let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is no port";
     assert!(status == 2 && line.contains(named), "{line}");
 }
 
 #[test]
 fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
-    let output = plan(&["--target-sir-db", "60", "--json"]);
+    let output = plan("--target-sir-db 60 --json");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let most = number(&report["best_sir"]);
@@ -327,11 +322,11 @@ fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
     );
     // The reported maximum can be met, and nothing above it.
     let told = format!("{:?}", most * (1.0 - 1e-5));
-    assert!(number(&json(&["--target-sir", &told])["sir"]) >= most * (1.0 - 1e-4));
+    assert!(number(&json(&format!("--target-sir {told}"))["sir"]) >= most * (1.0 - 1e-4));
     let more = format!("{:?}", most * 1.001);
-    assert_eq!(refusal(&["--target-sir", &more]).0, 1);
+    assert_eq!(refusal(&format!("--target-sir {more}")).0, 1);
     // More relays than the distance allows.
-    let (status, line) = refusal(&["--uavs", "1000"]);
+    let (status, line) = refusal("--uavs 1000");
     assert!(status == 1 && line.contains("min_separation_m"), "{line}");
 }
 
@@ -339,7 +334,7 @@ fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
 fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
     let svg = tempfile::NamedTempFile::new().unwrap();
     let path = svg.path().to_str().unwrap();
-    let output = plan(&["--uavs", "8", "--svg", path]);
+    let output = plan(&format!("--uavs 8 --svg {path}"));
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
         table.contains("worst hop: SIR 2.4655") && table.contains("8 relays, by Algorithm 1"),
@@ -348,7 +343,7 @@ fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
     assert!(table.contains("no positions are better"), "{table}");
     let drawing = std::fs::read_to_string(path).unwrap();
     assert!(roxmltree::Document::parse(&drawing).is_ok());
-    let output = plan(&["--target-sir", "5"]);
+    let output = plan("--target-sir 5");
     let table = String::from_utf8(output.stdout).unwrap();
     for part in [
         "with 22 relays, by eq. (Opt)",
@@ -369,7 +364,7 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
     // Interferers next to each other: the hypothetical one is good enough.
     let file = scenario(case, &two([490.0, 510.0], 400.0));
     let path = file.path().to_str().unwrap();
-    let near = json(&["--scenario", path, "--uavs", "8"]);
+    let near = json(&format!("--scenario {path} --uavs 8"));
     let one = &near["hypothetical"];
     for key in [
         "power_w",
@@ -387,17 +382,17 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
     assert!(
         (number(&one["x_m"]) - 500.0).abs() < 1.0 && (number(&one["power_w"]) - 80.0).abs() < 1.0
     );
-    let alone = json(&["--uavs", "8"]);
+    let alone = json("--uavs 8");
     assert!((number(&near["sir"]) / number(&alone["sir"]) - 1.0).abs() < 0.01);
     // Interferers far apart: no hypothetical one is good enough, and the plan's positions are better.
     let file = scenario(case, &two([100.0, 900.0], 150.0));
     let path = file.path().to_str().unwrap();
-    let far = json(&["--scenario", path, "--uavs", "8"]);
+    let far = json(&format!("--scenario {path} --uavs 8"));
     let one = &far["hypothetical"];
     assert!(one["kept"] == false && number(&one["gain"]) > 0.01, "{far}");
     let gained = number(&far["sir"]) / number(&one["sir"]) - 1.0;
     assert!((gained - number(&one["gain"])).abs() < 1e-9);
-    let table = String::from_utf8(plan(&["--scenario", path, "--uavs", "8"]).stdout).unwrap();
+    let table = String::from_utf8(plan(&format!("--scenario {path} --uavs 8")).stdout).unwrap();
     assert!(
         table.contains("its places are not good enough") && table.contains("a gain of"),
         "{table}"
@@ -407,22 +402,17 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
 #[test]
 fn the_joint_optimum_comes_out_where_altitudes_are_free() {
     let altitudes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/altitudes.toml");
-    let free = json(&["--scenario", altitudes, "--uavs", "8", "--altitude", "free"]);
+    let free = json(&format!("--scenario {altitudes} --uavs 8 --altitude free"));
     assert!(
         (number(&free["sir"]) / 1.235_783_8 - 1.0).abs() < 1e-3,
         "{free}"
     );
     assert_eq!(free["proven"].as_bool(), Some(false));
     // Free altitudes need no more relays.
-    let given = json(&["--scenario", altitudes, "--target-sir", "2"]);
-    let fewer = json(&[
-        "--scenario",
-        altitudes,
-        "--target-sir",
-        "2",
-        "--altitude",
-        "free",
-    ]);
+    let given = json(&format!("--scenario {altitudes} --target-sir 2"));
+    let fewer = json(&format!(
+        "--scenario {altitudes} --target-sir 2 --altitude free"
+    ));
     assert!(number(&fewer["uavs"]) <= number(&given["uavs"]), "{fewer}");
     assert!(number(&fewer["sir"]) >= 2.0);
 }

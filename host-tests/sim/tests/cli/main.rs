@@ -20,27 +20,22 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-fn chain(arguments: &[&str]) -> Output {
+fn chain(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_chain"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
-fn json(arguments: &[&str]) -> Value {
-    let mut all = vec!["--json"];
-    all.extend(arguments);
-    let output = chain(&all);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+fn json(arguments: &str) -> Value {
+    let output = chain(&format!("--json {arguments}"));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments}: {errors}");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 /// Returns the exit status and the single line on standard error.
-fn refusal(arguments: &[&str]) -> (i32, String) {
+fn refusal(arguments: &str) -> (i32, String) {
     let output = chain(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
@@ -49,7 +44,7 @@ fn refusal(arguments: &[&str]) -> (i32, String) {
 
 #[test]
 fn the_json_has_every_field_of_the_contract() {
-    let report = json(&["--uavs", "3", "--seed", "5"]);
+    let report = json("--uavs 3 --seed 5");
     for key in [
         "sir",
         "sir_db",
@@ -95,7 +90,7 @@ fn the_json_has_every_field_of_the_contract() {
 
 #[test]
 fn the_default_is_eight_relays_by_align_and_a_table() {
-    let output = chain(&[]);
+    let output = chain("");
     assert!(output.status.success() && output.stderr.is_empty());
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
@@ -110,30 +105,19 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
 #[test]
 fn the_table_has_y_where_there_is_room_beside_the_line() {
     let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
-    let table = |arguments: &[&str]| String::from_utf8(chain(arguments).stdout).unwrap();
-    let beside = table(&["--scenario", side, "--uavs", "2", "--method", "altitude"]);
+    let table = |arguments: &str| String::from_utf8(chain(arguments).stdout).unwrap();
+    let beside = table(&format!("--scenario {side} --uavs 2 --method altitude"));
     assert!(
         beside.contains("y [m]") && beside.contains("by `joint`"),
         "{beside}"
     );
-    assert!(!table(&["--uavs", "2"]).contains("y [m]"));
+    assert!(!table("--uavs 2").contains("y [m]"));
 }
 
 #[test]
 fn the_same_seed_prints_the_same_bytes() {
-    let bad_day = [
-        "--json",
-        "--loss",
-        "0.3",
-        "--corrupt",
-        "0.15",
-        "--duplicate",
-        "0.1",
-        "--reorder",
-        "0.1",
-        "--seed",
-    ];
-    let go = |seed| chain(&[&bad_day[..], &[seed]].concat()).stdout;
+    let bad_day = "--json --loss 0.3 --corrupt 0.15 --duplicate 0.1 --reorder 0.1 --seed";
+    let go = |seed| chain(&format!("{bad_day} {seed}")).stdout;
     assert_eq!(go("3"), go("3"));
     assert_ne!(go("3"), go("4"));
     let report: Value = serde_json::from_slice(&go("3")).unwrap();
@@ -183,7 +167,7 @@ fn refusals(cases: &[&str]) -> String {
     let mut all = String::new();
     for case in cases {
         let options = case.replace("EXAMPLES/", &examples);
-        let (status, line) = refusal(&options.split(' ').collect::<Vec<_>>());
+        let (status, line) = refusal(&options);
         assert_eq!(status, 2, "{case}: {line}");
         write!(all, "{case}\n    {}", line.replace(&examples, "EXAMPLES/")).unwrap();
     }
@@ -200,7 +184,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     let file = folder.path().join("on-top.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 1000\ny_m = 0\n";
     std::fs::write(&file, text).unwrap();
-    let output = chain(&["--json", "--scenario", file.to_str().unwrap()]);
+    let output = chain(&format!("--json --scenario {}", file.display()));
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
@@ -210,7 +194,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     assert_eq!(report["best_sir"].as_f64(), Some(0.0));
 
     // Without a scenario the option is wrong; the JSON has the same message.
-    let output = chain(&["--json", "--uavs", "1000"]);
+    let output = chain("--json --uavs 1000");
     assert_eq!(output.status.code(), Some(2));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let error = report["error"].as_str().unwrap();
@@ -222,7 +206,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
 
 #[test]
 fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
-    let output = chain(&["--json", "--uavs", "4", "--kill", "2@0.01", "--wires"]);
+    let output = chain("--json --uavs 4 --kill 2@0.01 --wires");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
@@ -247,7 +231,7 @@ fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
 #[test]
 fn a_relay_that_is_described_and_not_there_is_refused() {
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenario.toml");
-    let output = chain(&["--uavs", "4", "--scenario", example]);
+    let output = chain(&format!("--uavs 4 --scenario {example}"));
     assert_eq!(output.status.code(), Some(2));
     let line = String::from_utf8(output.stderr).unwrap();
     assert!(
@@ -333,19 +317,21 @@ fn an_option_that_is_of_use_is_taken() {
         "--uavs 3 --boot 2@20",
         "--uavs 3 --soak 30 --kill 2@29",
     ] {
-        let arguments: Vec<&str> = arguments.split(' ').collect();
-        json(&arguments);
+        json(arguments);
     }
 }
 
 /// Errors name keys of a scenario only if the user gave one.
 #[test]
 fn who_has_a_scenario_is_told_its_keys() {
-    let output = chain(&["--scenario", &example("scenario.toml"), "--uavs", "999"]);
+    let output = chain(&format!(
+        "--scenario {} --uavs 999",
+        example("scenario.toml")
+    ));
     let line = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(line.contains("geometry.min_separation_m"), "{line}");
-    let most = json(&["--uavs", "250"]);
+    let most = json("--uavs 250");
     assert_eq!(most["uavs"], 250);
 }
 
@@ -353,11 +339,8 @@ fn who_has_a_scenario_is_told_its_keys() {
 #[test]
 fn what_was_adopted_is_not_denied() {
     for (arguments, is_denied) in [
-        (
-            &["--uavs", "2", "--upload", "20", "--kill", "1@40"][..],
-            false,
-        ),
-        (&["--wires", "--upload", "20", "--kill", "4@20"], true),
+        ("--uavs 2 --upload 20 --kill 1@40", false),
+        ("--wires --upload 20 --kill 4@20", true),
     ] {
         let output = chain(arguments);
         assert_eq!(output.status.code(), Some(1));
@@ -375,18 +358,18 @@ fn what_was_adopted_is_not_denied() {
 fn whoever_does_not_listen_changes_no_status() {
     let several = example("multi_interferer.toml");
     for (arguments, status) in [
-        (&["--uavs", "3"][..], 0),
-        (&["--uavs", "3", "--json"], 0),
-        (&["--help"], 0),
-        (&["--uavs", "0"], 2),
-        (&["--epsilon", "1"], 2),
-        (&["--uavs", "2", "--kill", "1@20"], 1),
+        ("--uavs 3", 0),
+        ("--uavs 3 --json", 0),
+        ("--help", 0),
+        ("--uavs 0", 2),
+        ("--epsilon 1", 2),
+        ("--uavs 2 --kill 1@20", 1),
         // This scenario prints notes on standard error.
-        (&["--uavs", "3", "--scenario", &several], 0),
+        (&format!("--uavs 3 --scenario {several}"), 0),
     ] {
         for closed in [[true, false], [false, true], [true, true]] {
             let mut child = Command::new(env!("CARGO_BIN_EXE_chain"))
-                .args(arguments)
+                .args(arguments.split_whitespace())
                 .stdout(Stdio::piped())
                 .stderr(Stdio::piped())
                 .spawn()

@@ -39,9 +39,6 @@ impl NotDrawn {
 }
 
 /// Draws `chart` as SVG; `title` is for screen readers.
-///
-/// # Errors
-/// [`NotDrawn`] if the backend fails, or a number does not fit its axis.
 pub fn draw(chart: &Chart, title: &str) -> Result<String, NotDrawn> {
     if !chart.is_drawable() {
         return Err(NotDrawn("a number does not belong on its axis".to_owned()));

@@ -17,32 +17,25 @@ pub const SEED: u64 = 1000;
 
 /// SIRs and gains for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Number of relays.
-    pub relays: u16,
+struct Row {
+    relays: u16,
     /// SIR of the worst hop by Algorithm 1, linear.
-    pub sir_linear: f64,
+    sir_linear: f64,
     /// Mean SIR of the worst hop over random chains, linear.
-    pub random_sir_linear: f64,
+    random_sir_linear: f64,
     /// Standard error of that mean, linear.
-    pub random_error_linear: f64,
+    random_error_linear: f64,
     /// SIR of the worst hop of the interference-blind chain, linear.
-    pub blind_sir_linear: f64,
+    blind_sir_linear: f64,
     /// SIR of the worst hop with equal spacing, linear.
-    pub equal_sir_linear: f64,
-    /// Gain over the random mean, percent.
-    pub gain_over_random_percent: f64,
-    /// Gain over the blind chain, percent.
-    pub gain_over_blind_percent: f64,
-    /// Gain over equal spacing, percent.
-    pub gain_over_equal_percent: f64,
+    equal_sir_linear: f64,
+    gain_over_random_percent: f64,
+    gain_over_blind_percent: f64,
+    gain_over_equal_percent: f64,
 }
 
 /// Returns the results for these numbers of relays, against the mean of `draws` random chains.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
+fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
         .map(|&relays| row(relays, draws))
@@ -71,9 +64,6 @@ fn row(relays: u16, draws: u32) -> Result<Row, FigureError> {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let relays: Vec<u16> = (1..=MOST_RELAYS).collect();
     let rows = data(&relays, DRAWS)?;

@@ -83,9 +83,6 @@ h2{font-size:1.15rem;margin:0 0 .5rem}figcaption{max-width:46rem}p,ul{margin:.5r
 th,td{border-bottom:1px solid #ccc;padding:.15rem .7rem .15rem 0;text-align:right}th:first-child,td:first-child{text-align:left}";
 
 /// Writes a figure's picture and tables to `dir`.
-///
-/// # Errors
-/// [`FigureError::Drawing`] or [`FigureError::File`].
 pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
     let svg = draw(&sheet.chart, sheet.title)?;
     write(&dir.join(format!("{}.svg", sheet.name)), &svg)?;
@@ -96,9 +93,6 @@ pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
 }
 
 /// Writes `index.html` with these figures to `dir` and returns its path.
-///
-/// # Errors
-/// [`FigureError::File`].
 pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, FigureError> {
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>uav-relay: figures</title>\n\

@@ -22,29 +22,24 @@ pub const SEED: u64 = 2000;
 
 /// Results for one altitude and one pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Power of Tx, W.
-    pub tx_w: f64,
-    /// Power of the relay, W.
-    pub relay_w: f64,
-    /// Altitude, m.
-    pub altitude_m: u32,
-    /// Best position, m from Tx.
-    pub x_m: f32,
+struct Row {
+    tx_w: f64,
+    relay_w: f64,
+    altitude_m: u32,
+    x_m: f32,
     /// SIR of the worse hop at the best position, linear.
-    pub sir_linear: f32,
+    sir_linear: f32,
     /// Mean SIR of the worse hop over random positions, linear.
-    pub random_sir_linear: f64,
+    random_sir_linear: f64,
     /// Standard error of that mean, linear.
-    pub random_error_linear: f64,
+    random_error_linear: f64,
     /// Mean SIR over random positions, in dB.
-    pub random_sir_db: f64,
+    random_sir_db: f64,
     /// Mean of log2(1 + SIR) over random positions, bit/s/Hz.
-    pub random_rate_bit_per_s_hz: f64,
+    random_rate_bit_per_s_hz: f64,
     /// SIR at the interference-blind position, linear.
-    pub blind_sir_linear: f64,
-    /// SIR in the middle, linear.
-    pub middle_sir_linear: f64,
+    blind_sir_linear: f64,
+    middle_sir_linear: f64,
 }
 
 /// Returns the dual-hop scenario of the paper's third sub-table.
@@ -68,14 +63,7 @@ pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
 }
 
 /// Returns the results for each pair of powers and altitude, against `draws` random positions.
-///
-/// # Errors
-/// [`FigureError::Unsettled`], which does not occur for powers above 0.
-pub fn data(
-    powers_w: &[(f64, f64)],
-    altitudes_m: &[u32],
-    draws: u32,
-) -> Result<Vec<Row>, FigureError> {
+fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<Vec<Row>, FigureError> {
     let choices: Vec<(f64, f64, u32)> = powers_w
         .iter()
         .flat_map(|&(tx, relay)| altitudes_m.iter().map(move |&h| (tx, relay, h)))
@@ -171,30 +159,23 @@ impl Reading {
 
 /// Gains under one reading for one pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct GainRow {
-    /// Power of Tx, W.
-    pub tx_w: f64,
-    /// Power of the relay, W.
-    pub relay_w: f64,
-    /// Averaged quantity.
-    pub reading: Reading,
+struct GainRow {
+    tx_w: f64,
+    relay_w: f64,
+    reading: Reading,
     /// Gain over a random position, percent; none if the mean in dB is not above 0.
-    pub over_random_percent: Option<f64>,
+    over_random_percent: Option<f64>,
     /// Gain over the interference-blind position, percent.
-    pub over_blind_percent: Option<f64>,
-    /// Gain over the middle, percent.
-    pub over_middle_percent: Option<f64>,
+    over_blind_percent: Option<f64>,
+    over_middle_percent: Option<f64>,
     /// Largest gain over random at one altitude, percent of linear SIR.
-    pub largest_over_random_percent: f64,
+    largest_over_random_percent: f64,
     /// Largest gain over the blind position at one altitude, percent of linear SIR.
-    pub largest_over_blind_percent: f64,
+    largest_over_blind_percent: f64,
 }
 
 /// Returns every reading for every pair of these powers, over these altitudes.
-///
-/// # Errors
-/// Those of [`data`].
-pub fn gains(
+fn gains(
     tx_w: &[f64],
     relay_w: &[f64],
     altitudes_m: &[u32],
@@ -287,7 +268,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
 }
 
 /// Describes which readings reproduce the printed averages.
-pub fn findings(gains: &[GainRow]) -> Vec<String> {
+fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);
         of.filter_map(|row| row.over_random_percent)
@@ -320,7 +301,7 @@ pub fn findings(gains: &[GainRow]) -> Vec<String> {
 }
 
 /// Returns the nearest pair of powers per reading. The linear readings of the drawn pairs follow.
-pub fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
+fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",
         "p_t, p_u",
@@ -400,9 +381,6 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
 }
 
 /// Returns the figure, with the table of average gains.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let altitudes: Vec<u32> = (ALTITUDES_M.0..=ALTITUDES_M.1).collect();
     let rows = data(&REALISATIONS, &altitudes, DRAWS)?;

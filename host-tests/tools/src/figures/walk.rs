@@ -74,9 +74,6 @@ pub struct Sweep {
 }
 
 /// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles. `step` is in linear SIR.
-///
-/// # Errors
-/// [`FigureError::Unsettled`] if no target is met.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -118,9 +115,6 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
 }
 
 /// Returns the chain that the relays of `mission` agree on by Algorithm 1 (Algorithm 4 in a field).
-///
-/// # Errors
-/// [`FigureError::Unsettled`] if no target is met.
 pub fn settled(mission: &Mission) -> Result<Chain, FigureError> {
     let common = |_| mission.config().common;
     let agreed = plan::solve(mission, Schedule::Bracketed, common)?;
@@ -165,9 +159,6 @@ pub struct Flown {
 }
 
 /// Simulates `mission` until it settles; `predict` lets the leader first solve the chain itself.
-///
-/// # Errors
-/// [`FigureError::Setup`] or [`FigureError::Unsettled`].
 pub fn fly(
     mission: &Mission,
     method: Method,

@@ -57,9 +57,6 @@ impl Flown {
 /// Returns the chain that `relays` relays in `scenario` settle on by `method`.
 ///
 /// Work: that of [`super::plan`] twice.
-///
-/// # Errors
-/// [`NoPlan`] if the relays settle on nothing.
 pub fn flown(
     scenario: &Scenario,
     relays: u16,

@@ -248,9 +248,6 @@ const STYLES: [(&str, &str); 5] = [
 type Xml = Writer<Vec<u8>>;
 
 /// Returns the text of a KML file with the given title.
-///
-/// # Errors
-/// Those of the XML writer, which cannot fail in memory.
 pub fn kml(map: &Map, title: &str) -> io::Result<String> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 1);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;

@@ -61,9 +61,6 @@ impl Rates {
     /// Plans 1, 2, 3 and more relays. It ends when no larger number can carry more, or at the limit for a few seconds.
     ///
     /// `target_bps` is the wanted rate.
-    ///
-    /// # Errors
-    /// [`NoPlan`] if no number of relays has a plan.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,

@@ -208,9 +208,6 @@ impl Flight {
     }
 
     /// Returns the block of relay `index`, verified by reading it back.
-    ///
-    /// # Errors
-    /// [`BlockError`] if the drone would reject it.
     pub fn block(&self, index: u16) -> Result<Block, BlockError> {
         let own = self.own.iter().find(|(of, _)| *of == index);
         let config = Config {

@@ -14,20 +14,20 @@ mod units;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-fn plan(arguments: &[&str]) -> Output {
+fn plan(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plan"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
-fn said(arguments: &[&str]) -> String {
+fn said(arguments: &str) -> String {
     let output = plan(arguments);
     assert!(output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-fn refusal(arguments: &[&str]) -> (i32, String) {
+fn refusal(arguments: &str) -> (i32, String) {
     let output = plan(arguments);
     let line = String::from_utf8(output.stderr).unwrap();
     assert_eq!(line.trim_end().lines().count(), 1, "{arguments:?}: {line}");

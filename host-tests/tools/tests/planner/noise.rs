@@ -16,13 +16,10 @@ fn with(sections: &str) -> tempfile::NamedTempFile {
 }
 
 fn json(file: &tempfile::NamedTempFile) -> Value {
-    let output = plan(&[
-        "--json",
-        "--uavs",
-        "6",
-        "--scenario",
-        file.path().to_str().unwrap(),
-    ]);
+    let output = plan(&format!(
+        "--json --uavs 6 --scenario {}",
+        file.path().display()
+    ));
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -34,7 +31,7 @@ fn the_noise_is_k_t_b_f_and_says_of_what() {
     let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let plain = std::fs::read_to_string(super::example("scenario.toml")).unwrap();
     std::fs::write(file.path(), format!("{plain}{noisy}")).unwrap();
-    let table = said(&["--uavs", "6", "--scenario", file.path().to_str().unwrap()]);
+    let table = said(&format!("--uavs 6 --scenario {}", file.path().display()));
     let line = "noise: -94.965 dBm, 3.187948e-13 W, at every receiver: k T0 B F with T0 = 290 K, B = 20000000 Hz, F = 6 dB\n";
     assert!(table.contains(line), "{table}");
     let noise = &json(&file)["noise"];

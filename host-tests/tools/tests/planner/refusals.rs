@@ -28,7 +28,7 @@ fn what_is_not_there_is_not_planned() {
         "--uavs 3 --jsn",
     ] {
         let options = case.replace("MAP", map).replace("EXAMPLES/", &examples);
-        let (status, line) = refusal(&options.split(' ').collect::<Vec<_>>());
+        let (status, line) = refusal(&options);
         assert_eq!(status, 2, "{case}: {line}");
         let line = line.replace(map, "MAP").replace(&examples, "EXAMPLES/");
         writeln!(all, "{case}\n    {}", line.trim_end()).unwrap();
@@ -36,7 +36,7 @@ fn what_is_not_there_is_not_planned() {
     insta::assert_snapshot!(all);
     assert!(!std::path::Path::new(map).exists());
     // Without a scenario file the message names the numbers and the keys of such a file.
-    let (status, line) = refusal(&["--uavs", "300"]);
+    let (status, line) = refusal("--uavs 300");
     assert_eq!(status, 1);
     assert!(
         line.starts_with("no placement: 300 relays that stay 4 m apart need 1196 m, and there are 1000 m from Tx to Rx: fewer relays, or geometry.min_separation_m and geometry.distance_m of a --scenario FILE"),
@@ -49,16 +49,10 @@ fn maps_are_written_where_there_is_an_earth() {
     let folder = tempfile::tempdir().unwrap();
     let [geojson, kml] = ["plan.geojson", "plan.kml"]
         .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
-    said(&[
-        "--scenario",
-        &example("site.toml"),
-        "--uavs",
-        "3",
-        "--geojson",
-        &geojson,
-        "--kml",
-        &kml,
-    ]);
+    said(&format!(
+        "--scenario {} --uavs 3 --geojson {geojson} --kml {kml}",
+        example("site.toml")
+    ));
     let geojson: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(geojson).unwrap()).unwrap();
     // Tx, Rx, three relays, the interferer, four hops.

@@ -6,33 +6,31 @@ use super::{example, plan, refusal, said};
 
 #[test]
 fn what_is_asked_in_decibels_is_answered_in_decibels() {
-    let (status, line) = refusal(&["--target-sir-db", "60"]);
+    let (status, line) = refusal("--target-sir-db 60");
     assert_eq!(status, 1);
     assert!(line.starts_with("no number of relays, up to 1000, gives every hop an SIR of 60 dB: the most is 20.980 dB, with "), "{line}");
-    let (_, line) = refusal(&["--target-sir", "1000"]);
+    let (_, line) = refusal("--target-sir 1000");
     assert!(
         line.contains("an SIR of 1000: the most is 125.31"),
         "{line}"
     );
-    let (_, line) = refusal(&[
-        "--target-sir-db",
-        "60",
-        "--scenario",
-        &example("multi_interferer.toml"),
-    ]);
+    let (_, line) = refusal(&format!(
+        "--target-sir-db 60 --scenario {}",
+        example("multi_interferer.toml")
+    ));
     assert!(
         line.contains("an SIR of 60 dB: the most found is ") && line.contains(" dB"),
         "{line}"
     );
 
-    let table = said(&["--target-sir-db", "6"]);
+    let table = said("--target-sir-db 6");
     for part in [
         "worst hop: 6.000 dB (SIR 3.98107",
         "target: SIR 6 dB; that many relays reach up to 6.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
-    let table = said(&["--target-sir", "4"]);
+    let table = said("--target-sir 4");
     for part in [
         "worst hop: SIR 4.00000",
         "target: SIR 4; that many relays reach up to 4.",
@@ -44,7 +42,7 @@ fn what_is_asked_in_decibels_is_answered_in_decibels() {
 #[test]
 fn json_has_both_units() {
     let read =
-        |arguments: &[&str]| -> Value { serde_json::from_slice(&plan(arguments).stdout).unwrap() };
+        |arguments: &str| -> Value { serde_json::from_slice(&plan(arguments).stdout).unwrap() };
     let pairs = |report: &Value, names: &[&str]| {
         for name in names {
             let of = |name: &str| {
@@ -59,18 +57,18 @@ fn json_has_both_units() {
             );
         }
     };
-    let met = read(&["--target-sir-db", "6", "--json"]);
+    let met = read("--target-sir-db 6 --json");
     pairs(&met, &["sir", "target_sir", "most_sir", "rx_sir"]);
     pairs(
-        &read(&["--target-sir-db", "60", "--json"]),
+        &read("--target-sir-db 60 --json"),
         &["best_sir", "target_sir"],
     );
 }
 
 #[test]
 fn a_case_is_told_as_what_it_means_for_the_drone() {
-    let json: Value = serde_json::from_str(&said(&["--uavs", "1", "--json"])).unwrap();
-    let table = said(&["--uavs", "1"]);
+    let json: Value = serde_json::from_str(&said("--uavs 1 --json")).unwrap();
+    let table = said("--uavs 1");
     let words = json["case_words"].as_str().unwrap();
     assert!(words.starts_with("the drone "), "{words}");
     let line = format!(
@@ -79,14 +77,14 @@ fn a_case_is_told_as_what_it_means_for_the_drone() {
     );
     assert!(table.contains(&line), "{line}: {table}");
     for (arguments, theorem) in [
-        (&["--x-m", "300"][..], "(Theorem 2, case "),
-        (&["--altitude", "free"], "(Theorem 3, case "),
+        ("--x-m 300", "(Theorem 2, case "),
+        ("--altitude free", "(Theorem 3, case "),
         (
-            &["--altitude", "free", "--scenario", &example("side.toml")],
+            &format!("--altitude free --scenario {}", example("side.toml")),
             "(one relay aside, case ",
         ),
     ] {
-        let table = said(&[&["--uavs", "1"], arguments].concat());
+        let table = said(&format!("--uavs 1 {arguments}"));
         let line = table
             .lines()
             .find(|line| line.contains(theorem))
@@ -97,12 +95,10 @@ fn a_case_is_told_as_what_it_means_for_the_drone() {
 
 #[test]
 fn a_scenario_in_field_units_is_planned() {
-    let table = said(&[
-        "--scenario",
-        &example("decibels.toml"),
-        "--target-sir-db",
-        "8",
-    ]);
+    let table = said(&format!(
+        "--scenario {} --target-sir-db 8",
+        example("decibels.toml")
+    ));
     assert!(table.contains("worst hop: 8.00"), "{table}");
 }
 
@@ -113,8 +109,8 @@ fn a_map_has_rounded_numbers_with_units_in_their_names() {
     let [geojson, kml] = ["plan.geojson", "plan.kml"]
         .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
     let scenario = example("decibels.toml");
-    let maps = ["--geojson", &geojson, "--kml", &kml];
-    said(&[&["--scenario", &scenario, "--uavs", "3"], &maps[..]].concat());
+    let maps = format!("--geojson {geojson} --kml {kml}");
+    said(&format!("--scenario {scenario} --uavs 3 {maps}"));
     let is_short = |name: &str, number: &str| {
         let decimals = number.split_once('.').map_or("", |(_, decimals)| decimals);
         let most = match name {

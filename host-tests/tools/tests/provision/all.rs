@@ -12,14 +12,14 @@ use uav_relay_tools::provision::config::{Block, secret};
 
 use super::{example, provision, reads, refusal, write_key};
 
-fn plan(arguments: &[&str]) -> Output {
+fn plan(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plan"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
-fn planned(arguments: &[&str]) -> String {
+fn planned(arguments: &str) -> String {
     let output = plan(arguments);
     assert!(output.status.success(), "{output:?}");
     String::from_utf8(output.stdout).unwrap()
@@ -89,14 +89,10 @@ fn a_plan_goes_to_every_drone() {
     let folder = tempfile::tempdir().unwrap();
     let [file, key, dir] = ["plan.toml", "key.txt", "blocks"].map(|name| folder.path().join(name));
     let decibels = text(&example().with_file_name("decibels.toml"));
-    let said = planned(&[
-        "--scenario",
-        &decibels,
-        "--target-sir-db",
-        "8",
-        "--out",
-        &text(&file),
-    ]);
+    let said = planned(&format!(
+        "--scenario {decibels} --target-sir-db 8 --out {}",
+        text(&file)
+    ));
     let scenario = Scenario::load(&file).unwrap();
     let plan = scenario.plan.clone().unwrap();
     assert!(
@@ -115,16 +111,9 @@ fn a_plan_goes_to_every_drone() {
         .unwrap()
         .trim()
         .replace("DIR", &text(&dir));
-    let words: Vec<&str> = command.split(' ').skip(2).collect();
-    let more = [
-        "--network",
-        "9",
-        "--key-file",
-        key.to_str().unwrap(),
-        "--epoch",
-        "77",
-    ];
-    let output = provision(&[&words[..], &more].concat());
+    let words = command.strip_prefix("cargo provision ").unwrap();
+    let more = format!("--network 9 --key-file {} --epoch 77", key.display());
+    let output = provision(&format!("{words} {more}"));
     assert!(
         output.status.success() && output.stderr.is_empty(),
         "{output:?}"
@@ -141,22 +130,19 @@ fn a_plan_goes_to_every_drone() {
     assert!(!summary.contains("0123456789abcdef"));
 
     // Existing blocks stay without --force; with it nothing of a larger flight remains.
-    let again = refusal(&words);
+    let again = refusal(words);
     assert!(
         again.contains("relay1.bin exists already; --force"),
         "{again}"
     );
     let small = folder.path().join("small.toml");
-    planned(&["--uavs", "2", "--out", small.to_str().unwrap()]);
+    planned(&format!("--uavs 2 --out {}", small.display()));
     std::fs::write(dir.join("notes.txt"), "mine").unwrap();
-    let output = provision(&[
-        "--scenario",
-        small.to_str().unwrap(),
-        "--all",
-        "--out-dir",
-        dir.to_str().unwrap(),
-        "--force",
-    ]);
+    let output = provision(&format!(
+        "--scenario {} --all --out-dir {} --force",
+        small.display(),
+        dir.display()
+    ));
     assert!(output.status.success(), "{output:?}");
     let left = ["notes.txt", "relay1.bin", "relay2.bin", "summary.txt"].map(str::to_owned);
     assert_eq!(names(&dir), left.into());
@@ -167,27 +153,19 @@ fn a_joint_plan_is_flown_jointly_and_planned_anew_in_place() {
     let folder = tempfile::tempdir().unwrap();
     let [file, dir] = ["plan.toml", "blocks"].map(|name| text(&folder.path().join(name)));
     let altitudes = text(&example().with_file_name("altitudes.toml"));
-    planned(&["--scenario", &altitudes, "--uavs", "3", "--out", &file]);
-    let line = plan(&["--scenario", &file, "--uavs", "4", "--out", &file]);
+    planned(&format!("--scenario {altitudes} --uavs 3 --out {file}"));
+    let line = plan(&format!("--scenario {file} --uavs 4 --out {file}"));
     let line = String::from_utf8(line.stderr).unwrap();
     assert!(
         line.contains("exists already; --force overwrites it"),
         "{line}"
     );
-    planned(&[
-        "--scenario",
-        &file,
-        "--uavs",
-        "4",
-        "--altitude",
-        "free",
-        "--out",
-        &file,
-        "--force",
-    ]);
+    planned(&format!(
+        "--scenario {file} --uavs 4 --altitude free --out {file} --force"
+    ));
     let written = std::fs::read_to_string(&file).unwrap();
     assert_eq!(written.matches("[plan]").count(), 1, "{written}");
-    let output = provision(&["--scenario", &file, "--all", "--out-dir", &dir]);
+    let output = provision(&format!("--scenario {file} --all --out-dir {dir}"));
     assert!(output.status.success(), "{output:?}");
     let block: Block = std::fs::read(Path::new(&dir).join("relay4.bin"))
         .unwrap()
@@ -209,28 +187,20 @@ fn all_or_none_is_written() {
     );
     let file = folder.path().join("field.toml");
     std::fs::write(&file, field).unwrap();
-    let wide = [
-        "--scenario",
-        file.to_str().unwrap(),
-        "--uavs",
-        "3",
-        "--all",
-        "--out-dir",
-        dir.to_str().unwrap(),
-    ];
+    let wide = format!(
+        "--scenario {} --uavs 3 --all --out-dir {}",
+        file.display(),
+        dir.display()
+    );
     let line = refusal(&wide);
     assert!(line.contains("a drone has room for 16 points"), "{line}");
     assert!(!dir.exists());
     // A folder with the name of a block cannot be replaced: files renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
-    let line = refusal(&[
-        "--uavs",
-        "3",
-        "--all",
-        "--out-dir",
-        dir.to_str().unwrap(),
-        "--force",
-    ]);
+    let line = refusal(&format!(
+        "--uavs 3 --all --out-dir {} --force",
+        dir.display()
+    ));
     assert!(
         line.starts_with("--out-dir ") && line.contains("relay2.bin"),
         "{line}"
@@ -243,7 +213,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let [file, old, dir] =
         ["plan.toml", "old.toml", "blocks"].map(|name| text(&folder.path().join(name)));
-    planned(&["--uavs", "3", "--out", &file]);
+    planned(&format!("--uavs 3 --out {file}"));
     let written = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&old, written.replace("uav_w = 1.0 ", "uav_w = 2.0 ")).unwrap();
     let places = [
@@ -272,7 +242,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         for (place, name) in &places {
             options = options.replace(name, place);
         }
-        let mut line = refusal(&options.split_whitespace().collect::<Vec<_>>());
+        let mut line = refusal(&options);
         for (place, name) in &places {
             line = line.replace(place, name);
         }
@@ -280,7 +250,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
         assert!(!Path::new(&dir).exists(), "{case}");
     }
     insta::assert_snapshot!(lines);
-    let line = refusal(&["--uavs", "3", "--index", "1", "--out", &file, "--force"]);
+    let line = refusal(&format!("--uavs 3 --index 1 --out {file} --force"));
     assert!(line.contains("--all"), "{line}");
 }
 
@@ -290,28 +260,19 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let folder = tempfile::tempdir().unwrap();
     let [out, dir] = ["block.bin", "blocks"].map(|name| text(&folder.path().join(name)));
     let several = text(&example().with_file_name("multi_interferer.toml"));
-    let report = planned(&["--scenario", &several, "--uavs", "8", "--json"]);
+    let report = planned(&format!("--scenario {several} --uavs 8 --json"));
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let loss = report["hypothetical"]["loss"].as_f64().unwrap();
     assert!(loss > 0.15, "{report}");
     let words = format!("{:.1} % less than the best positions", 100.0 * loss);
-    let one = [
-        "--scenario",
-        &several,
-        "--uavs",
-        "8",
-        "--index",
-        "2",
-        "--out",
-        &out,
-    ];
+    let one = format!("--scenario {several} --uavs 8 --index 2 --out {out}");
     let line = refusal(&one);
     assert!(
         line.contains(&words) && line.contains("cargo chain --listen"),
         "{line}"
     );
     assert!(!Path::new(&out).exists());
-    let planned = plan(&["--scenario", &several, "--uavs", "8", "--out", &out]);
+    let planned = plan(&format!("--scenario {several} --uavs 8 --out {out}"));
     let line = String::from_utf8(planned.stderr).unwrap();
     assert!(
         planned.status.code() == Some(1) && line.contains(&words),
@@ -320,17 +281,9 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     assert!(!Path::new(&out).exists());
     for arguments in [
         &one[..],
-        &[
-            "--scenario",
-            &several,
-            "--uavs",
-            "8",
-            "--all",
-            "--out-dir",
-            &dir,
-        ],
+        &format!("--scenario {several} --uavs 8 --all --out-dir {dir}"),
     ] {
-        let output = provision(&[arguments, &["--stand-in"]].concat());
+        let output = provision(&format!("{arguments} --stand-in"));
         let line = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success() && line.contains(&words), "{line}");
     }
@@ -341,16 +294,10 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
         .replace("y_m = 300.0", "y_m = 150.0");
     let file = folder.path().join("near.toml");
     std::fs::write(&file, near).unwrap();
-    let output = provision(&[
-        "--scenario",
-        file.to_str().unwrap(),
-        "--uavs",
-        "8",
-        "--index",
-        "2",
-        "--out",
-        &out,
-    ]);
+    let output = provision(&format!(
+        "--scenario {} --uavs 8 --index 2 --out {out}",
+        file.display()
+    ));
     assert!(output.status.success(), "{output:?}");
 }
 
@@ -372,7 +319,7 @@ fn the_next_command_takes_the_file() {
     let [mine, planned_file] = [text(&scenario), text(&file)];
     std::fs::write(&scenario, &drone).unwrap();
     write_key(&key, &"0123456789abcdef".repeat(4));
-    let arguments = ["--scenario", &mine, "--uavs", "3", "--out", &planned_file];
+    let arguments = format!("--scenario {mine} --uavs 3 --out {planned_file}");
     // The published example is for Linux computers.
     let said = planned(&arguments);
     assert!(
@@ -385,22 +332,18 @@ fn the_next_command_takes_the_file() {
         )),
         "{said}"
     );
-    let line = refusal(&[
-        "--scenario",
-        &planned_file,
-        "--all",
-        "--out-dir",
-        &text(&dir),
-    ]);
+    let line = refusal(&format!(
+        "--scenario {planned_file} --all --out-dir {}",
+        text(&dir)
+    ));
     assert!(line.contains("network.baud = 57600"), "{line}");
     // For the firmware the last line is a command that succeeds.
     std::fs::write(&scenario, for_the_firmware(&drone)).unwrap();
-    let said = planned(&[&arguments[..], &["--force"]].concat());
+    let said = planned(&format!("{arguments} --force"));
     let command = said.lines().last().unwrap().trim();
     let command = command.replace("DIR", &text(&dir));
-    let words: Vec<&str> = command.split(' ').collect();
-    assert_eq!(words[..2], ["cargo", "provision"], "{said}");
-    let output = provision(&words[2..]);
+    let words = command.strip_prefix("cargo provision ").unwrap();
+    let output = provision(words);
     assert!(output.status.success(), "{output:?}");
     assert_eq!(names(&dir).len(), 4);
 }
@@ -415,8 +358,8 @@ fn a_plan_and_a_network_of_different_sizes_are_refused() {
     std::fs::write(&scenario, drone.replace("relays = 3", "relays = 4")).unwrap();
     let words =
         "network.relays = 4 contradicts plan.uavs; allowed: 6, the number of relays of the plan";
-    for wanted in [&["--uavs", "6"][..], &["--target-sir-db", "3"]] {
-        let arguments = [&["--scenario", &scenario, "--out", &file], wanted].concat();
+    for wanted in ["--uavs 6", "--target-sir-db 3"] {
+        let arguments = format!("--scenario {scenario} --out {file} {wanted}");
         let output = plan(&arguments);
         let line = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{line}");
@@ -427,23 +370,17 @@ fn a_plan_and_a_network_of_different_sizes_are_refused() {
         assert!(!Path::new(&file).exists());
     }
     // A file edited by hand.
-    planned(&["--scenario", &scenario, "--uavs", "4", "--out", &file]);
+    planned(&format!("--scenario {scenario} --uavs 4 --out {file}"));
     let four = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&scenario, four.replace("relays = 4", "relays = 6")).unwrap();
-    planned(&[
-        "--scenario",
-        &scenario,
-        "--uavs",
-        "6",
-        "--out",
-        &file,
-        "--force",
-    ]);
+    planned(&format!(
+        "--scenario {scenario} --uavs 6 --out {file} --force"
+    ));
     let six = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, six.replace("relays = 6", "relays = 4")).unwrap();
-    for more in [&[][..], &["--uavs", "6"], &["--uavs", "4"]] {
-        let all = ["--scenario", &file, "--all", "--out-dir", &dir];
-        let line = refusal(&[&all[..], more].concat());
+    for more in ["", "--uavs 6", "--uavs 4"] {
+        let all = format!("--scenario {file} --all --out-dir {dir}");
+        let line = refusal(&format!("{all} {more}"));
         assert!(line.contains(words), "{line}");
         assert!(!Path::new(&dir).exists());
     }

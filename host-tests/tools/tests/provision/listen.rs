@@ -100,8 +100,8 @@ fn the_command_takes_it_from_the_scenario() {
     let (toml, out) = (path("listen.toml"), path("relay.bin"));
     let of = |text: &str| {
         std::fs::write(&toml, format!("{TOML}{text}")).unwrap();
-        let arguments = ["--scenario", &toml, "--uavs", "5", "--index", "3"];
-        provision(&[&arguments[..], &["--network", "7", "--out", &out]].concat())
+        let arguments = format!("--scenario {toml} --uavs 5 --index 3");
+        provision(&format!("{arguments} --network 7 --out {out}"))
     };
     assert!(of("[listen]\nfollowing = true\n").status.success());
     let block = std::fs::read(&out).unwrap();

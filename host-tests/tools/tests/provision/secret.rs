@@ -67,7 +67,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     );
     assert_eq!(block(), paper());
 
-    let signed = [&plain[..], &["--key-file", &file]].concat();
+    let signed = format!("{plain} --key-file {file}");
     let before = clock();
     let output = provision(&signed);
     assert!(output.status.success() && output.stderr.is_empty());
@@ -77,7 +77,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(!said.to_lowercase().contains("0af1"), "{said}");
 
-    let output = provision(&[&signed[..], &["--epoch", "9"]].concat());
+    let output = provision(&format!("{signed} --epoch 9"));
     assert!(output.status.success());
     assert_eq!(secret(&block()).unwrap().unwrap().epoch, 9);
 }
@@ -87,8 +87,8 @@ fn a_bad_key_is_named_and_not_shown() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file) = (path("block.bin"), path("key"));
-    let plain = ["--uavs", "5", "--index", "3", "--out", &out];
-    let keyed = [&plain[..], &["--key-file", &file]].concat();
+    let plain = format!("--uavs 5 --index 3 --out {out}");
+    let keyed = format!("{plain} --key-file {file}");
     let text = refusal(&keyed);
     assert!(text.contains("--key-file"), "{text}");
     assert!(text.contains("cannot be read"), "{text}");
@@ -113,10 +113,10 @@ fn a_bad_key_is_named_and_not_shown() {
     }
     super::write_key(&file, &good);
     for epoch in ["--epoch=0", "--epoch=4294967295", "--epoch=-1"] {
-        let text = refusal(&[&keyed[..], &[epoch]].concat());
+        let text = refusal(&format!("{keyed} {epoch}"));
         assert!(text.contains("--epoch"), "{text}");
     }
-    let text = refusal(&[&plain[..], &["--epoch", "9"]].concat());
+    let text = refusal(&format!("{plain} --epoch 9"));
     assert!(text.contains("--key-file"), "{text}");
     assert!(!Path::new(&out).exists());
 }
@@ -128,8 +128,8 @@ fn a_key_file_that_others_can_read_is_refused() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file) = (path("block.bin"), path("key"));
     std::fs::write(&file, "0123456789abcdef".repeat(4)).unwrap();
-    let plain = ["--uavs", "5", "--index", "3", "--out", &out];
-    let keyed = [&plain[..], &["--key-file", &file]].concat();
+    let plain = format!("--uavs 5 --index 3 --out {out}");
+    let keyed = format!("{plain} --key-file {file}");
     for (mode, is_taken) in [
         (0o644, false),
         (0o604, false),

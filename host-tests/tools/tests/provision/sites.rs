@@ -133,25 +133,22 @@ fn the_command_has_them_from_the_scenario() {
     std::fs::write(&file, TOML.replace("-47", "47")).unwrap();
     std::fs::write(&off, TOML).unwrap();
     let plain = of_paper(&out);
-    let sited = [&plain[..], &["--scenario", &file]].concat();
-    let written = |more: &[&str]| {
-        let output = provision(&[&sited[..], more].concat());
+    let sited = format!("{plain} --scenario {file}");
+    let written = |more: &str| {
+        let output = provision(&format!("{sited} {more}"));
         assert!(output.status.success(), "{output:?}");
         <Block>::try_from(&std::fs::read(&out).unwrap()[..]).unwrap()
     };
-    assert_eq!(written(&[]), flight().block(3).unwrap());
+    assert_eq!(written(""), flight().block(3).unwrap());
     let fast = flight().no_faster_than(7.5).block(3).unwrap();
-    assert_eq!(written(&["--speed", "7.5"]), fast);
+    assert_eq!(written("--speed 7.5"), fast);
     for (arguments, words) in [
-        (
-            &["--speed", "7.5"][..],
-            "--speed: is for a scenario with a [site]",
-        ),
-        (&["--speed", "20.1"], "must be a number within 0.1 to 20.0"),
-        (&["--speed", "NaN"], "must be a number within 0.1 to 20.0"),
-        (&["--scenario", &off], "m from tx to rx"),
+        ("--speed 7.5", "--speed: is for a scenario with a [site]"),
+        ("--speed 20.1", "must be a number within 0.1 to 20.0"),
+        ("--speed NaN", "must be a number within 0.1 to 20.0"),
+        (&format!("--scenario {off}"), "m from tx to rx"),
     ] {
-        let text = refusal(&[&plain[..], arguments].concat());
+        let text = refusal(&format!("{plain} {arguments}"));
         assert!(text.contains(words), "{text}");
     }
 }
@@ -177,12 +174,12 @@ fn provision_has_the_key_of_the_autopilot_from_a_file() {
     let (out, file, sites) = (path("block.bin"), path("key"), path("sites.toml"));
     std::fs::write(&sites, TOML.replace("-47", "47")).unwrap();
     super::write_key(&file, &"4b".repeat(32));
-    let plain = ["--uavs", "5", "--index", "3", "--out", &out];
-    let keyed = [&plain[..], &["--autopilot-key-file", &file]].concat();
+    let plain = format!("--uavs 5 --index 3 --out {out}");
+    let keyed = format!("{plain} --autopilot-key-file {file}");
     let text = refusal(&keyed);
     assert!(text.contains("--autopilot-key-file"), "{text}");
     assert!(text.contains("[site]"), "{text}");
-    let sited = [&keyed[..], &["--scenario", &sites]].concat();
+    let sited = format!("{keyed} --scenario {sites}");
     assert!(provision(&sited).status.success());
     let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
     assert_eq!(autopilot_key(&block), Some(KEY));
