@@ -8,10 +8,13 @@
 )]
 
 use std::fmt::Write as _;
-use std::process::{Command, Output};
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
-use uav_relay_oracle::cases::{self, Case};
+use uav_relay_oracle::cases;
+use uav_relay_oracle::cases::Case;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Corridor, Effort, optimum};
 
@@ -118,7 +121,7 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
 /// The only relay leaves the line if there is lateral room, and no position is better.
 #[test]
 fn one_relay_aside_is_the_judges_of_three_dimensions() {
-    let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
+    let side = example("side.toml");
     let report = json(&format!("--scenario {side} --uavs 1 --altitude free"));
     assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
     assert_eq!(report["how"].as_str(), Some("one relay aside"));
@@ -258,40 +261,6 @@ fn the_answer_names_what_the_model_leaves_out() {
     }
 }
 
-#[test]
-fn wrong_input_is_named_in_one_line_with_status_2() {
-    let mut all = String::new();
-    for case in [
-        "",
-        "--uavs 0",
-        "--uavs 1001",
-        "--uavs 3 --target-sir 2",
-        "--target-sir 0",
-        "--target-sir nan",
-        "--target-sir -3",
-        "--target-sir-db 91",
-        "--target-rate-bps 5",
-        "--uavs 1 --bandwidth-hz 0",
-        "--uavs 1 --altitude low",
-        "--uavs 1 --x-m -1",
-        "--uavs 1 --x-m 1000.5",
-        "--uavs 1 --x-m nan",
-        "--uavs 2 --x-m 3",
-        "--target-sir 2 --x-m 3",
-        "--uavs 1 --tolerance 0",
-        "--uavs 1 --scenario no-such-file.toml",
-        "--uavs 1 --svg /no/such/folder/x.svg",
-    ] {
-        let (status, line) = refusal(case);
-        assert_eq!(status, 2, "{case}: {line}");
-        writeln!(all, "{case}\n    {}", line.trim_end()).unwrap();
-    }
-    insta::assert_snapshot!(all);
-    let field = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/field.toml");
-    let (status, line) = refusal(&format!("--uavs 1 --x-m 3 --scenario {field}"));
-    assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
-}
-
 /// The planner flies nothing, but finds the mistake before the flight.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
@@ -401,7 +370,7 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
 
 #[test]
 fn the_joint_optimum_comes_out_where_altitudes_are_free() {
-    let altitudes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/altitudes.toml");
+    let altitudes = example("altitudes.toml");
     let free = json(&format!("--scenario {altitudes} --uavs 8 --altitude free"));
     assert!(
         (number(&free["sir"]) / 1.235_783_8 - 1.0).abs() < 1e-3,
@@ -415,4 +384,350 @@ fn the_joint_optimum_comes_out_where_altitudes_are_free() {
     ));
     assert!(number(&fewer["uavs"]) <= number(&given["uavs"]), "{fewer}");
     assert!(number(&fewer["sir"]) >= 2.0);
+}
+
+fn said(arguments: &str) -> String {
+    let output = plan(arguments);
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn example(name: &str) -> String {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    file.join(name).to_str().unwrap().to_owned()
+}
+
+#[test]
+fn what_is_not_there_is_not_planned() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("map");
+    let map = map.to_str().unwrap();
+    let examples = example("");
+    let mut all = String::new();
+    for case in [
+        "",
+        "--uavs 0",
+        "--uavs 1001",
+        "--uavs 3 --target-sir 2",
+        "--target-sir 0",
+        "--target-sir nan",
+        "--target-sir -3",
+        "--target-sir-db 91",
+        "--target-rate-bps 5",
+        "--uavs 1 --bandwidth-hz 0",
+        "--uavs 1 --altitude low",
+        "--uavs 1 --x-m -1",
+        "--uavs 1 --x-m 1000.5",
+        "--uavs 1 --x-m nan",
+        "--uavs 2 --x-m 3",
+        "--target-sir 2 --x-m 3",
+        "--uavs 1 --tolerance 0",
+        "--uavs 1 --scenario no-such-file.toml",
+        "--uavs 1 --svg /no/such/folder/x.svg",
+        "--uavs 3 --geojson MAP",
+        "--uavs 3 --kml MAP",
+        "--uavs 3 --scenario EXAMPLES/scenario.toml",
+        "--uavs 1 --x-m 3 --altitude free",
+        "--uavs 1 --x-m far",
+        "--uavs 1 --x-m 3 --out MAP",
+        "--uavs 3 --altitude free --out MAP --scenario EXAMPLES/field.toml",
+        "--uavs 3 --out /no/such/folder/plan.toml",
+        "--uavs 3 --scenario EXAMPLES/site.toml --kml /no/such/folder/x.kml",
+        "--uavs 3 --force",
+        "--uavs ten",
+        "--uavs 99999999999999999999",
+        "--uavs 3 --altitude fre",
+        "--uavs 3 --jsn",
+    ] {
+        let options = case.replace("MAP", map).replace("EXAMPLES/", &examples);
+        let (status, line) = refusal(&options);
+        assert_eq!(status, 2, "{case}: {line}");
+        let line = line.replace(map, "MAP").replace(&examples, "EXAMPLES/");
+        writeln!(all, "{case}\n    {}", line.trim_end()).unwrap();
+    }
+    insta::assert_snapshot!(all);
+    assert!(!std::path::Path::new(map).exists());
+    let field = example("field.toml");
+    let (status, line) = refusal(&format!("--uavs 1 --x-m 3 --scenario {field}"));
+    assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
+    // Without a scenario file the message names the numbers and the keys of such a file.
+    let (status, line) = refusal("--uavs 300");
+    assert_eq!(status, 1);
+    assert!(
+        line.starts_with("no placement: 300 relays that stay 4 m apart need 1196 m, and there are 1000 m from Tx to Rx: fewer relays, or geometry.min_separation_m and geometry.distance_m of a --scenario FILE"),
+        "{line}"
+    );
+}
+
+#[test]
+fn maps_are_written_where_there_is_an_earth() {
+    let folder = tempfile::tempdir().unwrap();
+    let [geojson, kml] = ["plan.geojson", "plan.kml"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    said(&format!(
+        "--scenario {} --uavs 3 --geojson {geojson} --kml {kml}",
+        example("site.toml")
+    ));
+    let geojson: Value = serde_json::from_str(&std::fs::read_to_string(geojson).unwrap()).unwrap();
+    // Tx, Rx, three relays, the interferer, four hops.
+    assert_eq!(geojson["features"].as_array().unwrap().len(), 10);
+    let kml = std::fs::read_to_string(kml).unwrap();
+    let kml = roxmltree::Document::parse(&kml).unwrap();
+    let places = kml
+        .descendants()
+        .filter(|node| node.has_tag_name(("http://www.opengis.net/kml/2.2", "Placemark")));
+    assert_eq!(places.count(), 10);
+}
+
+#[test]
+fn what_is_asked_in_decibels_is_answered_in_decibels() {
+    let (status, line) = refusal("--target-sir-db 60");
+    assert_eq!(status, 1);
+    assert!(line.starts_with("no number of relays, up to 1000, gives every hop an SIR of 60 dB: the most is 20.980 dB, with "), "{line}");
+    let (_, line) = refusal("--target-sir 1000");
+    assert!(
+        line.contains("an SIR of 1000: the most is 125.31"),
+        "{line}"
+    );
+    let (_, line) = refusal(&format!(
+        "--target-sir-db 60 --scenario {}",
+        example("multi_interferer.toml")
+    ));
+    assert!(
+        line.contains("an SIR of 60 dB: the most found is ") && line.contains(" dB"),
+        "{line}"
+    );
+
+    let table = said("--target-sir-db 6");
+    for part in [
+        "worst hop: 6.000 dB (SIR 3.98107",
+        "target: SIR 6 dB; that many relays reach up to 6.",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+    let table = said("--target-sir 4");
+    for part in [
+        "worst hop: SIR 4.00000",
+        "target: SIR 4; that many relays reach up to 4.",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+}
+
+#[test]
+fn json_has_both_units() {
+    let read =
+        |arguments: &str| -> Value { serde_json::from_slice(&plan(arguments).stdout).unwrap() };
+    let pairs = |report: &Value, names: &[&str]| {
+        for name in names {
+            let of = |name: &str| {
+                report[name]
+                    .as_f64()
+                    .unwrap_or_else(|| panic!("{name}: {report}"))
+            };
+            let db = 10.0 * of(name).log10();
+            assert!(
+                (db - of(&format!("{name}_db"))).abs() < 1e-9,
+                "{name}: {report}"
+            );
+        }
+    };
+    let met = read("--target-sir-db 6 --json");
+    pairs(&met, &["sir", "target_sir", "most_sir", "rx_sir"]);
+    pairs(
+        &read("--target-sir-db 60 --json"),
+        &["best_sir", "target_sir"],
+    );
+}
+
+#[test]
+fn a_case_is_told_as_what_it_means_for_the_drone() {
+    let json = json("--uavs 1");
+    let table = said("--uavs 1");
+    let words = json["case_words"].as_str().unwrap();
+    assert!(words.starts_with("the drone "), "{words}");
+    let line = format!(
+        "{words} (Theorem {}, case {})\n",
+        json["theorem"], json["case"]
+    );
+    assert!(table.contains(&line), "{line}: {table}");
+    for (arguments, theorem) in [
+        ("--x-m 300", "(Theorem 2, case "),
+        ("--altitude free", "(Theorem 3, case "),
+        (
+            &format!("--altitude free --scenario {}", example("side.toml")),
+            "(one relay aside, case ",
+        ),
+    ] {
+        let table = said(&format!("--uavs 1 {arguments}"));
+        let line = table
+            .lines()
+            .find(|line| line.contains(theorem))
+            .unwrap_or_else(|| panic!("{table}"));
+        assert!(line.contains("the drone "), "{line}");
+    }
+}
+
+/// Map numbers are rounded for people: millimetres, thousandths of a decibel, whole counts.
+#[test]
+fn a_map_has_rounded_numbers_with_units_in_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let [geojson, kml] = ["plan.geojson", "plan.kml"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let scenario = example("decibels.toml");
+    let maps = format!("--geojson {geojson} --kml {kml}");
+    said(&format!("--scenario {scenario} --uavs 3 {maps}"));
+    let is_short = |name: &str, number: &str| {
+        let decimals = number.split_once('.').map_or("", |(_, decimals)| decimals);
+        let most = match name {
+            "index" | "hop" => 0,
+            "sir_ratio" => 6,
+            _ => 3,
+        };
+        decimals.len() <= most && !number.contains('e')
+    };
+    let text = std::fs::read_to_string(&geojson).unwrap();
+    let map: Value = serde_json::from_str(&text).unwrap();
+    let mut names = std::collections::BTreeSet::new();
+    for feature in map["features"].as_array().unwrap() {
+        for (name, value) in feature["properties"].as_object().unwrap() {
+            let Value::Number(number) = value else {
+                continue;
+            };
+            names.insert(name.clone());
+            let is_count = matches!(name.as_str(), "index" | "hop");
+            assert_eq!(number.is_u64(), is_count, "{name}: {number}");
+            assert!(
+                is_count || is_short(name, number.to_string().trim_end_matches(".0")),
+                "{name}: {number}"
+            );
+        }
+    }
+    let known = [
+        "amsl_m",
+        "eirp_dbm",
+        "h_m",
+        "hop",
+        "index",
+        "sir_db",
+        "sir_ratio",
+        "x_m",
+        "y_m",
+    ];
+    assert!(names.iter().eq(known), "{names:?}");
+    let text = std::fs::read_to_string(&kml).unwrap();
+    let descriptions = text.split("<description>").skip(1);
+    let mut numbers = 0;
+    for description in descriptions {
+        for pair in description.split('<').next().unwrap().split(", ") {
+            let (name, number) = pair.split_once(" = ").unwrap();
+            assert!(is_short(name, number), "{pair}");
+            numbers += 1;
+        }
+    }
+    assert!(numbers > 20, "{text}");
+}
+
+/// Returns the paper's scenario with extra lines in `[power]`.
+fn with(sections: &str) -> tempfile::NamedTempFile {
+    let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let text = std::fs::read_to_string(example("scenario.toml")).unwrap();
+    let text = text.replace("[power]", &format!("[power]\n{sections}"));
+    writeln!(file, "{text}").unwrap();
+    file
+}
+
+fn json_of(file: &tempfile::NamedTempFile) -> Value {
+    let output = plan(&format!(
+        "--json --uavs 6 --scenario {}",
+        file.path().display()
+    ));
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// k T0 B F: 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
+#[test]
+fn the_noise_is_k_t_b_f_and_says_of_what() {
+    let noisy = "\n[noise]\nbandwidth_hz = 20e6\nfigure_db = 6.0\n";
+    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let plain = std::fs::read_to_string(example("scenario.toml")).unwrap();
+    std::fs::write(file.path(), format!("{plain}{noisy}")).unwrap();
+    let table = said(&format!("--uavs 6 --scenario {}", file.path().display()));
+    let line = "noise: -94.965 dBm, 3.187948e-13 W, at every receiver: k T0 B F with T0 = 290 K, B = 20000000 Hz, F = 6 dB\n";
+    assert!(table.contains(line), "{table}");
+    let noise = &json_of(&file)["noise"];
+    let is = |name: &str, expected: f64, within: f64| {
+        let value = noise[name].as_f64().unwrap();
+        assert!((value / expected - 1.0).abs() < within, "{name}: {noise}");
+    };
+    is("power_w", 3.187_948_3e-13, 1e-7);
+    is("power_dbm", -94.964_89, 1e-6);
+    is("bandwidth_hz", 20e6, 1e-15);
+    is("figure_db", 6.0, 1e-15);
+    is("temperature_k", 290.0, 1e-15);
+    is("effective_w", 3.187_948_3e-13, 1e-7);
+
+    // Antennas of 3 dBi at the relays and 5 dBi at the receiver: the lower gain counts, 10^0.3 = 1.99526231.
+    let gains = "uav_gain_dbi = 3.0\nrx_gain_dbi = 5.0";
+    let aired = with(gains);
+    let text = std::fs::read_to_string(aired.path()).unwrap();
+    std::fs::write(aired.path(), format!("{text}{noisy}")).unwrap();
+    let effective = json_of(&aired)["noise"]["effective_w"].as_f64().unwrap();
+    assert!(
+        (effective / 1.597_759_0e-13 - 1.0).abs() < 1e-6,
+        "{effective:e}"
+    );
+
+    // No derivation for a power stated in the file, or without noise.
+    for given in ["\n[noise]\npower_dbm = -95.0\n", ""] {
+        std::fs::write(file.path(), format!("{plain}{given}")).unwrap();
+        assert!(json_of(&file)["noise"].is_null(), "{given}");
+    }
+}
+
+fn unheard(tool: &str, arguments: &str) -> Option<i32> {
+    let pipe = || {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        Stdio::from(writer)
+    };
+    let status = Command::new(tool)
+        .args(arguments.split_whitespace())
+        .stdout(pipe())
+        .stderr(pipe())
+        .status();
+    status.unwrap().code()
+}
+
+#[test]
+fn nobody_reads_and_the_status_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let [plan, provision, figures] = [
+        env!("CARGO_BIN_EXE_plan"),
+        env!("CARGO_BIN_EXE_provision"),
+        env!("CARGO_BIN_EXE_figures"),
+    ];
+    let (block, blocks, pages) = (path("block.bin"), path("blocks"), path("figures"));
+    for (tool, arguments, status) in [
+        (plan, "--uavs 8", 0),
+        (plan, "--uavs 8 --json", 0),
+        (plan, "--help", 0),
+        (plan, "--uavs x", 2),
+        (plan, "--target-sir-db 60", 1),
+        (provision, &format!("--uavs 3 --index 1 --out {block}"), 0),
+        (provision, &format!("--uavs 3 --all --out-dir {blocks}"), 0),
+        (provision, &format!("--uavs 3 --all --out-dir {blocks}"), 2),
+        (provision, "--help", 0),
+        (figures, &format!("--only locus --out {pages}"), 0),
+        (figures, "--only none", 2),
+        (figures, "--help", 0),
+    ] {
+        assert_eq!(
+            unheard(tool, arguments),
+            Some(status),
+            "{tool} {arguments:?}"
+        );
+    }
 }

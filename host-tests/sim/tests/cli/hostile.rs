@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{chain, json, refusal, refusals};
+use super::{chain, json, refusal};
 
 #[test]
 fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
@@ -283,24 +283,6 @@ fn the_story_tells_who_does_not_hear_whom() {
         (deaf[0]["relay"].as_u64(), deaf[0]["other"].as_u64()),
         (Some(4), Some(3))
     );
-}
-
-#[test]
-fn wrong_options_of_the_air_are_named_with_what_is_allowed() {
-    insta::assert_snapshot!(refusals(&[
-        "--air csma --wires",
-        "--air tdma",
-        "--baud 299",
-        "--burst 0.5",
-        "--burst 2 --loss 0.7",
-        "--deaf 4:3",
-        "--deaf 4@3",
-        "--deaf 4:4@1",
-        "--deaf 4:3@9-5",
-        "--deaf 9:3@1",
-        "--deaf 3:0@1",
-        "--soak 0",
-    ]));
 }
 
 const TOML: &str =

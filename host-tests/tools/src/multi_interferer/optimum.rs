@@ -1,6 +1,6 @@
 //! The best chain against the true sum of the interference, for relays at one fixed altitude.
 
-use uav_relay_scenario::hypothetical::mesh::{Centre, graded};
+use uav_relay_scenario::hypothetical::{Centre, graded};
 use uav_relay_scenario::scene::Scene;
 
 /// Relative bracket width at which the bisection of the target ends.

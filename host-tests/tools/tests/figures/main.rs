@@ -12,9 +12,7 @@
 )]
 
 mod altitudes;
-mod aside;
 mod chains;
-mod fields;
 mod files;
 mod single;
 

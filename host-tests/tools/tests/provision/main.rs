@@ -8,13 +8,9 @@
     missing_docs
 )]
 
-mod all;
 mod block;
 mod command;
-mod listen;
-mod ranges;
-mod secret;
-mod sites;
+mod parts;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
