@@ -1,10 +1,10 @@
 //! Baseline placements that ignore the interferer, for comparison with the crate's methods.
 //!
-//! | file | positions of the relays |
+//! | function | positions of the relays |
 //! | --- | --- |
-//! | [`random`] | uniformly random, in order; mean over many draws |
-//! | [`blind`] | maximise the weakest received signal, without interference |
-//! | [`equal`] | equal spacing |
+//! | [`mean`] | uniformly random, in order; mean over many draws |
+//! | [`blind_places`] | maximise the weakest received signal, without interference |
+//! | [`equal_places`] | equal spacing |
 //!
 //! Each is scored in f64 by [`Scene`](uav_relay_scenario::scene::Scene): the SIR of the worst hop.
 

@@ -1,11 +1,4 @@
 //! Drones with simulated autopilots, connected to their relays by MAVLink.
-//!
-//! | file | contents |
-//! | --- | --- |
-//! | [`spec`] | flight parameters and pilots' actions |
-//! | `frames` | MAVLink frames of the autopilot |
-//! | `pilot` | take-off, hand-over, takeover |
-//! | `vehicle` | one drone: dynamics, modes and messages |
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -6,16 +6,15 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | [`locus`], [`single`], [`single_gains`], [`single_sheet`], [`aside`] | one relay |
+//! | [`locus`], [`single`], [`aside`] | one relay |
 //! | [`fewest`], [`convergence`], [`gain`], [`cost`] | chains at one altitude |
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
 //! | [`sensing`] | an unknown interferer |
 //! | [`paper`] | the paper's scenarios, as missions |
-//! | [`walk`], [`flight`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
-//! | [`chart`], [`scale`], [`draw`] | a chart, its axes, its SVG |
-//! | [`sheet`], [`page`] | a figure with its tables and text; the page of all figures |
-//! | [`error`] | errors |
+//! | [`walk`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
+//! | [`chart`], [`draw`] | a chart, its axes, its SVG |
+//! | [`sheet`] | a figure with its tables and text; the page of all figures; errors |
 
 pub mod adjust;
 pub mod altitude;

@@ -2,9 +2,9 @@
 //!
 //! | interference | file |
 //! | --- | --- |
-//! | one interferer | `one`, `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
-//! | a field | `field`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
-//! | several interferers | `several`: the hypothetical interferer, or the true sum where that is not good enough |
+//! | one interferer | `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
+//! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
+//! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
 //!
 //! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
 //! optimal.
