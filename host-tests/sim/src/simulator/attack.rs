@@ -158,8 +158,6 @@ pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
         .map_or("oversized", |(name, _)| name)
 }
 
-/// Network number of every simulated relay.
-
 /// Header flags: a tag follows; the body is a handshake.
 const SIGNED: u8 = 0x10;
 const HELLO: u8 = 0x20;
