@@ -7,8 +7,7 @@ use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::{self, Chain, Style};
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::Scene;
-use uav_relay_tools::baseline::random::mean;
-use uav_relay_tools::baseline::{blind, equal};
+use uav_relay_tools::baseline::{blind_places, equal_places, mean};
 
 fn scene(link: &Link) -> Scene {
     scene_of(link).unwrap()
@@ -25,10 +24,10 @@ fn a_single_relay_stands_where_the_reference_says() {
     for case in cases {
         let mut link = case.link(1);
         link.relays[0].altitude_m = case.arg("h").unwrap();
-        let places = blind::places(&scene(&link));
+        let places = blind_places(&scene(&link));
         assert!(off(places[0], case.part("chen_x").unwrap()) < case.rtol);
         assert!(off(link.chain_sir(&places), case.part("chen_sir").unwrap()) < case.rtol);
-        let middle = link.chain_sir(&equal::places(&scene(&link)));
+        let middle = link.chain_sir(&equal_places(&scene(&link)));
         assert!(off(middle, case.part("midpoint_sir").unwrap()) < case.rtol);
         let random = mean(&scene(&link), 200_000, 1);
         let want = case.part("random_mean").unwrap();
@@ -46,12 +45,12 @@ fn chains_stand_where_the_reference_says() {
     assert!(!cases.is_empty());
     for case in cases {
         let link = case.link(case.relays().unwrap());
-        let places = blind::places(&scene(&link));
+        let places = blind_places(&scene(&link));
         for (got, want) in places.iter().zip(case.part_list("chen_x").unwrap()) {
             assert!(off(*got, want) < case.rtol, "{got} against {want}");
         }
         assert!(off(link.chain_sir(&places), case.part("chen_sir").unwrap()) < case.rtol);
-        let equal = link.chain_sir(&equal::places(&scene(&link)));
+        let equal = link.chain_sir(&equal_places(&scene(&link)));
         assert!(off(equal, case.part("equal_sir").unwrap()) < case.rtol);
     }
 }
@@ -98,7 +97,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
         };
         for _ in 0..links {
             let link = random::link(&mut rng, &style);
-            let places = blind::places(&scene(&link));
+            let places = blind_places(&scene(&link));
             assert_eq!(places.len(), link.len());
             assert!(places.windows(2).all(|pair| pair[0] <= pair[1]));
             assert!((0.0..=link.distance_m).contains(&places[0]));
@@ -122,7 +121,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);
-    let places = blind::places(&scene(&link));
+    let places = blind_places(&scene(&link));
     assert!(off(places[49], link.distance_m) < 1e-12);
     let first = (80.0_f64 - 1.0).sqrt() * 20.0;
     let (step, whole) = (20.0, first + 49.0 * 20.0);
@@ -135,7 +134,7 @@ fn surplus_relays_shorten_all_hops_in_proportion() {
 fn the_weaker_ground_station_has_its_relay_above_it() {
     let mut link = Link::paper(60);
     link.tx_w = 0.5;
-    let places = blind::places(&scene(&link));
+    let places = blind_places(&scene(&link));
     // At 0.5 W / (eta h^2) the steps are 0 to the first relay, sqrt(2) h between relays, h to Rx.
     let (step, last) = (20.0 * 2.0_f64.sqrt(), 20.0);
     let whole = 59.0 * step + last;

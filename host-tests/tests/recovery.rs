@@ -3,7 +3,7 @@
 use host_tests::fixtures::mission;
 use uav_relay::Instant;
 use uav_relay_sim::report::ChainReport;
-use uav_relay_sim::report::recovery::RecoveryReport;
+use uav_relay_sim::report::timeline::RecoveryReport;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;

@@ -9,10 +9,10 @@ use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
-use uav_relay_sim::beta::beta_w;
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::true_interference::beta_w;
 
 fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
     of_stochastic_link(link, min_separation_m).unwrap()

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Found, Results, Run, Solved};
 use crate::score::{Score, judge, score};
-use uav_relay_xtask::number::spaced;
+use uav_relay_xtask::toolchain::spaced;
 
 const TITLES: [(Choice, &str); 3] = [
     (

@@ -8,8 +8,8 @@ use uav_relay::sensing::belief::Belief;
 use uav_relay::{Instant, Placement, Side};
 use uav_relay_scenario::number::narrow;
 use uav_relay_sim::cli::Prepared;
-use uav_relay_sim::simulator::film::{Sent, Shot};
-use uav_relay_sim::simulator::outcome::Outcome;
+use uav_relay_sim::report::seconds;
+use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
 /// Largest number of moments; moments close to each other are merged.
 const STANDS: usize = 600;
@@ -134,15 +134,11 @@ fn told(
     (index, is_on, place)
 }
 
-fn frame(sent: &Sent) -> (f64, u16, i8) {
+fn frame(sent: &Transmission) -> (f64, u16, i8) {
     let to = match sent.to {
         Some(Side::Upstream) => -1,
         Some(Side::Downstream) => 1,
         None => 0,
     };
     (seconds(sent.at), sent.relay, to)
-}
-
-fn seconds(at: Instant) -> f64 {
-    at.as_micros() as f64 / 1e6
 }

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use toml::Table;
 
+use super::keys::SECTIONS;
 use crate::check;
-use crate::deployment_keys::SECTIONS;
 use crate::error::{Problem, ScenarioError};
 
 /// Default network number of all tools.

@@ -4,17 +4,16 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use toml::Table;
+use uav_relay::flight::axis::{Axis, AxisError};
+use uav_relay::{Geodetic, Placement};
 
-use crate::check::{mistake, unread};
-use crate::error::{Problem, ScenarioError};
-use crate::interferer::{RawSource, Room, sources};
-use crate::keys::number;
-use crate::plan::{Planned, PlannedMethod, PlannedPlace};
-use crate::power::{Powers, RawPower, Said, powers};
-use crate::site::{self, RawSites};
-use crate::spec::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, ListenSpec, Noise, RelayOverride,
-    Scenario,
+use super::check::{mistake, unread};
+use super::error::{Problem, ScenarioError};
+use super::keys::number;
+use super::number::{factor, watts};
+use super::spec::{
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, Planned,
+    PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
 };
 
 /// Scenario file as serde reads it. `deny_unknown_fields` guards the table of keys: a key that is listed there but missing here
@@ -159,7 +158,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     if altitude_max_m < altitude_m {
         return band("geometry.altitude_max_m", altitude_max_m, "least");
     }
-    let (line, distance_m) = site::line(file, raw.site, geometry.distance_m)?;
+    let (line, distance_m) = line(file, raw.site, geometry.distance_m)?;
     let powers = powers(file, &raw.power)?;
     let room = Room {
         line: line.as_ref(),
@@ -380,4 +379,332 @@ fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
         sir_db: raw.sir_db,
         places: raw.places,
     })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawSites {
+    tx: RawSite,
+    rx: RawSite,
+    geoid_m: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSite {
+    lat_deg: f64,
+    lon_deg: f64,
+    amsl_m: f64,
+}
+
+/// Returns the geographic line, if there are sites, and the distance from Tx to Rx. The given one, or that of the sites.
+pub(super) fn line(
+    file: &str,
+    sites: Option<RawSites>,
+    distance_m: Option<f64>,
+) -> Result<(Option<Line>, f64), ScenarioError> {
+    let Some(sites) = sites else {
+        let missing = || {
+            let allowed = "a number, 1 to 1e6 m, or [site]".to_owned();
+            mistake(file, "geometry.distance_m", None, Problem::Missing, allowed)
+        };
+        return distance_m.map(|given| (None, given)).ok_or_else(missing);
+    };
+    let line = line_on_earth(file, &sites)?;
+    let along = line.axis.distance_m();
+    match distance_m {
+        #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
+        Some(given) if !line.axis.is_of(given as f32) => {
+            let allowed = format!("{along:.3} m, as [site] has it, or none");
+            Err(mistake(
+                file,
+                "geometry.distance_m",
+                Some(number(given)),
+                Problem::OtherDistance,
+                allowed,
+            ))
+        }
+        _ => Ok((Some(line), along)),
+    }
+}
+
+fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
+    let geoid_m = sites.geoid_m;
+    let sites @ [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
+        // The ranges have been checked.
+        Geodetic::from_degrees(site.lat_deg, site.lon_deg, site.amsl_m).unwrap_or_default()
+    });
+    let axis = Axis::try_new(tx, rx).map_err(|error| {
+        let value = match error {
+            AxisError::TooShort { distance_m } | AxisError::TooLong { distance_m } => {
+                format!("{distance_m:.2} m from tx to rx")
+            }
+            AxisError::Tx(_) | AxisError::Rx(_) => error.to_string(),
+        };
+        let allowed = "10 to 1e5 m".to_owned();
+        mistake(file, "site", Some(value), Problem::OutOfRange, allowed)
+    })?;
+    Ok(Line {
+        axis,
+        sites,
+        geoid_m,
+    })
+}
+
+// Powers as in data sheets, in W or dBm and with antenna gains, and their form in the model.
+//
+// The channel model has only a path loss: P / (mu d^2) is received of P. With antennas of gains `G_t` and `G_r` (Friis) it is
+// `P G_t G_r / (mu d^2)`. With the interferers' `P_i G_i` and the receiver's noise N, the SINR is
+//
+// ```text
+// P G_t G_r / (mu d^2)                      P G_t / (mu d^2)
+// --------------------------------  =  ------------------------------
+// sum P_i G_i G_r / (mu_i d_i^2) + N   sum P_i G_i / (mu_i d_i^2) + N / G_r
+// ```
+//
+// so a sender's gain is included in its power (its EIRP counts), and a receiver's gain, which signal and interference share,
+// divides its noise. Without noise it has no effect.
+//
+// A mission has one N for all receivers. If the gains of the relays and of Rx differ, the lower one is used: exact for receivers
+// with that gain, and a lower bound on the SINR at the others.
+//
+// An antenna has the same gain in all directions; a null toward the interferer is not modelled.
+
+/// EIRPs that a mission accepts for Tx and relays, W, and for interferers.
+const EIRP: [f64; 2] = [1e-6, 1e6];
+const SOURCE_EIRP: [f64; 2] = [1e-6, 1e9];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPower {
+    tx_w: Option<f64>,
+    tx_dbm: Option<f64>,
+    tx_gain_dbi: Option<f64>,
+    tx_eirp_dbm: Option<f64>,
+    uav_w: Option<f64>,
+    uav_dbm: Option<f64>,
+    uav_gain_dbi: Option<f64>,
+    rx_gain_dbi: Option<f64>,
+}
+
+pub(super) struct Powers {
+    pub(super) tx_w: f64,
+    pub(super) uav_w: f64,
+    pub(super) uav_gain_dbi: f64,
+    pub(super) rx_gain_dbi: f64,
+}
+
+/// A sender's power in one of the forms that a table allows.
+pub(super) struct Said<'a> {
+    /// Name of the table, such as `interferer[0].`, and the keys in it.
+    pub(super) table: &'a str,
+    pub(super) in_w: (&'a str, Option<f64>),
+    pub(super) in_dbm: (&'a str, Option<f64>),
+    pub(super) eirp: (&'a str, Option<f64>),
+    /// Key and value of the antenna gain.
+    pub(super) gain: (&'a str, Option<f64>),
+}
+
+impl Said<'_> {
+    fn eirp_w(&self, file: &str, [least, most]: [f64; 2]) -> Result<Option<f64>, ScenarioError> {
+        let gain = self.gain.1.map_or(1.0, factor);
+        let ((key, given), eirp_w) = match (self.in_w, self.in_dbm, self.eirp) {
+            (said @ (_, Some(power_w)), _, _) => (said, power_w * gain),
+            (_, said @ (_, Some(dbm)), _) => (said, watts(dbm) * gain),
+            (_, _, said @ (_, Some(dbm))) => (said, watts(dbm)),
+            _ => return Ok(None),
+        };
+        // The ranges of the keys have the same limits, apart from rounding of powers of ten.
+        if (least * (1.0 - 1e-9)..=most * (1.0 + 1e-9)).contains(&eirp_w) {
+            return Ok(Some(eirp_w.clamp(least, most)));
+        }
+        let (antenna, gain) = self.gain;
+        let said = format!(
+            "{} with {antenna} = {}, an EIRP of {eirp_w:.3e} W,",
+            number(given.unwrap_or_default()),
+            number(gain.unwrap_or_default())
+        );
+        let allowed = format!("an EIRP of {} to {} W", number(least), number(most));
+        let key = format!("{}{key}", self.table);
+        Err(mistake(
+            file,
+            &key,
+            Some(said),
+            Problem::OutOfRange,
+            allowed,
+        ))
+    }
+
+    pub(super) fn of_ours(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
+        self.eirp_w(file, EIRP)
+    }
+
+    pub(super) fn of_source(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
+        self.eirp_w(file, SOURCE_EIRP)
+    }
+}
+
+pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError> {
+    let table = "power.";
+    let tx = Said {
+        table,
+        in_w: ("tx_w", raw.tx_w),
+        in_dbm: ("tx_dbm", raw.tx_dbm),
+        eirp: ("tx_eirp_dbm", raw.tx_eirp_dbm),
+        gain: ("tx_gain_dbi", raw.tx_gain_dbi),
+    };
+    let uav = Said {
+        table,
+        in_w: ("uav_w", raw.uav_w),
+        in_dbm: ("uav_dbm", raw.uav_dbm),
+        eirp: ("", None),
+        gain: ("uav_gain_dbi", raw.uav_gain_dbi),
+    };
+    Ok(Powers {
+        tx_w: tx.of_ours(file)?.unwrap_or_default(),
+        uav_w: uav.of_ours(file)?.unwrap_or_default(),
+        uav_gain_dbi: raw.uav_gain_dbi.unwrap_or_default(),
+        rx_gain_dbi: raw.rx_gain_dbi.unwrap_or_default(),
+    })
+}
+
+/// Largest change of interference, dB, by ignoring an interferer's height. It holds anywhere that relays or Rx may be.
+const MOST_OFF_DB: f64 = 1.0;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawSource {
+    power_w: Option<f64>,
+    power_dbm: Option<f64>,
+    gain_dbi: Option<f64>,
+    eirp_dbm: Option<f64>,
+    x_m: Option<f64>,
+    y_m: Option<f64>,
+    lat_deg: Option<f64>,
+    lon_deg: Option<f64>,
+    amsl_m: Option<f64>,
+}
+
+pub(super) struct Room<'a> {
+    pub(super) line: Option<&'a Line>,
+    pub(super) distance_m: f64,
+    pub(super) altitudes_m: [f64; 2],
+    pub(super) lateral_m: [f64; 2],
+}
+
+/// Returns the interferers of a file whose keys have been checked.
+pub(super) fn sources(
+    file: &str,
+    raw: &[RawSource],
+    room: &Room,
+) -> Result<Vec<Source>, ScenarioError> {
+    let each = raw.iter().enumerate();
+    each.map(|(at, raw)| {
+        let table = format!("interferer[{at}].");
+        let said = Said {
+            table: &table,
+            in_w: ("power_w", raw.power_w),
+            in_dbm: ("power_dbm", raw.power_dbm),
+            eirp: ("eirp_dbm", raw.eirp_dbm),
+            gain: ("gain_dbi", raw.gain_dbi),
+        };
+        let power_w = said.of_source(file)?.unwrap_or_default();
+        let (x_m, y_m) = match (raw.lat_deg, raw.lon_deg) {
+            (Some(lat), Some(lon)) => on_earth(file, &table, raw, [lat, lon], room)?,
+            _ => (raw.x_m.unwrap_or_default(), raw.y_m.unwrap_or_default()),
+        };
+        Ok(Source { power_w, x_m, y_m })
+    })
+    .collect()
+}
+
+/// Converts geographic coordinates to a position along the line and to its right, m.
+fn on_earth(
+    file: &str,
+    table: &str,
+    raw: &RawSource,
+    [lat_deg, lon_deg]: [f64; 2],
+    room: &Room,
+) -> Result<(f64, f64), ScenarioError> {
+    let key = format!("{table}lat_deg");
+    let value = format!("{lat_deg}, lon_deg = {lon_deg}");
+    let fail = |problem, allowed: &str| {
+        Err(mistake(
+            file,
+            &key,
+            Some(value.clone()),
+            problem,
+            allowed.to_owned(),
+        ))
+    };
+    let Some(line) = room.line else {
+        let allowed = "x_m and y_m, or a [site] that says where the line is";
+        return fail(Problem::NoSite, allowed);
+    };
+    let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
+    let Some(place) = point.and_then(|point| line.axis.place(point)) else {
+        let allowed = format!(
+            "up to {} m from the line of [site] and from its ends",
+            Axis::AROUND_M
+        );
+        return fail(Problem::OutOfRange, &allowed);
+    };
+    let Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    } = place;
+    let (x_m, y_m) = (f64::from(x_m), f64::from(y_m));
+    if let Some(amsl_m) = raw.amsl_m {
+        let above_m = f64::from(altitude_m);
+        let off_db = room.off_by_db(x_m, y_m, above_m);
+        if off_db > MOST_OFF_DB {
+            let value = format!(
+                "{}, {above_m:.1} m above the straight line between the sites,",
+                number(amsl_m)
+            );
+            let allowed = format!(
+                "a height that changes the interference anywhere by at most {MOST_OFF_DB} dB, and this does by {off_db:.1} dB: \
+                 interferers are on the ground; none, for one there"
+            );
+            let key = format!("{table}amsl_m");
+            return Err(mistake(
+                file,
+                &key,
+                Some(value),
+                Problem::OutOfRange,
+                allowed,
+            ));
+        }
+    }
+    Ok((x_m, y_m))
+}
+
+impl Room<'_> {
+    /// Returns the largest difference, dB, of the interference by a source's height. The source is `above_m` over (`x_m`, `y_m`),
+    /// or on the ground below.
+    ///
+    /// At a given altitude it is largest for the nearest relay position; altitudes are tried in steps. Rx is a further receiver.
+    fn off_by_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
+        const STEPS: u32 = 64;
+        let ratio_db = |beside_m: f64, h: f64| {
+            let beside = beside_m * beside_m;
+            let (ground, there) = (beside + h * h, beside + (h - above_m) * (h - above_m));
+            (10.0 * (ground / there).log10()).abs()
+        };
+        let [low, high] = self.altitudes_m;
+        let [left, right] = self.lateral_m;
+        let nearest = (x_m - x_m.clamp(0.0, self.distance_m)).hypot(y_m - y_m.clamp(left, right));
+        let at_relays = (0..=STEPS)
+            .map(|step| low + (high - low) * f64::from(step) / f64::from(STEPS))
+            .map(|h| ratio_db(nearest, h));
+        // An interferer at Rx drowns it at any height.
+        let at_rx = (x_m - self.distance_m).hypot(y_m);
+        let at_rx = if at_rx > 0.0 {
+            ratio_db(at_rx, 0.0)
+        } else {
+            0.0
+        };
+        at_relays.fold(at_rx, f64::max)
+    }
 }

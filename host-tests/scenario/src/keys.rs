@@ -4,10 +4,11 @@
 
 use core::fmt;
 
+use Rule::{Choice, LinkOrNumber, Number, Text, Whole};
 use toml::Table;
 
-use crate::endpoint::FORM;
-use crate::plan::PlannedMethod;
+use super::endpoint::FORM;
+use super::spec::PlannedMethod;
 
 /// Range of numbers; both ends are included, except a low end that is `open`.
 pub(super) struct Range {
@@ -104,8 +105,6 @@ const fn without(others: &'static [&'static str], name: &'static str, rule: Rule
     }
 }
 
-use Rule::{LinkOrNumber, Number, Whole};
-
 // Up to the altitude of aircraft.
 const ALTITUDE: Range = range(0.1, 1e4, "m");
 const POWER: Range = range(1e-6, 1e6, "W");
@@ -143,7 +142,7 @@ const GEOMETRY: Keys = &[
 
 const PLAN: Keys = &[
     required("uavs", Whole(range(1.0, 1000.0, ""))),
-    required("method", Rule::Choice(PlannedMethod::NAMES)),
+    required("method", Choice(PlannedMethod::NAMES)),
     required("tolerance", Number(range(1e-6, 0.1, ""))),
     required("sir_db", Number(range(-400.0, 400.0, "dB"))),
     required("places", Rule::Tables(PLANNED_PLACE, 1)),
@@ -301,9 +300,9 @@ impl fmt::Display for Rule {
             Whole(range) => write!(f, "a whole number, {range}"),
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
-            Rule::Text => f.write_str("a text that is not empty"),
+            Text => f.write_str("a text that is not empty"),
             Rule::TtyOrUdp => write!(f, "a tty, or {FORM}"),
-            Rule::Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
+            Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
             Rule::Table(keys) => write!(f, "a table with the keys {}", names(*keys)),
             Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(*keys)),
             Rule::Tables(keys, least) => write!(
@@ -340,3 +339,56 @@ pub(super) fn names<'a>(keys: impl IntoIterator<Item = &'a Key>) -> String {
         .collect::<Vec<_>>()
         .join(", ")
 }
+
+const BAUD: Range = range(1_200.0, 4e6, "bit/s");
+const SILENCE: Range = range(1.0, 3.6e6, "ms");
+
+pub(super) const SECTIONS: Keys = &[
+    optional("network", Rule::Table(NETWORK)),
+    optional("companion", Rule::Table(COMPANION)),
+    optional("ground", Rule::Table(GROUND)),
+];
+
+const NETWORK: Keys = &[
+    optional("id", Whole(range(0.0, 65_535.0, ""))),
+    optional("relays", Whole(range(1.0, 1_000.0, ""))),
+    optional("key_file", Text),
+    optional("method", Choice(&["align", "joint", "adjust"])),
+    optional("baud", Whole(BAUD)),
+    optional("probe_after_ms", Whole(SILENCE)),
+    optional("dead_after_ms", Whole(SILENCE)),
+];
+
+const COMPANION: Keys = &[
+    optional("index", Whole(range(1.0, 1_000.0, ""))),
+    optional("upstream", Text),
+    optional("downstream", Text),
+    optional("shared", Text),
+    optional("epoch_file", Text),
+    optional("upload_file", Text),
+    optional("view_file", Text),
+    optional("autopilot", Rule::TtyOrUdp),
+    optional("autopilot_baud", Whole(BAUD)),
+    optional("autopilot_key_file", Text),
+    optional("speed_m_s", Number(range(0.1, 20.0, "m/s"))),
+    optional("positions", Text),
+    optional("position_error_m", Number(range(0.0, 1_000.0, "m"))),
+    optional("json", Rule::Flag),
+    optional("log_file", Text),
+    optional("status_socket", Text),
+    optional("capture", Text),
+];
+
+const GROUND: Keys = &[
+    optional("tty", Text),
+    optional("shared", Rule::Flag),
+    optional("end", Choice(&["tx", "rx"])),
+    optional("epoch_file", Text),
+    optional("timeout_s", Whole(range(1.0, 86_400.0, "s"))),
+    optional("stand", Rule::Flag),
+    optional("measurements", Text),
+    optional("json", Rule::Flag),
+    optional("log_file", Text),
+    optional("status_socket", Text),
+    optional("capture", Text),
+];

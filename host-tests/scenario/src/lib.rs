@@ -16,31 +16,24 @@
 
 mod check;
 pub mod deployment;
-mod deployment_keys;
 pub mod endpoint;
 mod error;
 mod file;
 pub mod hypothetical;
-mod interferer;
 pub mod key;
 mod keys;
 pub mod mission;
 pub mod number;
-mod plan;
-mod power;
-mod read;
 pub mod scene;
-mod site;
 mod spec;
 
 use std::path::Path;
 
 pub use error::{Problem, ScenarioError};
 pub use keys::all as keys;
-pub use plan::{Planned, PlannedMethod, PlannedPlace};
 pub use spec::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, RelayOverride,
-    Scenario, Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, Planned,
+    PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
 };
 
 /// Text of the default scenario file.
@@ -52,7 +45,7 @@ impl Scenario {
     /// # Errors
     /// A file that cannot be read as text, or any of the mistakes of [`Scenario::parse`].
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
-        let text = read::text_of(path)?;
+        let text = check::text_of(path)?;
         Self::parse(&path.display().to_string(), &text)
     }
 
@@ -62,7 +55,7 @@ impl Scenario {
     /// The first mistake found: invalid TOML, an unknown or missing key, a value of the wrong type or out of its range (NaN and
     /// infinities are out of every range), or keys that contradict each other.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
-        let table = read::table_of(file_name, text)?;
+        let table = check::table_of(file_name, text)?;
         check::table(file_name, &table)?;
         let (scenario, sections) = deployment::split(table);
         // Other programs use the sections, but a mistake in one is reported here too.
@@ -78,7 +71,7 @@ impl deployment::Deployment {
     /// # Errors
     /// Those of [`Scenario::load`], and a number of relays in `[network]` that differs from `[plan]`.
     pub fn load(path: &Path) -> Result<(Scenario, Self), ScenarioError> {
-        let (name, text) = (path.display().to_string(), read::text_of(path)?);
+        let (name, text) = (path.display().to_string(), check::text_of(path)?);
         let scenario = Scenario::parse(&name, &text)?;
         let sections = Self::parse(&name, &text)?;
         let planned = scenario.plan.as_ref().map(|plan| plan.uavs);
@@ -91,7 +84,7 @@ impl deployment::Deployment {
     /// # Errors
     /// Invalid TOML, and any mistake in a section.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
-        let table = read::table_of(file_name, text)?;
+        let table = check::table_of(file_name, text)?;
         check::table(file_name, &table)?;
         let (_, sections) = deployment::split(table);
         deployment::from_table(file_name, &sections)

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use serde::Deserialize;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Listen};
 
-use crate::number::{factor, narrow, watts};
-use crate::plan::Planned;
+use super::number::{factor, narrow, watts};
 
 /// Parameters of a flight, in SI units. x is along the line from Tx (x = 0) to Rx, y to its right as seen from above.
 ///
@@ -273,6 +273,56 @@ impl Scenario {
                 sources.iter().map(|s| (s.power_w, s.x_m, s.y_m)).collect()
             }
             Interference::Field(_) => Vec::new(),
+        }
+    }
+}
+
+/// A plan in a scenario file, from `cargo plan --out` to `cargo provision`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// Number of relays, 1 to 1000.
+    pub uavs: u16,
+    /// Placement method of the relays.
+    pub method: PlannedMethod,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1.
+    pub tolerance: f64,
+    /// SIR of the worst hop at these positions, dB, -400 to 400.
+    pub sir_db: f64,
+    /// Positions, relay 1 first; one per relay.
+    pub places: Vec<PlannedPlace>,
+}
+
+/// Placement method of relays that fly a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PlannedMethod {
+    /// Fixed altitudes: Algorithm 1, in a field Algorithm 4.
+    Align,
+    /// Positions, sides and altitudes together.
+    Joint,
+}
+
+/// Position of a relay.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannedPlace {
+    /// Distance along the line from Tx, m.
+    pub x_m: f64,
+    /// Lateral position, m; positive to the right as seen from above.
+    pub y_m: f64,
+    /// Altitude above ground, m, 0.1 to 1e4.
+    pub altitude_m: f64,
+}
+
+impl PlannedMethod {
+    /// Names of the methods in files.
+    pub const NAMES: &'static [&'static str] = &["align", "joint"];
+
+    /// Returns the name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Align => "align",
+            Self::Joint => "joint",
         }
     }
 }

@@ -5,11 +5,9 @@
 //! | [`simulator`] | relays, links, faults and attackers on a virtual clock |
 //! | [`report`] | the outcome of a run, as text and JSON |
 //! | [`svg`] | the outcome of a run, as a picture |
-//! | [`beta`] | random interference powers |
 //! | [`cli`] | `cargo chain` without its file and terminal access |
 //! | [`command`] | code shared by all commands |
 
-pub mod beta;
 pub mod cli;
 pub mod report;
 pub mod simulator;

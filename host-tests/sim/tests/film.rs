@@ -66,7 +66,7 @@ fn a_relay_that_falls_silent_and_comes_back_is_filmed_as_that() {
     let last = of_three.last().unwrap();
     assert_eq!(last.place, outcome.relays[2].setpoint);
     assert!(last.place.is_some());
-    let meanwhile = |shot: &&uav_relay_sim::simulator::film::Shot| (off..on).contains(&shot.at);
+    let meanwhile = |shot: &&uav_relay_sim::simulator::outcome::Shot| (off..on).contains(&shot.at);
     assert!(film.shots.iter().filter(meanwhile).count() > 4);
     assert!(film.sent.iter().all(|it| it.to.is_none()));
     assert!(

@@ -9,8 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use uav_relay::MAX_FRAME;
 
 use super::emulator::SPEED;
-use uav_relay_sim::simulator::faults::{Faults, Injected};
-use uav_relay_sim::simulator::link::LinkSpec;
+use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 
 /// Maximum number of bytes without a delimiter; a longer sequence is forwarded in pieces.
 const LONGEST: usize = 2 * MAX_FRAME;

@@ -161,8 +161,7 @@ mod tests {
 
     use super::{Network, radio};
     use crate::firmware::medium::Medium;
-    use uav_relay_sim::simulator::faults::Faults;
-    use uav_relay_sim::simulator::link::LinkSpec;
+    use uav_relay_sim::simulator::faults::{Faults, LinkSpec};
 
     #[test]
     fn a_port_that_nobody_reads_holds_up_no_other() {

@@ -2,7 +2,7 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use uav_relay_sim::simulator::bursts::Bursts;
+use uav_relay_sim::simulator::faults::Bursts;
 
 const FRAMES: usize = 1_000_000;
 

@@ -3,7 +3,7 @@
 use host_tests::fixtures::mission;
 use uav_relay::Side;
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::one_way::OneWayFailure;
+use uav_relay_sim::simulator::faults::OneWayFailure;
 use uav_relay_sim::simulator::outcome::{Ending, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 

@@ -1,7 +1,7 @@
 //! Number of groups that fly different agreements.
 
 use uav_relay::{Phase, ViewId};
-use uav_relay_sim::simulator::flying::{Seen, groups, has_agreed};
+use uav_relay_sim::simulator::watch::{Seen, groups, has_agreed};
 
 /// Returns the state of relay `index` of `relays` in view `view`.
 fn seen(view: u32, relays: u16, index: u16) -> Seen {

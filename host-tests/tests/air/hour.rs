@@ -2,7 +2,7 @@
 
 use host_tests::fixtures::mission;
 use uav_relay_sim::report::{self, ChainReport};
-use uav_relay_sim::simulator::parallel::run_seeds;
+use uav_relay_sim::simulator::chain::run_seeds;
 use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;

@@ -15,7 +15,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use uav_relay::{Duration, Instant};
-use uav_relay_sim::simulator::link::LinkSpec;
+use uav_relay_sim::simulator::faults::LinkSpec;
 use uav_relay_sim::simulator::medium::{Access, Agenda, AirCounts, AirEvent, Medium, Sent};
 
 /// Medium with its own clock, and the frames received.

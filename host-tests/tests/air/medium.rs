@@ -1,7 +1,7 @@
 //! Collisions of frames.
 
 use super::*;
-use uav_relay_sim::simulator::medium::access::{HEADER, QUEUE, TURNAROUND};
+use uav_relay_sim::simulator::medium::{HEADER, QUEUE, TURNAROUND};
 
 #[test]
 fn a_frame_takes_its_bytes_its_header_and_the_turnaround() {

@@ -3,8 +3,8 @@
 use std::time;
 
 use host_tests::fixtures::mission;
-use uav_relay_sim::simulator::one_way::OneWayFailure;
-use uav_relay_sim::simulator::parallel::run_seeds;
+use uav_relay_sim::simulator::chain::run_seeds;
+use uav_relay_sim::simulator::faults::OneWayFailure;
 use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;

@@ -8,7 +8,7 @@ use uav_relay::{Port, Stats};
 use uav_relay_decode::vectors::Vectors;
 use uav_relay_oracle::random::seed;
 
-use super::frames::{HEADER, HELLO, Plain, SIGNED, TAG, handshake, nonce, plain};
+use super::frames::{HANDSHAKE, HEADER, Plain, SIGNED, TAG, handshake, nonce, plain};
 use super::net::{Heard, Net};
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -120,7 +120,7 @@ pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
 /// Returns the counter that an intact frame with a wrong tag increments at relay `to`.
 fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
     let flags = frame.flags();
-    if frame.version() != 1 || ![0, SIGNED, SIGNED | HELLO].contains(&flags) {
+    if frame.version() != 1 || ![0, SIGNED, SIGNED | HANDSHAKE].contains(&flags) {
         return "version";
     }
     if flags != 0 && frame.0.len() < HEADER + TAG {

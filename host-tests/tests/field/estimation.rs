@@ -7,7 +7,7 @@ use uav_relay::field::estimate::{Estimate, Estimator};
 use uav_relay_oracle::random::seed;
 
 use super::off;
-use uav_relay_sim::beta::beta_w;
+use uav_relay_sim::simulator::true_interference::beta_w;
 
 const SEEDS: u64 = 100;
 

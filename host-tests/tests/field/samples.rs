@@ -5,13 +5,12 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use uav_relay::field::Field;
-use uav_relay::field::FieldPoint;
 use uav_relay::field::estimate::{Estimate, Estimator};
+use uav_relay::field::{Field, FieldPoint};
 use uav_relay_oracle::random::seed;
 
 use super::off;
-use uav_relay_sim::beta::beta_w;
+use uav_relay_sim::simulator::true_interference::beta_w;
 
 fn filled(alpha: f64, beta: f64, i_max_w: f32, samples: u32) -> Estimator {
     let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -20,7 +20,7 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, MissionConfig, Placement, Side, Sites, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::Point;
-use uav_relay_sim::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
+use uav_relay_sim::simulator::fleet::{FleetSpec, Takeover, somewhere};
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::UploadSpec;
 

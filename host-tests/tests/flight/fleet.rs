@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::{Interference, Interferer, MissionConfig, Side, Upload};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::fleet::spec::{FleetSpec, Takeover, somewhere};
+use uav_relay_sim::simulator::fleet::{FleetSpec, Takeover, somewhere};
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::UploadSpec;
 

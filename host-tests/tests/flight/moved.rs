@@ -5,7 +5,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, MissionConfig, Placement, Side, Sites, Upload};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::fleet::spec::{FleetSpec, somewhere};
+use uav_relay_sim::simulator::fleet::{FleetSpec, somewhere};
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::UploadSpec;
 

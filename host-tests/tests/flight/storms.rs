@@ -12,10 +12,8 @@ use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::WithoutQuorum;
 use uav_relay_oracle::random::seed;
-use uav_relay_sim::simulator::bursts::Bursts;
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::one_way::OneWayFailure;
+use uav_relay_sim::simulator::faults::{Bursts, Faults, OneWayFailure};
 
 use super::*;
 

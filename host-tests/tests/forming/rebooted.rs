@@ -41,7 +41,7 @@ fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
     };
     for rebooted in 1..3 {
         let mut chain = Chain::new(3, 20.0, LOW, settings);
-        let second = |chain: &Bench| chain.relays[0].stats().sweeps == 2;
+        let second = |chain: &Bench| chain.relays[0].stats().passes_begun == 2;
         chain.until(1_000, second).unwrap();
         assert!(!chain.bench.holds());
         chain.bench.flying.clear();

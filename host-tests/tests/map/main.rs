@@ -36,8 +36,8 @@ fn read(scenario: &Scenario, plan: &Plan) -> Value {
     places.extend(plan.places.iter().map(|(place, _)| f64s(place)));
     places.extend(scenario.sources().iter().map(|(_, x, y)| [*x, *y]));
     let given = json!({
-        "geojson": geojson::text(&map),
-        "kml": kml::text(&map, "a <plan> & \"more\"").unwrap(),
+        "geojson": geojson(&map),
+        "kml": kml(&map, "a <plan> & \"more\"").unwrap(),
         "line": ends,
         "places": places,
     });
@@ -59,7 +59,7 @@ fn read(scenario: &Scenario, plan: &Plan) -> Value {
     assert_eq!(found["kml_hops"], hops);
     assert_eq!(found["lines"].as_array().unwrap().len(), hops);
     // The map and `flight` give the same coordinates.
-    let text = geojson::text(&map);
+    let text = geojson(&map);
     for (place, _) in &plan.places {
         let at = line.axis.point(*place).unwrap();
         for unit in [at.lat_e7, at.lon_e7] {

@@ -73,7 +73,7 @@ struct Found {
     flies: u64,
     /// True if the duplicate that started first has the setpoint in the end.
     first_stays: bool,
-    /// Records for each duplicate that it raised `Event::IndexTaken`.
+    /// Records for each duplicate that it raised `Event::DuplicateIndex`.
     reported: [bool; 2],
 }
 
@@ -149,7 +149,7 @@ fn flown(case: Case) -> Found {
         }
     }
     found.first_stays = bench.relays[first].setpoint().is_some();
-    let taken = Event::IndexTaken { node: twice };
+    let taken = Event::DuplicateIndex { node: twice };
     found.reported = [first, second].map(|at| bench.has_raised(at, taken));
     found
 }

@@ -12,8 +12,7 @@ use host_tests::firmware::emulator::{Emulator, Kept, Life};
 use host_tests::firmware::image;
 use host_tests::firmware::medium::Medium;
 use host_tests::firmware::network::{self, Network};
-use uav_relay_sim::simulator::faults::{Faults, Injected};
-use uav_relay_sim::simulator::link::LinkSpec;
+use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 use uav_relay_tools::provision::block::Flight;
 
 use crate::log::{self, Line};

@@ -39,7 +39,7 @@ pub(crate) fn is_infeasible(line: &Bench) -> bool {
 /// Checks that every reported number is finite, and no relay sends messages that others refuse.
 pub(crate) fn check(line: &Bench) {
     for relay in &line.relays {
-        for place in [relay.setpoint(), relay.final_setpoint()]
+        for place in [relay.setpoint(), relay.agreed_place()]
             .into_iter()
             .flatten()
         {

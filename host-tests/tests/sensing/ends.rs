@@ -8,8 +8,7 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
-use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::scene::RandomScene;
+use uav_relay_tools::listening::{RandomScene, quantile};
 
 use crate::count;
 

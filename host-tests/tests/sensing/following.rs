@@ -1,7 +1,6 @@
 //! Moving interferer, compared with a chain that stays in its first optimum.
 
-use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::moving::{mean, shares};
+use uav_relay_tools::listening::{mean, moving_shares, quantile};
 
 use crate::count;
 
@@ -15,7 +14,7 @@ fn a_moving_interferer_is_followed() {
         (3, 3.0, 0.0),
         (3, 9.0, 0.0),
     ] {
-        let mut shares = shares(count(20), relays, speed_mps).unwrap();
+        let mut shares = moving_shares(count(20), relays, speed_mps).unwrap();
         let (follows, stays) = (mean(&shares.followed), mean(&shares.stayed));
         println!(
             "N = {relays}, {speed_mps} m/s: {follows:.4} followed (the worst scene {:.4}), {stays:.4} stayed",

@@ -2,9 +2,10 @@
 
 use uav_relay::{Interference, Interferer};
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_tools::figures::error::FigureError;
-use uav_relay_tools::listening::found::{self, LAST, hypothetical, quantile, shadowed, unknown};
-use uav_relay_tools::listening::scene::RandomScene;
+use uav_relay_tools::figures::sheet::FigureError;
+use uav_relay_tools::listening::{
+    self, LAST, RandomScene, hypothetical, quantile, shadowed, unknown,
+};
 
 use crate::count;
 
@@ -70,7 +71,7 @@ fn sources_are_found() {
     ];
     for (what, chains, sources, setup, limits) in rows {
         for &relays in chains {
-            let mut shares = found::shares(count(200), relays, sources, setup).unwrap();
+            let mut shares = listening::shares(count(200), relays, sources, setup).unwrap();
             for at in [0, 1, 2, 3, 5, LAST] {
                 let [least, tenth, median] =
                     [0.0, 0.1, 0.5].map(|part| quantile(&mut shares[at], part));

@@ -6,8 +6,7 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
 
-use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::scene::RandomScene;
+use uav_relay_tools::listening::{RandomScene, quantile};
 
 use crate::count;
 use crate::wrong::{named, share};

@@ -7,8 +7,7 @@ use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
 
-use uav_relay_tools::listening::found::quantile;
-use uav_relay_tools::listening::scene::RandomScene;
+use uav_relay_tools::listening::{RandomScene, quantile};
 
 use crate::count;
 

@@ -2,7 +2,7 @@
 
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Placement, Sites, Wiring};
-use uav_relay_sim::simulator::fleet::spec::somewhere;
+use uav_relay_sim::simulator::fleet::somewhere;
 
 use super::*;
 

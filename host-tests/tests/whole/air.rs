@@ -6,12 +6,11 @@ use std::rc::Rc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::MAX_FRAME;
 use uav_relay::{
-    Auth, Event, Identity, Instant, Key, Mission, Phase, Port, Relay, Settings, Upload, ViewRecord,
-    Wiring,
+    Auth, Event, Identity, Instant, Key, MAX_FRAME, Mission, Phase, Port, Relay, Settings, Upload,
+    ViewRecord, Wiring,
 };
-use uav_relay_sim::simulator::flying::{Seen, groups};
+use uav_relay_sim::simulator::watch::{Seen, groups};
 
 /// Bit rate of a link, and of each relay's share of the channel.
 const BAUD: u64 = 115_200;
@@ -538,7 +537,7 @@ fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now: Instant) -> R
     let settings = Settings {
         wiring: kind.wiring,
         auth,
-        hop_time: uav_relay_sim::simulator::link::LinkSpec::default().hop_time(),
+        hop_time: uav_relay_sim::simulator::faults::LinkSpec::default().hop_time(),
         ..Settings::default()
     };
     let identity = Identity { network: 7, index };

@@ -117,7 +117,13 @@ fn an_upload_is_encoded_and_decoded_with_every_number() {
         assert_eq!(bytes[..], kept(&offer));
         assert_eq!(Upload::decode(&bytes), Some(upload));
         let answer = 77;
-        assert_eq!(meaning::message(&offer), Message::Offer { upload, offer_number: answer });
+        assert_eq!(
+            meaning::message(&offer),
+            Message::Offer {
+                upload,
+                offer_number: answer
+            }
+        );
         let mission = Mission::try_new(config).unwrap();
         assert_eq!(digest(&mission), mission_id(&offer).0);
     }

@@ -10,6 +10,11 @@
 //! | [`listening`] | chains that locate an unknown interferer, in random scenes |
 //! | [`baseline`] | baseline placements for the figures |
 
+#![allow(
+    clippy::missing_errors_doc,
+    reason = "the variants of the error types say when they occur"
+)]
+
 pub mod baseline;
 pub mod figures;
 pub mod image;

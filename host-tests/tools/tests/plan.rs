@@ -8,7 +8,9 @@
 )]
 
 use std::fmt::Write as _;
-use std::process::{Command, Output};
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use uav_relay_oracle::cases::{self, Case};
@@ -16,26 +18,24 @@ use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::Corridor;
 
-fn plan(arguments: &[&str]) -> Output {
+fn plan(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plan"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
-fn json(arguments: &[&str]) -> Value {
-    let mut all = vec!["--json"];
-    all.extend(arguments);
-    let output = plan(&all);
+fn json(arguments: &str) -> Value {
+    let output = plan(&format!("--json {arguments}"));
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
         output.status.success() && text.is_empty(),
-        "{arguments:?}: {text}"
+        "{arguments}: {text}"
     );
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-fn refusal(arguments: &[&str]) -> (i32, String) {
+fn refusal(arguments: &str) -> (i32, String) {
     let output = plan(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
@@ -88,18 +88,16 @@ fn with_the_papers_channel(function: &str) -> Vec<Case> {
 #[test]
 fn the_theorems_of_the_reference_come_out_of_the_command() {
     for (function, options) in [
-        ("theorem1", &["--uavs", "1"][..]),
-        ("theorem3", &["--uavs", "1", "--altitude", "free"]),
-        ("theorem2", &["--uavs", "1", "--x-m"]),
+        ("theorem1", "--uavs 1"),
+        ("theorem3", "--uavs 1 --altitude free"),
+        ("theorem2", "--uavs 1 --x-m"),
     ] {
         for mut case in with_the_papers_channel(function) {
             case.params.h = case.arg("h").unwrap_or(case.params.h_min);
-            let x_m = case.arg("x").map(|x| format!("{x:?}"));
+            let x_m = case.arg("x").map(|x| format!("{x:?}")).unwrap_or_default();
             let file = scenario(&case, &interferer(&case));
-            let mut arguments = vec!["--scenario", file.path().to_str().unwrap()];
-            arguments.extend(options);
-            arguments.extend(x_m.as_deref());
-            let report = json(&arguments);
+            let path = file.path().display();
+            let report = json(&format!("--scenario {path} {options} {x_m}"));
             let sir = number(&report["sir"]);
             assert!(
                 (sir / case.part("sir").unwrap() - 1.0).abs() < 1e-5,
@@ -123,8 +121,8 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
 /// The only relay leaves the line if there is lateral room, and no position is better.
 #[test]
 fn one_relay_aside_is_the_judges_of_three_dimensions() {
-    let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
-    let report = json(&["--scenario", side, "--uavs", "1", "--altitude", "free"]);
+    let side = example("side.toml");
+    let report = json(&format!("--scenario {side} --uavs 1 --altitude free"));
     assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
     assert_eq!(report["how"].as_str(), Some("one relay aside"));
     assert_eq!(report["proven"].as_bool(), Some(true));
@@ -143,7 +141,7 @@ fn one_relay_aside_is_the_judges_of_three_dimensions() {
     let sir = number(&report["sir"]);
     assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
     // With a given altitude it stays above the line.
-    let report = json(&["--scenario", side, "--uavs", "1"]);
+    let report = json(&format!("--scenario {side} --uavs 1"));
     assert_eq!(report["theorem"].as_u64(), Some(1), "{report}");
 }
 
@@ -153,7 +151,7 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
         let file = scenario(&case, &interferer(&case));
         let target = format!("{:?}", case.arg("gamma").unwrap());
         let path = file.path().to_str().unwrap();
-        let report = json(&["--scenario", path, "--target-sir", &target]);
+        let report = json(&format!("--scenario {path} --target-sir {target}"));
         assert!(
             (number(&report["uavs"]) - case.part("N").unwrap()).abs() < 0.5,
             "{}",
@@ -166,12 +164,12 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
         assert!(number(&report["sir"]) >= case.arg("gamma").unwrap() * (1.0 - 1e-5));
         assert_eq!(report["proven"].as_bool(), Some(true));
         let db = format!("{:?}", 10.0 * case.arg("gamma").unwrap().log10());
-        let again = json(&["--scenario", path, "--target-sir-db", &db]);
+        let again = json(&format!("--scenario {path} --target-sir-db {db}"));
         assert_eq!(again["uavs"], report["uavs"], "{}", case.id);
         // One fewer relay misses the target.
         let fewer = report["uavs"].as_u64().unwrap() - 1;
         if fewer > 0 {
-            let best = json(&["--scenario", path, "--uavs", &fewer.to_string()]);
+            let best = json(&format!("--scenario {path} --uavs {}", fewer.to_string()));
             assert!(
                 number(&best["sir"]) < case.arg("gamma").unwrap(),
                 "{}",
@@ -185,7 +183,7 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
 fn rates_are_divided_by_the_slots() {
     for relays in [1_u32, 4, 8] {
         let uavs = relays.to_string();
-        let report = json(&["--uavs", &uavs, "--bandwidth-hz", "1e7"]);
+        let report = json(&format!("--uavs {uavs} --bandwidth-hz 1e7"));
         let hop = 1e7 * (1.0 + number(&report["sir"])).log2();
         let slots = relays + 1;
         assert!((number(&report["hop_rate_bps"]) / hop - 1.0).abs() < 1e-12);
@@ -195,7 +193,7 @@ fn rates_are_divided_by_the_slots() {
         assert!((number(&report["best_rate_bps"]) / 6.58e6 - 1.0).abs() < 1e-3);
         assert_eq!(report["best_is_proven"].as_bool(), Some(true), "{report}");
     }
-    let output = plan(&["--uavs", "12", "--bandwidth-hz", "1e7"]);
+    let output = plan("--uavs 12 --bandwidth-hz 1e7");
     let table = String::from_utf8(output.stdout).unwrap();
     for part in [
         "data rate: 1.57",
@@ -206,16 +204,16 @@ fn rates_are_divided_by_the_slots() {
         assert!(table.contains(part), "{part}: {table}");
     }
     // Without a bandwidth there is no rate.
-    assert!(json(&["--uavs", "2"])["rate_bps"].is_null());
+    assert!(json("--uavs 2")["rate_bps"].is_null());
 }
 
 #[test]
 fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
-    let report = json(&["--target-rate-bps", "6e6", "--bandwidth-hz", "1e7"]);
+    let report = json("--target-rate-bps 6e6 --bandwidth-hz 1e7");
     assert_eq!(report["uavs"].as_u64(), Some(1), "{report}");
     assert!(number(&report["rate_bps"]) >= 6e6);
     // Twelve relays give each hop 20 Mbit/s while it sends, but the chain carries only a thirteenth of it.
-    let (status, line) = refusal(&["--target-rate-bps", "2e7", "--bandwidth-hz", "1e7"]);
+    let (status, line) = refusal("--target-rate-bps 2e7 --bandwidth-hz 1e7");
     assert_eq!(status, 1, "{line}");
     for part in [
         "--target-rate-bps 20000000.0: no number of relays carries it: all hops share one frequency in equal time slots",
@@ -230,30 +228,29 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
                  excess_loss_nlos_db = 50\n[noise]\nbandwidth_hz = 1e7\n[[interferer]]\npower_w = 1e-6\nx_m = 5000\ny_m = 1e6\n";
     std::fs::write(file.path(), noisy).unwrap();
     let path = file.path().to_str().unwrap();
-    let ask =
-        |more: &[&str]| json(&[&["--scenario", path, "--bandwidth-hz", "1e7"], more].concat());
-    let one = ask(&["--uavs", "1"]);
+    let ask = |more: &str| json(&format!("--scenario {path} --bandwidth-hz 1e7 {more}"));
+    let one = ask("--uavs 1");
     let best = one["best_uavs"].as_u64().unwrap();
     assert!(best > 1, "{one}");
     assert!(number(&one["best_rate_bps"]) > number(&one["rate_bps"]));
-    let at_best = ask(&["--uavs", &best.to_string()]);
+    let at_best = ask(&format!("--uavs {}", best.to_string()));
     assert_eq!(at_best["rate_bps"], one["best_rate_bps"]);
     for beside in [best - 1, best + 1] {
-        let rate = number(&ask(&["--uavs", &beside.to_string()])["rate_bps"]);
+        let rate = number(&ask(&format!("--uavs {}", beside.to_string()))["rate_bps"]);
         assert!(rate <= number(&one["best_rate_bps"]), "{beside}: {rate}");
     }
     // The fewest relays that meet the target, not the number with the largest rate.
     let half = 0.5 * (number(&one["rate_bps"]) + number(&one["best_rate_bps"]));
-    let met = ask(&["--target-rate-bps", &format!("{half:?}")]);
+    let met = ask(&format!("--target-rate-bps {half:?}"));
     let uavs = met["uavs"].as_u64().unwrap();
     assert!(uavs > 1 && uavs <= best, "{met}");
-    let fewer = ask(&["--uavs", &(uavs - 1).to_string()]);
+    let fewer = ask(&format!("--uavs {}", uavs - 1));
     assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
 }
 
 #[test]
 fn the_answer_names_what_the_model_leaves_out() {
-    for arguments in [&["--uavs", "3"][..], &["--target-sir", "3"]] {
+    for arguments in ["--uavs 3", "--target-sir 3"] {
         let table = String::from_utf8(plan(arguments).stdout).unwrap();
         assert!(
             table.contains(
@@ -264,8 +261,148 @@ fn the_answer_names_what_the_model_leaves_out() {
     }
 }
 
+/// The planner flies nothing, but finds the mistake before the flight.
 #[test]
-fn wrong_input_is_named_in_one_line_with_status_2() {
+fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
+    let drone = include_str!("../../../examples/drone.toml");
+    let begin = "autopilot = \"/dev/ttyAMA0\"";
+    assert!(drone.contains(begin));
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let wrong = drone.replace(begin, "autopilot = \"udp:localhost:65000\"");
+    std::fs::write(&file, wrong).unwrap();
+    let name = file.path().to_str().unwrap();
+    let (status, line) = refusal(&format!("--uavs 1 --scenario {name}"));
+    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is no port";
+    assert!(status == 2 && line.contains(named), "{line}");
+}
+
+#[test]
+fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
+    let output = plan("--target-sir-db 60 --json");
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let most = number(&report["best_sir"]);
+    assert!(
+        report["error"]
+            .as_str()
+            .unwrap()
+            .contains("gives every hop an SIR of 60 dB: the most is 20.980 dB, with "),
+        "{report}"
+    );
+    // The reported maximum can be met, and nothing above it.
+    let told = format!("{:?}", most * (1.0 - 1e-5));
+    assert!(number(&json(&format!("--target-sir {told}"))["sir"]) >= most * (1.0 - 1e-4));
+    let more = format!("{:?}", most * 1.001);
+    assert_eq!(refusal(&format!("--target-sir {more}")).0, 1);
+    // More relays than the distance allows.
+    let (status, line) = refusal("--uavs 1000");
+    assert!(status == 1 && line.contains("min_separation_m"), "{line}");
+}
+
+#[test]
+fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
+    let svg = tempfile::NamedTempFile::new().unwrap();
+    let path = svg.path().to_str().unwrap();
+    let output = plan(&format!("--uavs 8 --svg {path}"));
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        table.contains("worst hop: SIR 2.4655") && table.contains("8 relays, by Algorithm 1"),
+        "{table}"
+    );
+    assert!(table.contains("no positions are better"), "{table}");
+    let drawing = std::fs::read_to_string(path).unwrap();
+    assert!(roxmltree::Document::parse(&drawing).is_ok());
+    let output = plan("--target-sir 5");
+    let table = String::from_utf8(output.stdout).unwrap();
+    for part in [
+        "with 22 relays, by eq. (Opt)",
+        "no fewer relays meet the target",
+        "up to 5.16",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+}
+
+#[test]
+fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
+    let case = &with_the_papers_channel("hyp_msi")[0];
+    let two = |x: [f64; 2], y: f64| {
+        x.map(|x| format!("[[interferer]]\npower_w = 40.0\nx_m = {x:?}\ny_m = {y:?}\n"))
+            .concat()
+    };
+    // Interferers next to each other: the hypothetical one is good enough.
+    let file = scenario(case, &two([490.0, 510.0], 400.0));
+    let path = file.path().to_str().unwrap();
+    let near = json(&format!("--scenario {path} --uavs 8"));
+    let one = &near["hypothetical"];
+    for key in [
+        "power_w",
+        "x_m",
+        "y_m",
+        "mean_abs_error_w",
+        "relative_error",
+    ] {
+        assert!(one[key].is_number(), "{key} in {one}");
+    }
+    assert!(
+        number(&one["relative_error"]) < 1e-3 && one["kept"] == true,
+        "{one}"
+    );
+    assert!(
+        (number(&one["x_m"]) - 500.0).abs() < 1.0 && (number(&one["power_w"]) - 80.0).abs() < 1.0
+    );
+    let alone = json("--uavs 8");
+    assert!((number(&near["sir"]) / number(&alone["sir"]) - 1.0).abs() < 0.01);
+    // Interferers far apart: no hypothetical one is good enough, and the plan's positions are better.
+    let file = scenario(case, &two([100.0, 900.0], 150.0));
+    let path = file.path().to_str().unwrap();
+    let far = json(&format!("--scenario {path} --uavs 8"));
+    let one = &far["hypothetical"];
+    assert!(one["kept"] == false && number(&one["gain"]) > 0.01, "{far}");
+    let gained = number(&far["sir"]) / number(&one["sir"]) - 1.0;
+    assert!((gained - number(&one["gain"])).abs() < 1e-9);
+    let table = String::from_utf8(plan(&format!("--scenario {path} --uavs 8")).stdout).unwrap();
+    assert!(
+        table.contains("its places are not good enough") && table.contains("a gain of"),
+        "{table}"
+    );
+}
+
+#[test]
+fn the_joint_optimum_comes_out_where_altitudes_are_free() {
+    let altitudes = example("altitudes.toml");
+    let free = json(&format!("--scenario {altitudes} --uavs 8 --altitude free"));
+    assert!(
+        (number(&free["sir"]) / 1.235_783_8 - 1.0).abs() < 1e-3,
+        "{free}"
+    );
+    assert_eq!(free["proven"].as_bool(), Some(false));
+    // Free altitudes need no more relays.
+    let given = json(&format!("--scenario {altitudes} --target-sir 2"));
+    let fewer = json(&format!(
+        "--scenario {altitudes} --target-sir 2 --altitude free"
+    ));
+    assert!(number(&fewer["uavs"]) <= number(&given["uavs"]), "{fewer}");
+    assert!(number(&fewer["sir"]) >= 2.0);
+}
+
+fn said(arguments: &str) -> String {
+    let output = plan(arguments);
+    assert!(output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn example(name: &str) -> String {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    file.join(name).to_str().unwrap().to_owned()
+}
+
+#[test]
+fn what_is_not_there_is_not_planned() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("map");
+    let map = map.to_str().unwrap();
+    let examples = example("");
     let mut all = String::new();
     for case in [
         "",
@@ -287,143 +424,310 @@ fn wrong_input_is_named_in_one_line_with_status_2() {
         "--uavs 1 --tolerance 0",
         "--uavs 1 --scenario no-such-file.toml",
         "--uavs 1 --svg /no/such/folder/x.svg",
+        "--uavs 3 --geojson MAP",
+        "--uavs 3 --kml MAP",
+        "--uavs 3 --scenario EXAMPLES/scenario.toml",
+        "--uavs 1 --x-m 3 --altitude free",
+        "--uavs 1 --x-m far",
+        "--uavs 1 --x-m 3 --out MAP",
+        "--uavs 3 --altitude free --out MAP --scenario EXAMPLES/field.toml",
+        "--uavs 3 --out /no/such/folder/plan.toml",
+        "--uavs 3 --scenario EXAMPLES/site.toml --kml /no/such/folder/x.kml",
+        "--uavs 3 --force",
+        "--uavs ten",
+        "--uavs 99999999999999999999",
+        "--uavs 3 --altitude fre",
+        "--uavs 3 --jsn",
     ] {
-        let (status, line) = refusal(&case.split_whitespace().collect::<Vec<_>>());
+        let options = case.replace("MAP", map).replace("EXAMPLES/", &examples);
+        let (status, line) = refusal(&options);
         assert_eq!(status, 2, "{case}: {line}");
+        let line = line.replace(map, "MAP").replace(&examples, "EXAMPLES/");
         writeln!(all, "{case}\n    {}", line.trim_end()).unwrap();
     }
     insta::assert_snapshot!(all);
-    let field = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/field.toml");
-    let (status, line) = refusal(&["--uavs", "1", "--x-m", "3", "--scenario", field]);
+    assert!(!std::path::Path::new(map).exists());
+    let field = example("field.toml");
+    let (status, line) = refusal(&format!("--uavs 1 --x-m 3 --scenario {field}"));
     assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
-}
-
-/// The planner flies nothing, but finds the mistake before the flight.
-#[test]
-fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
-    let drone = include_str!("../../../examples/drone.toml");
-    let begin = "autopilot = \"/dev/ttyAMA0\"";
-    assert!(drone.contains(begin));
-    let file = tempfile::NamedTempFile::new().unwrap();
-    let wrong = drone.replace(begin, "autopilot = \"udp:localhost:65000\"");
-    std::fs::write(&file, wrong).unwrap();
-    let name = file.path().to_str().unwrap();
-    let (status, line) = refusal(&["--uavs", "1", "--scenario", name]);
-    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is no port";
-    assert!(status == 2 && line.contains(named), "{line}");
-}
-
-#[test]
-fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
-    let output = plan(&["--target-sir-db", "60", "--json"]);
-    assert_eq!(output.status.code(), Some(1));
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let most = number(&report["best_sir"]);
+    // Without a scenario file the message names the numbers and the keys of such a file.
+    let (status, line) = refusal("--uavs 300");
+    assert_eq!(status, 1);
     assert!(
-        report["error"]
-            .as_str()
-            .unwrap()
-            .contains("gives every hop an SIR of 60 dB: the most is 20.980 dB, with "),
-        "{report}"
+        line.starts_with("no placement: 300 relays that stay 4 m apart need 1196 m, and there are 1000 m from Tx to Rx: fewer relays, or geometry.min_separation_m and geometry.distance_m of a --scenario FILE"),
+        "{line}"
     );
-    // The reported maximum can be met, and nothing above it.
-    let told = format!("{:?}", most * (1.0 - 1e-5));
-    assert!(number(&json(&["--target-sir", &told])["sir"]) >= most * (1.0 - 1e-4));
-    let more = format!("{:?}", most * 1.001);
-    assert_eq!(refusal(&["--target-sir", &more]).0, 1);
-    // More relays than the distance allows.
-    let (status, line) = refusal(&["--uavs", "1000"]);
-    assert!(status == 1 && line.contains("min_separation_m"), "{line}");
 }
 
 #[test]
-fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
-    let svg = tempfile::NamedTempFile::new().unwrap();
-    let path = svg.path().to_str().unwrap();
-    let output = plan(&["--uavs", "8", "--svg", path]);
-    let table = String::from_utf8(output.stdout).unwrap();
+fn maps_are_written_where_there_is_an_earth() {
+    let folder = tempfile::tempdir().unwrap();
+    let [geojson, kml] = ["plan.geojson", "plan.kml"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    said(&format!(
+        "--scenario {} --uavs 3 --geojson {geojson} --kml {kml}",
+        example("site.toml")
+    ));
+    let geojson: Value = serde_json::from_str(&std::fs::read_to_string(geojson).unwrap()).unwrap();
+    // Tx, Rx, three relays, the interferer, four hops.
+    assert_eq!(geojson["features"].as_array().unwrap().len(), 10);
+    let kml = std::fs::read_to_string(kml).unwrap();
+    let kml = roxmltree::Document::parse(&kml).unwrap();
+    let places = kml
+        .descendants()
+        .filter(|node| node.has_tag_name(("http://www.opengis.net/kml/2.2", "Placemark")));
+    assert_eq!(places.count(), 10);
+}
+
+#[test]
+fn what_is_asked_in_decibels_is_answered_in_decibels() {
+    let (status, line) = refusal("--target-sir-db 60");
+    assert_eq!(status, 1);
+    assert!(line.starts_with("no number of relays, up to 1000, gives every hop an SIR of 60 dB: the most is 20.980 dB, with "), "{line}");
+    let (_, line) = refusal("--target-sir 1000");
     assert!(
-        table.contains("worst hop: SIR 2.4655") && table.contains("8 relays, by Algorithm 1"),
-        "{table}"
+        line.contains("an SIR of 1000: the most is 125.31"),
+        "{line}"
     );
-    assert!(table.contains("no positions are better"), "{table}");
-    let drawing = std::fs::read_to_string(path).unwrap();
-    assert!(roxmltree::Document::parse(&drawing).is_ok());
-    let output = plan(&["--target-sir", "5"]);
-    let table = String::from_utf8(output.stdout).unwrap();
+    let (_, line) = refusal(&format!(
+        "--target-sir-db 60 --scenario {}",
+        example("multi_interferer.toml")
+    ));
+    assert!(
+        line.contains("an SIR of 60 dB: the most found is ") && line.contains(" dB"),
+        "{line}"
+    );
+
+    let table = said("--target-sir-db 6");
     for part in [
-        "with 22 relays, by eq. (Opt)",
-        "no fewer relays meet the target",
-        "up to 5.16",
+        "worst hop: 6.000 dB (SIR 3.98107",
+        "target: SIR 6 dB; that many relays reach up to 6.",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+    let table = said("--target-sir 4");
+    for part in [
+        "worst hop: SIR 4.00000",
+        "target: SIR 4; that many relays reach up to 4.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
 }
 
 #[test]
-fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
-    let case = &with_the_papers_channel("hyp_msi")[0];
-    let two = |x: [f64; 2], y: f64| {
-        x.map(|x| format!("[[interferer]]\npower_w = 40.0\nx_m = {x:?}\ny_m = {y:?}\n"))
-            .concat()
+fn json_has_both_units() {
+    let read =
+        |arguments: &str| -> Value { serde_json::from_slice(&plan(arguments).stdout).unwrap() };
+    let pairs = |report: &Value, names: &[&str]| {
+        for name in names {
+            let of = |name: &str| {
+                report[name]
+                    .as_f64()
+                    .unwrap_or_else(|| panic!("{name}: {report}"))
+            };
+            let db = 10.0 * of(name).log10();
+            assert!(
+                (db - of(&format!("{name}_db"))).abs() < 1e-9,
+                "{name}: {report}"
+            );
+        }
     };
-    // Interferers next to each other: the hypothetical one is good enough.
-    let file = scenario(case, &two([490.0, 510.0], 400.0));
-    let path = file.path().to_str().unwrap();
-    let near = json(&["--scenario", path, "--uavs", "8"]);
-    let one = &near["hypothetical"];
-    for key in [
-        "power_w",
-        "x_m",
-        "y_m",
-        "mean_abs_error_w",
-        "relative_error",
-    ] {
-        assert!(one[key].is_number(), "{key} in {one}");
-    }
-    assert!(
-        number(&one["relative_error"]) < 1e-3 && one["kept"] == true,
-        "{one}"
-    );
-    assert!(
-        (number(&one["x_m"]) - 500.0).abs() < 1.0 && (number(&one["power_w"]) - 80.0).abs() < 1.0
-    );
-    let alone = json(&["--uavs", "8"]);
-    assert!((number(&near["sir"]) / number(&alone["sir"]) - 1.0).abs() < 0.01);
-    // Interferers far apart: no hypothetical one is good enough, and the plan's positions are better.
-    let file = scenario(case, &two([100.0, 900.0], 150.0));
-    let path = file.path().to_str().unwrap();
-    let far = json(&["--scenario", path, "--uavs", "8"]);
-    let one = &far["hypothetical"];
-    assert!(one["kept"] == false && number(&one["gain"]) > 0.01, "{far}");
-    let gained = number(&far["sir"]) / number(&one["sir"]) - 1.0;
-    assert!((gained - number(&one["gain"])).abs() < 1e-9);
-    let table = String::from_utf8(plan(&["--scenario", path, "--uavs", "8"]).stdout).unwrap();
-    assert!(
-        table.contains("its places are not good enough") && table.contains("a gain of"),
-        "{table}"
+    let met = read("--target-sir-db 6 --json");
+    pairs(&met, &["sir", "target_sir", "most_sir", "rx_sir"]);
+    pairs(
+        &read("--target-sir-db 60 --json"),
+        &["best_sir", "target_sir"],
     );
 }
 
 #[test]
-fn the_joint_optimum_comes_out_where_altitudes_are_free() {
-    let altitudes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/altitudes.toml");
-    let free = json(&["--scenario", altitudes, "--uavs", "8", "--altitude", "free"]);
-    assert!(
-        (number(&free["sir"]) / 1.235_783_8 - 1.0).abs() < 1e-3,
-        "{free}"
+fn a_case_is_told_as_what_it_means_for_the_drone() {
+    let json = json("--uavs 1");
+    let table = said("--uavs 1");
+    let words = json["case_words"].as_str().unwrap();
+    assert!(words.starts_with("the drone "), "{words}");
+    let line = format!(
+        "{words} (Theorem {}, case {})\n",
+        json["theorem"], json["case"]
     );
-    assert_eq!(free["proven"].as_bool(), Some(false));
-    // Free altitudes need no more relays.
-    let given = json(&["--scenario", altitudes, "--target-sir", "2"]);
-    let fewer = json(&[
-        "--scenario",
-        altitudes,
-        "--target-sir",
-        "2",
-        "--altitude",
-        "free",
-    ]);
-    assert!(number(&fewer["uavs"]) <= number(&given["uavs"]), "{fewer}");
-    assert!(number(&fewer["sir"]) >= 2.0);
+    assert!(table.contains(&line), "{line}: {table}");
+    for (arguments, theorem) in [
+        ("--x-m 300", "(Theorem 2, case "),
+        ("--altitude free", "(Theorem 3, case "),
+        (
+            &format!("--altitude free --scenario {}", example("side.toml")),
+            "(one relay aside, case ",
+        ),
+    ] {
+        let table = said(&format!("--uavs 1 {arguments}"));
+        let line = table
+            .lines()
+            .find(|line| line.contains(theorem))
+            .unwrap_or_else(|| panic!("{table}"));
+        assert!(line.contains("the drone "), "{line}");
+    }
+}
+
+/// Map numbers are rounded for people: millimetres, thousandths of a decibel, whole counts.
+#[test]
+fn a_map_has_rounded_numbers_with_units_in_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let [geojson, kml] = ["plan.geojson", "plan.kml"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let scenario = example("decibels.toml");
+    let maps = format!("--geojson {geojson} --kml {kml}");
+    said(&format!("--scenario {scenario} --uavs 3 {maps}"));
+    let is_short = |name: &str, number: &str| {
+        let decimals = number.split_once('.').map_or("", |(_, decimals)| decimals);
+        let most = match name {
+            "index" | "hop" => 0,
+            "sir_ratio" => 6,
+            _ => 3,
+        };
+        decimals.len() <= most && !number.contains('e')
+    };
+    let text = std::fs::read_to_string(&geojson).unwrap();
+    let map: Value = serde_json::from_str(&text).unwrap();
+    let mut names = std::collections::BTreeSet::new();
+    for feature in map["features"].as_array().unwrap() {
+        for (name, value) in feature["properties"].as_object().unwrap() {
+            let Value::Number(number) = value else {
+                continue;
+            };
+            names.insert(name.clone());
+            let is_count = matches!(name.as_str(), "index" | "hop");
+            assert_eq!(number.is_u64(), is_count, "{name}: {number}");
+            assert!(
+                is_count || is_short(name, number.to_string().trim_end_matches(".0")),
+                "{name}: {number}"
+            );
+        }
+    }
+    let known = [
+        "amsl_m",
+        "eirp_dbm",
+        "h_m",
+        "hop",
+        "index",
+        "sir_db",
+        "sir_ratio",
+        "x_m",
+        "y_m",
+    ];
+    assert!(names.iter().eq(known), "{names:?}");
+    let text = std::fs::read_to_string(&kml).unwrap();
+    let descriptions = text.split("<description>").skip(1);
+    let mut numbers = 0;
+    for description in descriptions {
+        for pair in description.split('<').next().unwrap().split(", ") {
+            let (name, number) = pair.split_once(" = ").unwrap();
+            assert!(is_short(name, number), "{pair}");
+            numbers += 1;
+        }
+    }
+    assert!(numbers > 20, "{text}");
+}
+
+/// Returns the paper's scenario with extra lines in `[power]`.
+fn with(sections: &str) -> tempfile::NamedTempFile {
+    let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let text = std::fs::read_to_string(example("scenario.toml")).unwrap();
+    let text = text.replace("[power]", &format!("[power]\n{sections}"));
+    writeln!(file, "{text}").unwrap();
+    file
+}
+
+fn json_of(file: &tempfile::NamedTempFile) -> Value {
+    let output = plan(&format!(
+        "--json --uavs 6 --scenario {}",
+        file.path().display()
+    ));
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// k T0 B F: 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
+#[test]
+fn the_noise_is_k_t_b_f_and_says_of_what() {
+    let noisy = "\n[noise]\nbandwidth_hz = 20e6\nfigure_db = 6.0\n";
+    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let plain = std::fs::read_to_string(example("scenario.toml")).unwrap();
+    std::fs::write(file.path(), format!("{plain}{noisy}")).unwrap();
+    let table = said(&format!("--uavs 6 --scenario {}", file.path().display()));
+    let line = "noise: -94.965 dBm, 3.187948e-13 W, at every receiver: k T0 B F with T0 = 290 K, B = 20000000 Hz, F = 6 dB\n";
+    assert!(table.contains(line), "{table}");
+    let noise = &json_of(&file)["noise"];
+    let is = |name: &str, expected: f64, within: f64| {
+        let value = noise[name].as_f64().unwrap();
+        assert!((value / expected - 1.0).abs() < within, "{name}: {noise}");
+    };
+    is("power_w", 3.187_948_3e-13, 1e-7);
+    is("power_dbm", -94.964_89, 1e-6);
+    is("bandwidth_hz", 20e6, 1e-15);
+    is("figure_db", 6.0, 1e-15);
+    is("temperature_k", 290.0, 1e-15);
+    is("effective_w", 3.187_948_3e-13, 1e-7);
+
+    // Antennas of 3 dBi at the relays and 5 dBi at the receiver: the lower gain counts, 10^0.3 = 1.99526231.
+    let gains = "uav_gain_dbi = 3.0\nrx_gain_dbi = 5.0";
+    let aired = with(gains);
+    let text = std::fs::read_to_string(aired.path()).unwrap();
+    std::fs::write(aired.path(), format!("{text}{noisy}")).unwrap();
+    let effective = json_of(&aired)["noise"]["effective_w"].as_f64().unwrap();
+    assert!(
+        (effective / 1.597_759_0e-13 - 1.0).abs() < 1e-6,
+        "{effective:e}"
+    );
+
+    // No derivation for a power stated in the file, or without noise.
+    for given in ["\n[noise]\npower_dbm = -95.0\n", ""] {
+        std::fs::write(file.path(), format!("{plain}{given}")).unwrap();
+        assert!(json_of(&file)["noise"].is_null(), "{given}");
+    }
+}
+
+fn unheard(tool: &str, arguments: &str) -> Option<i32> {
+    let pipe = || {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        Stdio::from(writer)
+    };
+    let status = Command::new(tool)
+        .args(arguments.split_whitespace())
+        .stdout(pipe())
+        .stderr(pipe())
+        .status();
+    status.unwrap().code()
+}
+
+#[test]
+fn nobody_reads_and_the_status_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let [plan, provision, figures] = [
+        env!("CARGO_BIN_EXE_plan"),
+        env!("CARGO_BIN_EXE_provision"),
+        env!("CARGO_BIN_EXE_figures"),
+    ];
+    let (block, blocks, pages) = (path("block.bin"), path("blocks"), path("figures"));
+    for (tool, arguments, status) in [
+        (plan, "--uavs 8", 0),
+        (plan, "--uavs 8 --json", 0),
+        (plan, "--help", 0),
+        (plan, "--uavs x", 2),
+        (plan, "--target-sir-db 60", 1),
+        (provision, &format!("--uavs 3 --index 1 --out {block}"), 0),
+        (provision, &format!("--uavs 3 --all --out-dir {blocks}"), 0),
+        (provision, &format!("--uavs 3 --all --out-dir {blocks}"), 2),
+        (provision, "--help", 0),
+        (figures, &format!("--only locus --out {pages}"), 0),
+        (figures, "--only none", 2),
+        (figures, "--help", 0),
+    ] {
+        assert_eq!(
+            unheard(tool, arguments),
+            Some(status),
+            "{tool} {arguments:?}"
+        );
+    }
 }

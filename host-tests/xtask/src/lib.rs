@@ -1,6 +1,5 @@
 //! Shared parts of the project's development commands.
 
-pub mod number;
 pub mod stack;
 pub mod template;
 pub mod toolchain;

@@ -1,8 +1,7 @@
 //! Firmware templates: the files of `examples/templates`, written into an empty folder.
 
-use std::fs;
-use std::io;
 use std::path::{Component, Path, PathBuf};
+use std::{fs, io};
 
 /// Folder of the files that all templates share, in the folder of the templates.
 const COMMON: &str = "common";

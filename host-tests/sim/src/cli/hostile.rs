@@ -1,15 +1,21 @@
 //! Options for failures, partitions, attacks and uploads.
 
-use crate::command::{Failure, whole};
-use crate::simulator::attack::Attack;
-use crate::simulator::setup::{Partition, Setup};
-use clap::Args;
-use uav_relay::{Instant, Sites, Wiring};
+use std::path::{Path, PathBuf};
 
-use super::air::Air;
-use super::flight::Flight;
-use super::times::{instant, seconds, span};
+use clap::{Args, ValueEnum};
+use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
+use uav_relay::{Duration, GuardConfig, Instant, Sites, Wiring};
+
+use super::options::{instant, span};
 use super::upload::Uploads;
+use crate::command::{Failure, carries, number, whole};
+use crate::report::seconds;
+use crate::simulator::attack::Attack;
+use crate::simulator::drones::Point;
+use crate::simulator::faults::{Bursts, OneWayFailure};
+use crate::simulator::fleet::{FleetSpec, Takeover, somewhere};
+use crate::simulator::medium::Access;
+use crate::simulator::setup::{Partition, Setup};
 
 /// Command-line options for events in the air.
 #[derive(Args, Debug)]
@@ -250,4 +256,320 @@ fn partition(text: &str) -> Result<Partition, String> {
         return Err("must be K@S-T with T after S".to_owned());
     }
     Ok(Partition { after, from, until })
+}
+
+/// Command-line options for links and the radio channel.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Links and the air")]
+pub struct Air {
+    /// Access method of the shared channel, which reaches four relays far; default csma
+    #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
+    sharing: Option<Sharing>,
+    /// Bits per second of every link or of the channel, 300 to 10000000; a byte takes ten bits
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole(300_u32, 10_000_000))]
+    baud: u32,
+    /// Silence after which a neighbour is probed, ms, 1 to 1200000; default 5000. After three times as long it counts as lost.
+    /// Larger values allow more relays on a slow channel
+    #[arg(long, value_name = "MS", value_parser = whole(1_u64, 1_200_000))]
+    probe_after_ms: Option<u64>,
+    /// Range of the radios on a shared channel, in relays, 1 to 1000; default 4
+    #[arg(long, value_name = "K", conflicts_with = "wires", value_parser = whole(1_usize, 1_000))]
+    reach: Option<usize>,
+    /// Mean length of a burst of losses, frames, 1 to 1e6 (Gilbert-Elliott). It is independent for each direction of a link; --loss
+    /// P is the mean share of lost frames. 1 for independent losses, otherwise at least 1 / (1 - P)
+    #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
+    burst: f64,
+    /// Relay J does not receive relay I from second S until E, or permanently. Repeatable
+    #[arg(long, value_name = "J:I@S[-E]", value_parser = deaf)]
+    deaf: Vec<OneWayFailure>,
+    /// Run for S seconds, 1 to 1e6, with all events, and report the availability of the chain
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = soak)]
+    soak: Option<Instant>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Sharing {
+    /// Half duplex: radios sense the channel before they send, and wait a random time
+    Csma,
+    /// Half duplex: radios send at once
+    Aloha,
+    /// Separate line for every sender: no collisions
+    Ideal,
+}
+
+impl Air {
+    /// Returns true if the options request a shared channel.
+    pub fn is_chosen(&self) -> bool {
+        self.sharing.is_some()
+    }
+
+    /// Returns true if the options can separate relays from the chain or fix the run's duration.
+    pub fn is_eventful(&self) -> bool {
+        !self.deaf.is_empty() || self.soak.is_some()
+    }
+
+    /// Returns the end of a soak, if requested.
+    pub const fn soaked(&self) -> Option<Instant> {
+        self.soak
+    }
+
+    /// Returns the failure options with their start times.
+    pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+        let name = |deaf: &OneWayFailure| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
+        self.deaf.iter().map(name)
+    }
+
+    /// Returns the times of all events.
+    pub fn times(&self) -> impl Iterator<Item = Instant> {
+        self.deaf
+            .iter()
+            .map(|deaf| deaf.until.unwrap_or(deaf.from))
+            .chain(self.soak)
+    }
+
+    /// Checks the options against a chain of `uavs` relays.
+    pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
+        let wrong = self.deaf.iter().find(|deaf| {
+            !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
+        });
+        if let Some(OneWayFailure { by, of, .. }) = wrong {
+            let line = format!("--deaf {by}:{of}@..: relays must be within 1 to {uavs}");
+            return Err(Failure::input(line));
+        }
+        Ok(())
+    }
+
+    /// Applies the options to a setup that loses `loss` of the frames. The wiring must already be set.
+    pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
+        if self.burst > 1.0 && loss <= 0.0 {
+            let line = format!("--burst {}: would be ignored without --loss", self.burst);
+            return Err(Failure::input(line));
+        }
+        let least = Bursts::shortest(loss);
+        if self.burst > 1.0 && self.burst < least {
+            let line = format!(
+                "--burst {}: must be 1, or {least:.4} to 1e6 with --loss {loss}: independent losses come in runs as long",
+                self.burst
+            );
+            return Err(Failure::input(line));
+        }
+        setup.burst = self.burst;
+        setup.link.baud = self.baud;
+        if let Some(ms) = self.probe_after_ms {
+            setup.settings.probe_after = Duration::from_millis(ms);
+            setup.settings.dead_after = Duration::from_millis(3 * ms);
+        }
+        if let Some(reach) = self.reach {
+            setup.radio_reach = reach;
+        }
+        setup.deaf.clone_from(&self.deaf);
+        setup.access = match (setup.settings.wiring, self.sharing) {
+            (Wiring::Pair, _) | (_, Some(Sharing::Ideal)) => Access::Ideal,
+            (_, Some(Sharing::Aloha)) => Access::Aloha,
+            (_, Some(Sharing::Csma) | None) => Access::Csma,
+        };
+        if let Some(load) = setup.load() {
+            carries(self.baud, load, setup.settings.probe_after).map_err(Failure::input)?;
+        }
+        if let Some(until) = self.soak {
+            setup.soak = Some(until);
+            setup.deadline = until;
+        }
+        Ok(())
+    }
+}
+
+fn deaf(text: &str) -> Result<OneWayFailure, String> {
+    let form =
+        "must be J:I@S or J:I@S-E, two relays (1 to N) and seconds after the start (0 to 1e6)";
+    let (relays, times) = text.split_once('@').ok_or(form)?;
+    let (by, of) = relays.split_once(':').ok_or(form)?;
+    let by: u16 = by.parse().map_err(|_| form)?;
+    let of: u16 = of.parse().map_err(|_| form)?;
+    let (from, until) = span(times).ok_or(form)?;
+    if until.is_some_and(|until| until <= from) {
+        return Err("must be J:I@S-E with E after S".to_owned());
+    }
+    if by == of {
+        return Err("must be J:I@S-E with two different relays".to_owned());
+    }
+    Ok(OneWayFailure {
+        by,
+        of,
+        from,
+        until,
+    })
+}
+
+fn soak(text: &str) -> Result<Instant, String> {
+    number(text, 1.0, 1e6)?;
+    instant(text).ok_or_else(|| "must be a number within 1.0 to 1e6".to_owned())
+}
+
+/// Bounds on the constant and the random position error, m; standard deviation of gusts, m/s.
+const BIAS_M: f64 = 0.5;
+const NOISE_M: f64 = 0.3;
+const GUST_MPS: f64 = 0.3;
+
+/// Largest reported distance of a hovering drone from its setpoint, m: position noise and gusts.
+const HOVER_M: f32 = 1.5;
+
+/// Command-line options for drones.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Drones")]
+pub struct Flight {
+    /// Simulate drones: limited speed and acceleration, position noise, gusts, autopilots, pilots, guard. The autopilots speak
+    /// MAVLink (PX4 and ArduCopter in turn), and the pilots take off and hand over. The run ends when all flying drones hover at
+    /// their positions
+    #[arg(long)]
+    fly: bool,
+    /// The pilot of drone I takes over from second S until E, or permanently. Repeatable
+    #[arg(long, value_name = "I@S[-E]", value_parser = takeover)]
+    takeover: Vec<Takeover>,
+    /// File with the position of each drone's first hand-over, one line `index, x_m, y_m, h_m` per drone
+    #[arg(long, value_name = "FILE", requires = "fly")]
+    start: Option<PathBuf>,
+}
+
+/// Bound on |x|, |y| and height of a start position, m.
+const START_WITHIN_M: f64 = 5_000.0;
+
+impl Flight {
+    pub const fn is_chosen(&self) -> bool {
+        self.fly
+    }
+
+    /// Returns the takeover options with their start times.
+    pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
+        let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
+        self.takeover.iter().map(name)
+    }
+
+    /// Returns the times of all events.
+    pub fn times(&self) -> impl Iterator<Item = Instant> {
+        self.takeover
+            .iter()
+            .map(|takeover| takeover.until.unwrap_or(takeover.from))
+    }
+
+    /// Checks the options against a chain of `uavs` relays.
+    pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
+        if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
+            let line = format!("--takeover {relay}@..: would be ignored without --fly");
+            return Err(Failure::input(line));
+        }
+        let wrong = |takeover: &&Takeover| !(1..=uavs).contains(&takeover.relay);
+        match self.takeover.iter().find(wrong) {
+            Some(takeover) => Err(Failure::input(format!(
+                "--takeover {}@..: relay must be within 1 to {uavs}",
+                takeover.relay
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds the drones to the setup; by default evenly spaced along the line.
+    pub fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
+        if !self.fly {
+            return Ok(());
+        }
+        let config = setup.mission.config();
+        let distance_m = f64::from(config.distance_m);
+        let axis = axis.or_else(|| somewhere(distance_m)).ok_or_else(|| {
+            Failure::input(format!(
+                "--fly: the line is {distance_m} m long: must be within {SHORTEST_M} to {LONGEST_M} m"
+            ))
+        })?;
+        let start = match &self.start {
+            Some(file) => starts(file, config.relays)?,
+            None => (0..config.relays)
+                .map(|index| {
+                    let share = (f64::from(index) + 0.5) / f64::from(config.relays);
+                    [distance_m * share, 0.0, f64::from(config.common.altitude_m)]
+                })
+                .collect(),
+        };
+        let mut guard = GuardConfig::of(&setup.mission, config.common);
+        guard.hover_m = HOVER_M;
+        setup.settings.guard = Some(guard);
+        setup.settings.sited = true;
+        setup.fleet = Some(FleetSpec {
+            axis,
+            start,
+            takeovers: self.takeover.clone(),
+            restarts: Vec::new(),
+            gust_mps: GUST_MPS,
+            bias_m: BIAS_M,
+            noise_m: NOISE_M,
+        });
+        Ok(())
+    }
+}
+
+fn takeover(text: &str) -> Result<Takeover, String> {
+    let form = "must be I@S or I@S-E, a relay (1 to N) and seconds after the start (0 to 1e6)";
+    let (relay, times) = text.split_once('@').ok_or(form)?;
+    let relay = relay.parse().map_err(|_| form)?;
+    let (from, until) = span(times).ok_or(form)?;
+    if until.is_some_and(|until| until <= from) {
+        return Err("must be I@S-E with E after S".to_owned());
+    }
+    Ok(Takeover {
+        relay,
+        from,
+        until,
+        to: None,
+    })
+}
+
+/// Reads the start positions of all drones from a file.
+fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
+    let named = |what: String| Failure::input(format!("--start {}: {what}", file.display()));
+    let text = std::fs::read_to_string(file).map_err(|error| named(error.to_string()))?;
+    let mut starts = vec![None; usize::from(relays)];
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let at = |what: String| named(format!("line {}: {what}", number + 1));
+        let form = || at(format!("`{line}`: must be `index, x_m, y_m, h_m`"));
+        let mut parts = line.split(',').map(str::trim);
+        let index: u16 = parts
+            .next()
+            .and_then(|part| part.parse().ok())
+            .ok_or_else(form)?;
+        let mut place = [0.0; 3];
+        for (value, least) in place
+            .iter_mut()
+            .zip([-START_WITHIN_M, -START_WITHIN_M, 2.0])
+        {
+            *value = parts
+                .next()
+                .and_then(|part| part.parse::<f64>().ok())
+                .ok_or_else(form)?;
+            if !(least..=START_WITHIN_M).contains(value) {
+                return Err(at(format!(
+                    "{value} m: must be within {least} to {START_WITHIN_M}"
+                )));
+            }
+        }
+        if parts.next().is_some() {
+            return Err(form());
+        }
+        let start = index
+            .checked_sub(1)
+            .and_then(|index| starts.get_mut(usize::from(index)))
+            .ok_or_else(|| at(format!("drone {index}: must be within 1 to {relays}")))?;
+        if start.replace(place).is_some() {
+            return Err(at(format!("drone {index} is there twice")));
+        }
+    }
+    let complete: Option<Vec<Point>> = starts.iter().copied().collect();
+    complete.ok_or_else(|| {
+        let missing = starts.iter().position(Option::is_none).unwrap_or(0) + 1;
+        named(format!(
+            "drone {missing} is missing: a line for each of 1 to {relays}"
+        ))
+    })
 }

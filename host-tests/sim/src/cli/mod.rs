@@ -7,14 +7,9 @@
 //! | run the chain | [`Prepared::fly`] |
 //! | report and draw the outcome | [`Prepared::report`], [`Prepared::picture`] |
 
-mod air;
-mod flight;
-mod given;
 mod hostile;
-mod listening;
 mod options;
 mod prepared;
-mod times;
 mod upload;
 
 pub use options::{Method, Options};

@@ -7,13 +7,13 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{Interference, Scenario};
 
 use super::options::{Method, Options};
-use crate::beta::beta_w;
 use crate::command::{self, Failure};
 use crate::report::{self, AirReport, AllInterferersReport, ChainReport, SensingReport, timeline};
 use crate::simulator::chain::Chain;
 use crate::simulator::faults::Faults;
 use crate::simulator::outcome::{Outcome, RelayEnd};
 use crate::simulator::setup::Setup;
+use crate::simulator::true_interference::beta_w;
 use crate::svg::{OtherInterferers, Picture, room};
 
 /// Setup of a run, with the true mission for its evaluation.

@@ -1,28 +1,26 @@
 //! Report of a simulated chain.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay::{Interference, Mission};
+use uav_relay::{Interference, Mission, Wiring};
+use uav_relay_scenario::scene::{Place, Scene};
+use uav_relay_scenario::{Scenario, mission};
 
-use super::air::AirReport;
-use super::all_interferers::AllInterferersReport;
 use super::attack::AttackReport;
-use super::availability::AvailabilityReport;
-use super::drones::{DroneReport, drones};
-use super::failure::error;
-use super::final_mission::version;
-use super::hops::{self, RelayReport, db, hop_sirs};
-use super::recovery::{self, RecoveryReport, recoveries};
-use super::remaining::{LostReport, left, lost};
+use super::hops::{RelayReport, db, hop_sirs};
 use super::sensing::SensingReport;
-use super::silences::{SilenceReport, silences};
-use super::timeline::{self, MomentReport, seconds};
-use crate::simulator::outcome::{Ending, Outcome};
+use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
+use super::{hops, timeline};
+use crate::simulator::drones::{Point, apart, point};
+use crate::simulator::medium::{Access, AirCounts};
+use crate::simulator::outcome::{Ending, Outcome, RelayEnd, TimelineEvent};
 use crate::simulator::setup::Setup;
+use crate::simulator::watch::Watched;
 
 /// Counts of frame faults.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct FaultReport {
     /// Lost frames.
     pub lost: u64,
@@ -37,7 +35,7 @@ pub struct FaultReport {
 }
 
 /// Result of `cargo chain`.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct ChainReport {
     /// Planning method, as on the command line.
     pub method: String,
@@ -190,10 +188,6 @@ impl ChainReport {
                     .sum(),
             },
             silences: silences(outcome),
-            channel: None,
-            air: None,
-            listened: None,
-            against_all: None,
             watched: outcome
                 .watched
                 .map(AvailabilityReport::of)
@@ -203,9 +197,9 @@ impl ChainReport {
             recovery: recoveries(&outcome.moments, mission.relays()),
             drones: drones(outcome),
             timeline,
-            attack: None,
             seed,
             room: !mission.config().lateral.is_single(),
+            ..Self::default()
         }
     }
 
@@ -214,42 +208,9 @@ impl ChainReport {
         Self {
             method: method.to_owned(),
             uavs,
-            version: None,
             error: Some(why.to_owned()),
-            best_sir: None,
-            sir: None,
-            sir_db: None,
-            target: None,
-            promised: None,
-            rounds: Vec::new(),
-            relays: Vec::new(),
-            rx_sir: None,
-            rx_sir_db: None,
-            sweeps: 0,
-            messages: 0,
-            bytes: 0,
-            virtual_s: 0.0,
-            faults: FaultReport {
-                lost: 0,
-                corrupted: 0,
-                duplicated: 0,
-                reordered: 0,
-                rejected: 0,
-            },
-            silences: Vec::new(),
-            channel: None,
-            air: None,
-            listened: None,
-            against_all: None,
-            watched: AvailabilityReport::default(),
-            left: None,
-            lost: Vec::new(),
-            drones: Vec::new(),
-            timeline: Vec::new(),
-            recovery: Vec::new(),
-            attack: None,
             seed,
-            room: false,
+            ..Self::default()
         }
     }
 
@@ -342,7 +303,7 @@ impl ChainReport {
             text += &attack.text();
         }
         text += &timeline::text(&self.timeline);
-        text += &recovery::text(&self.recovery);
+        text += &timeline::recovery_text(&self.recovery);
         text
     }
 
@@ -352,5 +313,378 @@ impl ChainReport {
             Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
             _ => self.uavs.to_string(),
         }
+    }
+}
+
+/// Relay that is no longer in the chain.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct LostReport {
+    /// Relay number in the mission, from 1.
+    pub index: u16,
+    /// Last setpoint: distance from the transmitter, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_m: Option<f64>,
+    /// Last setpoint: distance from the line, m, positive to the right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_m: Option<f64>,
+    /// Last setpoint: altitude, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub h_m: Option<f64>,
+    /// Last version of the relay's mission; absent without uploads.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+    /// Reason: `silent`; `apart` (alive, cannot reach the others); `no quorum` (alive, no chain is left).
+    pub why: &'static str,
+}
+
+/// Returns the relays of the chain at the end of the run, with their numbers from 1, in order from Tx.
+///
+/// The chain is the largest complete view, or all living relays if there is none. On separate links a failure is only reported:
+/// all relays stay. Without a quorum there is no chain.
+pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
+    let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
+    match outcome.ending {
+        Ending::Broken => return all,
+        Ending::NoQuorum => return Vec::new(),
+        _ => {}
+    }
+    let living: Vec<_> = all
+        .into_iter()
+        .filter(|(_, relay)| relay.killed.is_none())
+        .collect();
+    let views = living.iter().map(|(_, relay)| relay.view);
+    views
+        .map(|view| {
+            let part = living.iter().filter(|(_, relay)| relay.view == view);
+            (view, part.copied().collect::<Vec<_>>())
+        })
+        .filter(|(_, part)| is_counted(part))
+        .max_by_key(|(view, part)| (part.len(), *view))
+        .map_or(living.clone(), |(_, part)| part)
+}
+
+/// Returns true if these are all relays of their view.
+fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
+    (1..)
+        .zip(part)
+        .all(|(place, (_, relay))| relay.index == place && usize::from(relay.relays) == part.len())
+}
+
+/// Reports the relays that are not in `left`.
+pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostReport> {
+    (1..)
+        .zip(&outcome.relays)
+        .filter(|(index, _)| !left.iter().any(|(other, _)| other == index))
+        .map(|(index, relay)| LostReport {
+            index,
+            x_m: relay.setpoint.map(|place| f64::from(place.x_m)),
+            y_m: relay.setpoint.map(|place| f64::from(place.y_m)),
+            h_m: relay.setpoint.map(|place| f64::from(place.altitude_m)),
+            version: outcome.offered().map(|_| relay.version),
+            why: match outcome.ending {
+                _ if relay.killed.is_some() => "silent",
+                Ending::NoQuorum => "no quorum",
+                _ => "apart",
+            },
+        })
+        .collect()
+}
+
+/// Returns the mission that the chain flies at the end of a run, with all its relays.
+pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
+    let version = version(outcome);
+    let mut uploads = setup.uploads.iter().map(|spec| spec.upload);
+    uploads
+        .find(|upload| upload.version() == version)
+        .and_then(|upload| Mission::try_new(*upload.config()).ok())
+        .unwrap_or(setup.mission)
+}
+
+/// Returns the version of that mission; the newest one if the relays differ.
+pub(super) fn version(outcome: &Outcome) -> u16 {
+    let chain = left(outcome);
+    let versions = chain.iter().map(|(_, relay)| relay.version);
+    versions.max().unwrap_or(0)
+}
+
+/// Returns the reason for a failed run, and the upload that was not adopted, if any.
+pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
+    let error = ended(method, outcome)?;
+    // A mission counts as adopted even if its relays are lost.
+    let known = version(outcome).max(adopted(outcome));
+    let missing = outcome.offered().filter(|newest| *newest > known);
+    Some(match missing {
+        Some(version) => format!("{error}; mission {version} was not adopted"),
+        None => error,
+    })
+}
+
+/// Returns the newest mission version that any relay adopted; 0 for the original mission.
+fn adopted(outcome: &Outcome) -> u16 {
+    let versions = outcome.moments.iter().map(|moment| match moment.what {
+        TimelineEvent::Adopted(version) => version,
+        _ => 0,
+    });
+    versions.max().unwrap_or(0)
+}
+
+fn ended(method: &str, outcome: &Outcome) -> Option<String> {
+    match outcome.ending {
+        Ending::Settled | Ending::Soaked => None,
+        Ending::Infeasible if method.ends_with("-step") => Some(
+            "none of the targets that the fixed step takes can be met; a smaller one may find one"
+                .to_owned(),
+        ),
+        Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
+        Ending::Broken => {
+            let silent: Vec<String> = (1..)
+                .zip(&outcome.relays)
+                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
+                .map(|(index, _)| index.to_string())
+                .collect();
+            Some(format!(
+                "the chain is broken: relay {} went silent",
+                silent.join(", ")
+            ))
+        }
+        Ending::NoQuorum => Some("no quorum: too few relays reach each other".to_owned()),
+        Ending::OutOfTime => Some(format!(
+            "the chain had not settled after {:.0} s",
+            seconds(outcome.ended)
+        )),
+    }
+}
+
+/// Channel parameters and counters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct AirReport {
+    /// Access method: `csma` or `aloha`.
+    pub access: &'static str,
+    /// Bits per second.
+    pub baud: u32,
+    /// Counters of the channel.
+    #[serde(flatten)]
+    pub counts: AirCounts,
+}
+
+impl AirReport {
+    /// Report of a run of `setup`; `None` without a shared channel, or with an ideal one.
+    pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
+        let access = match (setup.settings.wiring, setup.access) {
+            (Wiring::Shared, Access::Csma) => "csma",
+            (Wiring::Shared, Access::Aloha) => "aloha",
+            _ => return None,
+        };
+        Some(Self {
+            access,
+            baud: setup.link.baud,
+            counts: outcome.air,
+        })
+    }
+
+    /// Formats the report as a line; `virtual_s` is the duration of the run.
+    pub(super) fn text(&self, virtual_s: f64) -> String {
+        let counts = self.counts;
+        let load = counts.air_time_us as f64 / 1e6 / virtual_s.max(1e-6);
+        let mut text = String::new();
+        _ = writeln!(
+            text,
+            "air ({}, {} baud): load {load:.3}, {} frames sent, {} not for want of room; receptions lost: {} to collisions, {} to sending",
+            self.access, self.baud, counts.sent, counts.dropped, counts.collided, counts.unheard
+        );
+        text
+    }
+}
+
+/// Statistics over the whole run; all absent if not recorded.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
+pub struct AvailabilityReport {
+    /// Time of the first agreement, s: all relays of a view hold their positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_agreement_s: Option<f64>,
+    /// Share of the time since then in which a longest possible chain held its optimum.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub availability: Option<f64>,
+    /// Longest continuous time since then without that, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_outage_s: Option<f64>,
+    /// Largest number of groups that held separate agreements at the same time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_flying: Option<usize>,
+    /// Smallest distance of two relays, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_separation_m: Option<f64>,
+}
+
+impl AvailabilityReport {
+    /// Report of `watched`.
+    pub fn of(watched: Watched) -> Self {
+        let longest = watched.longest_wrong;
+        Self {
+            first_agreement_s: watched.first_agreement.map(seconds),
+            availability: watched.availability,
+            longest_outage_s: longest.map(|span| span.as_micros() as f64 / 1e6),
+            most_flying: Some(watched.most_flying),
+            least_separation_m: watched.least_separation_m.filter(|least| least.is_finite()),
+        }
+    }
+
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        if let Some(availability) = self.availability {
+            let outage = self.longest_outage_s.unwrap_or(0.0);
+            _ = match self.first_agreement_s {
+                Some(first) => writeln!(
+                    text,
+                    "availability: {availability:.6} since the first agreement at {first:.3} s; the longest outage took {outage:.3} s"
+                ),
+                None => writeln!(
+                    text,
+                    "availability: {availability:.6}, because there was no agreement"
+                ),
+            };
+        }
+        if let Some(most) = self.most_flying {
+            _ = writeln!(
+                text,
+                "most groups with separate agreements at the same time: {most}"
+            );
+        }
+        if let Some(least) = self.least_separation_m {
+            _ = writeln!(text, "least separation of two relays: {least:.3} m");
+        }
+        text
+    }
+}
+
+/// Final state of a drone.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct DroneReport {
+    /// Relay number in the mission, from 1.
+    pub index: u16,
+    /// True position along the line, m.
+    pub x_m: f64,
+    /// True position to the right of the line, m.
+    pub y_m: f64,
+    /// True height above the ground, m.
+    pub h_m: f64,
+    /// True if the relay controls the drone.
+    pub flown: bool,
+    /// Distance from the relay's setpoint, m, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub off_m: Option<f64>,
+}
+
+pub(super) fn drones(outcome: &Outcome) -> Vec<DroneReport> {
+    let ends = (1..).zip(outcome.fleet.iter().zip(&outcome.relays));
+    ends.map(|(index, (&(at, flown), relay))| one(index, at, flown, relay))
+        .collect()
+}
+
+fn one(index: u16, at: Point, flown: bool, relay: &RelayEnd) -> DroneReport {
+    let [x_m, y_m, h_m] = at;
+    DroneReport {
+        index,
+        x_m,
+        y_m,
+        h_m,
+        flown,
+        off_m: relay.setpoint.map(|place| apart(point(place), at)),
+    }
+}
+
+/// Detected failure of a relay.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SilenceReport {
+    /// Failed relay.
+    pub silent: u16,
+    /// Neighbour that detected the failure.
+    pub noticed_by: u16,
+    /// Detection time, s of virtual time.
+    pub at_s: f64,
+}
+
+/// Reports which neighbours detected the relays that failed. False detections over bad links are left out.
+pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
+    let killed = |index: u16| {
+        let at = usize::from(index).checked_sub(1);
+        at.and_then(|at| outcome.relays.get(at))
+            .is_some_and(|relay| relay.killed.is_some())
+    };
+    let mut silences: BTreeMap<(u16, u16), f64> = BTreeMap::new();
+    for moment in &outcome.moments {
+        let Some(other) = moment.other else {
+            continue;
+        };
+        match moment.what {
+            TimelineEvent::Lost(_) if killed(other) => {
+                silences.insert((moment.relay, other), seconds(moment.at));
+            }
+            TimelineEvent::Found(_) => {
+                silences.remove(&(moment.relay, other));
+            }
+            _ => {}
+        }
+    }
+    let reports = silences
+        .into_iter()
+        .map(|((noticed_by, silent), at_s)| SilenceReport {
+            silent,
+            noticed_by,
+            at_s,
+        });
+    reports.collect()
+}
+
+/// SIR of the chain against all interferers, if its relays assumed a single one.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct AllInterferersReport {
+    /// SIR of the worst hop against all interferers, linear.
+    pub all_sir: f64,
+    /// SIR of the worst hop against all interferers, dB.
+    pub all_sir_db: f64,
+    /// Relative loss from the SIR that the relays assume; negative for a gain.
+    pub all_loss: f64,
+}
+
+impl AllInterferersReport {
+    /// Evaluates `relays`, which assume `sir`; `None` if there is a single interferer or a field.
+    pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {
+        mission::hypothetical(scenario)?;
+        let last = relays.last()?.index;
+        let mut scene = Scene::new(scenario, last)?;
+        // Remaining relays, in order.
+        let all = std::mem::take(&mut scene.relays);
+        let of = |relay: &RelayReport| all.get(usize::from(relay.index) - 1).copied();
+        scene.relays = relays.iter().filter_map(of).collect();
+        let places: Vec<Place> = relays
+            .iter()
+            .map(|relay| Place {
+                x: relay.x_m,
+                y: relay.y_m,
+                h: relay.h_m,
+            })
+            .collect();
+        let all_sir = scene.chain_sir(&places);
+        Some(Self {
+            all_sir,
+            all_sir_db: db(all_sir),
+            all_loss: 1.0 - all_sir / sir,
+        })
+    }
+
+    /// Formats the result as a line of text.
+    pub fn text(&self) -> String {
+        let Self {
+            all_sir,
+            all_sir_db,
+            all_loss,
+        } = self;
+        let part = 100.0 * all_loss.abs();
+        let side = if *all_loss < 0.0 { "above" } else { "below" };
+        format!(
+            "against all interferers: SIR {all_sir:.6} ({all_sir_db:.3} dB), {part:.1} % {side} the relays' estimate; `cargo plan` has the \
+             best positions against all\n"
+        )
     }
 }

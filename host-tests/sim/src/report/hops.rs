@@ -7,7 +7,7 @@ use uav_relay::place::Station;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Mission, Placement, Profile};
 
-use super::remaining::LostReport;
+use super::chain::LostReport;
 
 /// Position and SIR of a relay.
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -8,10 +8,10 @@ use uav_relay::{Interference, Interferer, Mission, MissionConfig};
 
 use super::hops::db;
 use crate::simulator::chain::run;
-use crate::simulator::optima::alone;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::TrueInterference;
+use crate::simulator::watch::alone;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 

@@ -1,42 +1,33 @@
 //! Event loop of a run: connects the relays and processes events until the run ends.
 
 mod air;
-mod attacker;
-mod begin;
-mod channel;
-mod ending;
-mod filmed;
 mod fleet;
-mod flight;
 mod ground;
-mod hearing;
 mod judge;
-mod limits;
-mod listening;
-mod receiver;
-mod recorded;
-mod start;
-mod state;
-mod station;
-mod timeline;
 
-pub use state::Chain;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
 
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uav_relay::MAX_FRAME;
-use uav_relay::SetupError;
-use uav_relay::{Instant, Placement, Sample};
+use uav_relay::{
+    Identity, Instant, MAX_FRAME, Placement, Port, Relay, Sample, Settings, SetupError, Upload,
+    ViewRecord, Wiring,
+};
 
-use judge::Touched;
-use start::{Start, switched_on};
-
+use super::attack::{AttackKind, Attacker, NETWORK};
+use super::drones::Flight;
+use super::faults::{Bursts, Line};
 use super::fleet::Vehicle;
-use super::flying::Seen;
-use super::medium::AirCounts;
-use super::outcome::{Outcome, RelayEnd, TimelineEvent};
-use super::queue::QueuedEvent;
+use super::medium::{Access, AirCounts, AirEvent, Medium};
+use super::outcome::{Film, Outcome, Record, RelayEnd, TimelineEvent};
 use super::setup::Setup;
+use super::watch::{Run, Seen, Watch};
+use fleet::LANDS_AFTER;
+use ground::{Station, stations};
+use judge::Touched;
 
 /// Limit on the events of a run: some minutes of computing.
 const MOST_HAPPENINGS: u64 = 400_000_000;
@@ -289,4 +280,371 @@ impl Chain {
 /// [`SetupError`] if a relay rejects its profile or settings.
 pub fn run(setup: Setup) -> Result<Outcome, SetupError> {
     Chain::new(setup).map(Chain::run)
+}
+
+#[derive(Debug)]
+struct Member {
+    relay: Relay,
+    /// Relay number in the mission, from 1.
+    node: u16,
+    /// Transmit lines: toward Tx (or shared), toward Rx.
+    lines: [Line; 2],
+    killed: Option<Instant>,
+    /// True if the relay controlled its drone at the last time step.
+    lent: bool,
+    starts: u32,
+    /// Sweeps begun before the last start.
+    swept: u32,
+    stored: Option<Upload>,
+    /// Stored view record, if the relay has voted.
+    record: Option<ViewRecord>,
+    /// Last setpoint that passed the limit check.
+    safe: Option<Placement>,
+    /// Least and greatest setpoint coordinates since the drone was engaged.
+    been: Option<[Placement; 2]>,
+    /// Position of the last measurement.
+    measured: Option<Placement>,
+    /// Last filmed state: on or off, and the setpoint.
+    filmed: Option<(bool, Option<Placement>)>,
+    /// Time of the valid wake-up in the queue, the earliest; others are ignored.
+    wake: Option<Instant>,
+}
+
+/// Simulated chain during a run.
+#[derive(Debug)]
+pub struct Chain {
+    setup: Setup,
+    members: Vec<Member>,
+    queue: Queue,
+    rng: ChaCha8Rng,
+    outcome: Outcome,
+    now: Instant,
+    happenings: u64,
+    /// Number of `Converged` events so far.
+    holding: usize,
+    /// Planned kills, boots, partitions, uploads and attacker frames that are still pending.
+    ahead: usize,
+    stations: Vec<Station>,
+    attacker: Option<Attacker>,
+    flight: Option<Flight>,
+    fleet: Vec<Vehicle>,
+    /// Distance of each pair of drones at their last hand-over, m. `None` while a pilot flies one of the two.
+    handed_over_m: Vec<Option<f64>>,
+    /// Simulated shared channel; `None` for separate lines or an ideal channel.
+    medium: Option<Medium>,
+    bursts: Option<Bursts>,
+    /// Setpoints of the last agreement.
+    agreed: Option<Vec<Placement>>,
+    agreements: u32,
+    /// True after the last measurement.
+    listened: bool,
+    /// Statistics, for soaks and shared channels.
+    watch: Option<Watch>,
+    record: Option<Record>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Start {
+    /// Relay number, from 1.
+    index: u16,
+    /// Number of the start, from 1.
+    number: u32,
+    seed: u32,
+    now: Instant,
+}
+
+/// Creates a relay and restores its persistent state.
+fn switched_on(
+    setup: &Setup,
+    start: Start,
+    stored: Option<&Upload>,
+    record: Option<&ViewRecord>,
+) -> Result<Relay, SetupError> {
+    let Start {
+        index,
+        number,
+        seed,
+        now,
+    } = start;
+    let own = setup.profiles.iter().find(|(of, _)| *of == index);
+    let settings = Settings {
+        profile: own.map(|(_, profile)| *profile),
+        hold_altitude: setup.held.contains(&index),
+        hop_time: setup.hop_time(),
+        auth: setup.proof(number).or(setup.settings.auth),
+        ..setup.settings
+    };
+    let identity = Identity {
+        network: NETWORK,
+        index,
+    };
+    let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
+    if let Some(upload) = stored {
+        let resumed = relay.resume(upload);
+        debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
+    }
+    if let Some(record) = record {
+        let resumed = relay.resume_view(now, record);
+        debug_assert_eq!(resumed, Ok(()), "it has left it itself");
+    }
+    Ok(relay)
+}
+
+impl Chain {
+    /// Switches every relay on at time 0. `run` computes the reference positions if the run is watched.
+    fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+        let members = members(&setup, &mut rng)?;
+        let mut queue = Queue::default();
+        let stations = stations(&setup);
+        let bursts = (setup.burst > 1.0).then(|| Bursts::new(setup.faults.loss, setup.burst));
+        let shared = setup.settings.wiring == Wiring::Shared;
+        let medium = (shared && setup.access != Access::Ideal).then(|| {
+            let nodes = members.len() + stations.len();
+            Medium::new(setup.access, setup.link, nodes, setup.seed)
+        });
+        for &(index, at) in &setup.kills {
+            queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Kill);
+        }
+        for &(index, at) in &setup.boots {
+            queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Boot);
+        }
+        for (which, spec) in setup.uploads.iter().enumerate() {
+            queue.put(spec.at, which, QueuedEvent::Upload);
+        }
+        let mut ahead = put_fleet(&setup, &mut queue)
+            + setup.kills.len()
+            + setup.boots.len()
+            + setup.uploads.len();
+        let parts = setup.partitions.iter().map(|part| (part.from, part.until));
+        let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
+        for (from, until) in parts.chain(deaf) {
+            for at in [Some(from), until].into_iter().flatten() {
+                queue.put(at, 0, QueuedEvent::Part);
+                ahead += 1;
+            }
+        }
+        let film = setup.film.then(Film::default);
+        let record = setup.record.then(Record::default);
+        let mut chain = Self {
+            stations,
+            setup,
+            members,
+            queue,
+            rng,
+            outcome: Outcome {
+                margin_m: f64::INFINITY,
+                film,
+                ..Outcome::default()
+            },
+            now: Instant::ZERO,
+            happenings: 0,
+            holding: 0,
+            ahead,
+            attacker: None,
+            flight: None,
+            fleet: Vec::new(),
+            handed_over_m: Vec::new(),
+            medium,
+            bursts,
+            agreed: None,
+            agreements: 0,
+            listened: false,
+            watch: None,
+            record,
+        };
+        if shared || chain.setup.soak.is_some() {
+            chain.begin_watch(run);
+        }
+        if let Some(sky) = &chain.setup.sky {
+            let first = Instant::ZERO + sky.period;
+            chain.queue.put(first, 0, QueuedEvent::Listen);
+        }
+        chain.expect_an_attack();
+        chain.take_off();
+        for index in 0..chain.members.len() {
+            chain.drain(index);
+        }
+        chain.look(Touched::All);
+        Ok(chain)
+    }
+}
+
+fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupError> {
+    let mut members = Vec::new();
+    for index in 1..=setup.mission.relays() {
+        let start = Start {
+            index,
+            number: 1,
+            seed: rng.random(),
+            now: Instant::ZERO,
+        };
+        let relay = switched_on(setup, start, None, None)?;
+        members.push(Member {
+            node: index,
+            lines: [Line::default(); 2],
+            killed: None,
+            lent: false,
+            starts: 1,
+            swept: 0,
+            stored: None,
+            record: None,
+            safe: None,
+            been: None,
+            measured: None,
+            filmed: None,
+            relay,
+            wake: None,
+        });
+    }
+    Ok(members)
+}
+
+/// Schedules the events of drones with autopilots and returns their number.
+fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
+    let Some(fleet) = &setup.fleet else {
+        return 0;
+    };
+    let mut put = |at, relay: u16, happening| {
+        queue.put(at, usize::from(relay.saturating_sub(1)), happening);
+    };
+    for &(relay, at) in &fleet.restarts {
+        put(at, relay, QueuedEvent::Restart);
+    }
+    // A pilot who keeps the drone lands it; its relay is switched off.
+    let kept = fleet.takeovers.iter().filter(|it| it.until.is_none());
+    for takeover in kept.clone() {
+        put(
+            takeover.from + LANDS_AFTER,
+            takeover.relay,
+            QueuedEvent::Kill,
+        );
+    }
+    fleet.restarts.len() + kept.count()
+}
+
+/// Event of a relay or of the whole run.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum QueuedEvent {
+    /// Bytes arrive at the relay.
+    Bytes {
+        /// Receiving port.
+        port: Port,
+        /// Received bytes.
+        bytes: Vec<u8>,
+    },
+    /// The relay's timer expires.
+    Wake,
+    /// Bytes arrive at a ground station.
+    Heard {
+        /// Received bytes.
+        bytes: Vec<u8>,
+    },
+    /// A ground station's timer expires.
+    Ask,
+    /// An upload begins; the relay index is the upload's number.
+    Upload,
+    /// Time step of all drones.
+    Fly,
+    /// The autopilot of the relay's drone restarts.
+    Restart,
+    /// The relay goes silent.
+    Kill,
+    /// The relay is switched on again.
+    Boot,
+    /// A partition or a one-way link failure begins or ends.
+    Part,
+    /// An event of the shared channel; the relay index is unused.
+    Air(AirEvent),
+    /// Interference measurement of all relays.
+    Listen,
+    /// The attacker sends a frame to a relay.
+    AttackKind(AttackKind),
+}
+
+/// Queued event. Events of the same time keep their order of insertion.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Entry {
+    at: Instant,
+    order: u64,
+    relay: usize,
+    happening: QueuedEvent,
+}
+
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.at, self.order).cmp(&(other.at, other.order))
+    }
+}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// Pending events.
+#[derive(Debug, Default)]
+pub struct Queue {
+    entries: BinaryHeap<Reverse<Entry>>,
+    order: u64,
+}
+
+impl Queue {
+    /// Schedules `happening` for `relay` (from 0) at `at`.
+    pub fn put(&mut self, at: Instant, relay: usize, happening: QueuedEvent) {
+        self.entries.push(Reverse(Entry {
+            at,
+            order: self.order,
+            relay,
+            happening,
+        }));
+        self.order += 1;
+    }
+
+    /// Removes the next event and returns its time, relay and kind.
+    pub fn take(&mut self) -> Option<(Instant, usize, QueuedEvent)> {
+        let Reverse(entry) = self.entries.pop()?;
+        Some((entry.at, entry.relay, entry.happening))
+    }
+}
+
+/// Runs `setup` with each of `seeds` on all cores and maps each outcome with `of`. The results keep the order of the seeds.
+///
+/// # Errors
+/// [`SetupError`] if a relay rejects its profile or settings.
+pub fn run_seeds<T: Send>(
+    setup: &Setup,
+    seeds: impl IntoIterator<Item = u64>,
+    of: impl Fn(u64, Outcome) -> T + Sync,
+) -> Result<Vec<T>, SetupError> {
+    let seeds: Vec<u64> = seeds.into_iter().collect();
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(seed) = seeds.get(at).copied() else {
+                return done;
+            };
+            let setup = Setup {
+                seed,
+                ..setup.clone()
+            };
+            done.push((at, run(setup).map(|outcome| of(seed, outcome))));
+        }
+    };
+    let mut all: Vec<_> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores.min(seeds.len()))
+            .map(|_| scope.spawn(work))
+            .collect();
+        let done = workers.into_iter().map(|worker| match worker.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        done.flatten().collect()
+    });
+    all.sort_by_key(|(at, _)| *at);
+    all.into_iter().map(|(_, result)| result).collect()
 }

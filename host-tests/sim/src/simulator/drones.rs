@@ -9,7 +9,8 @@ use uav_relay_scenario::number::narrow;
 /// Position: x, y and altitude, m.
 pub type Point = [f64; 3];
 
-pub(super) fn point(place: Placement) -> Point {
+/// Returns the coordinates of a placement.
+pub fn point(place: Placement) -> Point {
     [place.x_m, place.y_m, place.altitude_m].map(f64::from)
 }
 

@@ -1,7 +1,11 @@
 //! Frame faults on any link: loss, corruption, duplication and reordering, with a counter for each.
 
+use std::collections::HashMap;
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use uav_relay::wire::frame::MAX_SWEEP;
+use uav_relay::{Duration, Instant};
 
 /// Probability of each fault per frame, 0 to 0.9. Faults are independent: several may affect one frame.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -96,5 +100,119 @@ impl Faults {
                 Arrival { bytes, late }
             })
             .collect()
+    }
+}
+
+/// Burst state of all links; each direction of a link is independent.
+#[derive(Debug)]
+pub struct Bursts {
+    /// Mean share of lost frames, equal to the share of time in the bad state.
+    share: f64,
+    /// Probability per frame of the transition from good to bad.
+    worsens: f64,
+    /// Probability per frame of the transition from bad to good: the inverse of the mean burst length.
+    heals: f64,
+    /// True for a bad link, by sender and receiver.
+    bad: HashMap<(usize, usize), bool>,
+}
+
+impl Bursts {
+    /// Creates the model: a `share` of lost frames, 0 to 0.9, and a mean burst `length`. The length is at least
+    /// [`Bursts::shortest`].
+    pub fn new(share: f64, length: f64) -> Self {
+        let heals = 1.0 / length.max(1.0);
+        Self {
+            share,
+            worsens: (share * heals / (1.0 - share)).min(1.0),
+            heals,
+            bad: HashMap::new(),
+        }
+    }
+
+    /// Returns the mean burst length of independent losses with probability `share`. The model's lower limit.
+    pub fn shortest(share: f64) -> f64 {
+        1.0 / (1.0 - share)
+    }
+
+    /// Returns true if the link's next frame is lost.
+    pub fn loses(&mut self, from: usize, to: usize, rng: &mut ChaCha8Rng) -> bool {
+        let share = self.share;
+        let Some(bad) = self.bad.get_mut(&(from, to)) else {
+            let bad = rng.random_bool(share);
+            self.bad.insert((from, to), bad);
+            return bad;
+        };
+        let turns = if *bad { self.heals } else { self.worsens };
+        *bad ^= rng.random_bool(turns);
+        *bad
+    }
+}
+
+/// Period in which relay `by` does not receive relay `of`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct OneWayFailure {
+    /// The relay that does not receive, from 1.
+    pub by: u16,
+    /// The relay that is not received, from 1.
+    pub of: u16,
+    /// Start time.
+    pub from: Instant,
+    /// End time; `None` if the failure is permanent.
+    pub until: Option<Instant>,
+}
+
+impl OneWayFailure {
+    /// Returns true if this failure keeps `by` from receiving `of` at `now`.
+    pub fn applies(&self, by: u16, of: u16, now: Instant) -> bool {
+        (self.by, self.of) == (by, of)
+            && now >= self.from
+            && self.until.is_none_or(|until| now < until)
+    }
+}
+
+/// Parameters of a link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LinkSpec {
+    /// Bits per second, at least 300; a byte takes ten bits.
+    pub baud: u32,
+    /// Delay from the last bit sent to the last bit received.
+    pub latency: Duration,
+}
+
+impl Default for LinkSpec {
+    /// 115 200 baud and 2 ms, as of a telemetry radio at short range.
+    fn default() -> Self {
+        Self {
+            baud: 115_200,
+            latency: Duration::from_millis(2),
+        }
+    }
+}
+
+impl LinkSpec {
+    /// Returns the transmission time of `bytes` bytes.
+    pub fn line_time(&self, bytes: usize) -> Duration {
+        let bits = 10_000_000_u64.saturating_mul(bytes as u64);
+        Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
+    }
+
+    /// Returns the longest time of a sweep message per hop, with 1 ms for computing.
+    pub fn hop_time(&self) -> Duration {
+        let frame = self.line_time(MAX_SWEEP).as_micros();
+        Duration::from_micros(frame + self.latency.as_micros() + 1_000)
+    }
+}
+
+/// Serial line with the time until which it is busy.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Line {
+    free: Instant,
+}
+
+impl Line {
+    /// Sends `bytes` bytes once the line is free. Returns the arrival time.
+    pub fn send(&mut self, now: Instant, bytes: usize, spec: &LinkSpec) -> Instant {
+        self.free = self.free.max(now) + spec.line_time(bytes);
+        self.free + spec.latency
     }
 }

@@ -2,44 +2,24 @@
 //!
 //! | file | contents |
 //! | --- | --- |
-//! | [`link`] | one direction of a serial link: baud rate, latency |
 //! | [`medium`] | one half-duplex radio channel shared by all nodes |
-//! | [`faults`], [`bursts`] | frame faults (loss, corruption, ...); bursts of losses |
-//! | [`one_way`] | one-way link failures |
-//! | [`attack`], [`forge`] | the attacker, and the frames that it forges |
-//! | [`queue`] | the event queue |
-//! | [`film`] | state changes and transmissions of the relays, for an animation |
-//! | [`record`] | transmitted frames, for a capture file |
-//! | [`setup`], [`outcome`] | inputs and results of a run |
+//! | [`faults`] | one direction of a serial link: baud rate, latency, frame faults, bursts of losses, failures |
+//! | [`attack`] | the attacker, and the frames that it forges |
+//! | [`setup`] | inputs of a run |
+//! | [`outcome`] | results of a run, with its film for an animation and its frames for a capture file |
 //! | [`true_interference`] | interferers that the relays must find by measuring |
 //! | [`drones`] | simple drone dynamics with position errors |
 //! | [`fleet`] | drones with simulated autopilots and pilots |
-//! | [`flying`] | groups of relays that hold an agreement |
-//! | [`longest`] | longest possible chains of the relays that are on |
-//! | [`optima`], [`optimum`] | reference positions from an undisturbed run |
-//! | [`watch`] | availability of the chain over time |
-//! | [`parallel`] | the same run with many seeds |
-//! | [`chain`] | the event loop that connects the relays |
+//! | [`watch`] | availability of the chain over time, against the longest possible chain and its best positions |
+//! | [`chain`] | the event loop that connects the relays; the same run with many seeds |
 
 pub mod attack;
-pub mod bursts;
 pub mod chain;
 pub mod drones;
 pub mod faults;
-pub mod film;
 pub mod fleet;
-pub mod flying;
-pub mod forge;
-pub mod link;
-pub mod longest;
 pub mod medium;
-pub mod one_way;
-pub mod optima;
-pub mod optimum;
 pub mod outcome;
-pub mod parallel;
-pub mod queue;
-pub mod record;
 pub mod setup;
 pub mod true_interference;
 pub mod watch;

@@ -1,6 +1,7 @@
 //! Outcome of a simulated run.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use uav_relay::sensing::belief::Told;
 use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
@@ -8,10 +9,9 @@ use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
 use super::attack::Struck;
 use super::drones::{Nearest, Point};
 use super::faults::Injected;
-use super::film::Film;
-use super::flying::Seen;
 use super::medium::AirCounts;
 use super::true_interference::Stand;
+use super::watch::Seen;
 
 /// Kind of a log entry about a relay; "the other node" is [`Moment::other`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -101,7 +101,7 @@ pub struct Moment {
 }
 
 /// Reason for the end of a run.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Ending {
     /// Every relay holds its position for the same target.
     Settled,
@@ -114,6 +114,7 @@ pub enum Ending {
     /// The planned end ([`Setup::soak`](super::setup::Setup::soak), or of the measurements) was reached.
     Soaked,
     /// The deadline or the event limit was reached.
+    #[default]
     OutOfTime,
 }
 
@@ -164,7 +165,7 @@ pub struct Watched {
 }
 
 /// Outcome of a run.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// Reason for the end of the run.
     pub ending: Ending,
@@ -235,5 +236,96 @@ impl Outcome {
             _ => None,
         });
         versions.max()
+    }
+}
+
+/// Changed state of a relay.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Shot {
+    /// Time of the change.
+    pub at: Instant,
+    /// Relay number, from 1.
+    pub relay: u16,
+    /// True while the relay is switched on.
+    pub is_on: bool,
+    /// Setpoint, if any; a relay that is switched off keeps its last one.
+    pub place: Option<Placement>,
+    /// Frames sent on all links so far.
+    pub messages: u64,
+}
+
+/// Transmission of a frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Transmission {
+    /// Time of the transmission.
+    pub at: Instant,
+    /// Relay number, from 1.
+    pub relay: u16,
+    /// Direction of the transmission; `None` on a shared channel.
+    pub to: Option<Side>,
+}
+
+/// Film of a whole run.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Film {
+    /// State changes, in order of time.
+    pub shots: Vec<Shot>,
+    /// Transmissions, in order of time.
+    pub sent: Vec<Transmission>,
+}
+
+/// Link of a frame.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Link {
+    /// The shared channel.
+    Shared,
+    /// The link between this node and the next one; Tx is node 0.
+    After(u16),
+}
+
+/// Transmitted frame.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct OnAir {
+    /// Time of its last bit.
+    pub at: Instant,
+    /// Order of transmission, for frames that end at the same time.
+    order: u64,
+    /// Link of the frame.
+    pub link: Link,
+    /// Bytes as sent.
+    pub bytes: Vec<u8>,
+    /// Faults on the path; empty if all receivers got the frame intact and in time.
+    pub note: String,
+}
+
+/// Recorded frames that were not read yet.
+#[derive(Debug, Default)]
+pub struct Record {
+    frames: BinaryHeap<Reverse<OnAir>>,
+    order: u64,
+}
+
+impl Record {
+    /// Adds a frame.
+    pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
+        self.frames.push(Reverse(OnAir {
+            at,
+            order: self.order,
+            link,
+            bytes: bytes.to_vec(),
+            note,
+        }));
+        self.order += 1;
+    }
+
+    /// Removes and returns the frames that ended by `until`.
+    pub fn take(&mut self, until: Instant) -> Vec<OnAir> {
+        let mut over = Vec::new();
+        while let Some(Reverse(next)) = self.frames.peek()
+            && next.at <= until
+        {
+            over.extend(self.frames.pop().map(|Reverse(frame)| frame));
+        }
+        over
     }
 }

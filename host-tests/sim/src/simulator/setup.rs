@@ -8,11 +8,10 @@ use uav_relay::{
 
 use super::attack::Attack;
 use super::drones::FlightSpec;
-use super::faults::Faults;
-use super::fleet::spec::FleetSpec;
-use super::link::LinkSpec;
-use super::medium::access::{self, Access};
-use super::one_way::OneWayFailure;
+use super::faults::{Faults, LinkSpec, OneWayFailure};
+use super::fleet::FleetSpec;
+use super::medium;
+use super::medium::Access;
 use super::true_interference::TrueInterference;
 
 /// Period in which relays 1 to `after` and the others do not receive each other.
@@ -96,7 +95,7 @@ pub struct Setup {
     pub radio_reach: usize,
     /// Channel access of the radios, on a shared channel.
     pub access: Access,
-    /// Mean burst of losses, frames. 1 if independent, else at least [`Bursts::shortest`](super::bursts::Bursts::shortest).
+    /// Mean burst of losses, frames. 1 if independent, else at least [`Bursts::shortest`](super::faults::Bursts::shortest).
     pub burst: f64,
     /// Failures of single link directions.
     pub deaf: Vec<OneWayFailure>,
@@ -183,7 +182,7 @@ impl Setup {
         };
         let overhead = match (self.settings.wiring, self.access) {
             (Wiring::Pair, _) | (_, Access::Ideal) => 0,
-            _ => access::OVERHEAD,
+            _ => medium::OVERHEAD,
         };
         Channel {
             baud: self.link.baud,

@@ -1,11 +1,14 @@
 //! Statistics over time. Availability of the chain, simultaneous groups, and smallest distance of relays.
 
-use uav_relay::{Duration, Instant};
+use std::collections::{BTreeMap, HashMap};
 
-use super::drones::{Point, apart};
-use super::flying::{self, Seen};
-use super::optima::{Optima, Run};
+use uav_relay::{Duration, Instant, Mission, Phase, Relay, Settings, ViewId, Wiring};
+
+use super::chain::run;
+use super::drones::{Point, apart, point};
 pub use super::outcome::Watched;
+use super::outcome::{Ending, Outcome};
+use super::setup::Setup;
 
 /// Running statistics.
 #[derive(Debug)]
@@ -90,8 +93,8 @@ impl Watch {
 
     /// Evaluates the states after all changes at `now`.
     pub fn take_in(&mut self, now: Instant) {
-        self.most_flying = self.most_flying.max(flying::groups(&self.seen));
-        if self.first.is_none() && flying::has_agreed(&self.seen) {
+        self.most_flying = self.most_flying.max(groups(&self.seen));
+        if self.first.is_none() && has_agreed(&self.seen) {
             self.first = Some(now);
         }
     }
@@ -118,4 +121,278 @@ impl Watch {
             least_separation_m: flown_m.or(self.least_m),
         }
     }
+}
+
+/// Observed state of a relay.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Seen {
+    /// True if the relay is switched on.
+    pub is_on: bool,
+    /// Phase of the relay.
+    pub phase: Phase,
+    /// Current view.
+    pub view: ViewId,
+    /// True while the relay's lease is valid by its own clock.
+    pub leased: bool,
+    /// Number of relays in the view.
+    pub relays: u16,
+    /// Index of the relay in the view, from 1.
+    pub index: u16,
+    /// Version of its mission.
+    pub version: u16,
+    /// Target SIR of its position, linear.
+    pub target: Option<f32>,
+    /// Setpoint: x, y and altitude, m.
+    pub place: Option<Point>,
+}
+
+impl Seen {
+    /// Captures the state of `relay`.
+    pub fn of(relay: &Relay, is_on: bool) -> Self {
+        Self {
+            is_on,
+            phase: relay.phase(),
+            view: relay.view(),
+            leased: relay.lease().is_some(),
+            relays: relay.mission().relays(),
+            index: relay.index(),
+            version: relay.version(),
+            target: relay.target(),
+            place: relay.setpoint().map(point),
+        }
+    }
+
+    fn part_of(&self) -> (ViewId, u16) {
+        (self.view, self.relays)
+    }
+
+    /// Returns true if the relay is on, holds a lease and has a setpoint.
+    fn flies(&self) -> bool {
+        self.is_on && self.leased && self.place.is_some()
+    }
+}
+
+/// Returns the number of groups that each hold an agreement of their own.
+///
+/// A group consists of the relays of one view with valid leases. Relays of one view that claim the same index belong to different
+/// groups. Relays separated by a partition that still hold their common agreement are one group.
+pub fn groups(seen: &[Seen]) -> usize {
+    let mut views: BTreeMap<(ViewId, u16), BTreeMap<u16, usize>> = BTreeMap::new();
+    for one in seen.iter().filter(|one| one.flies()) {
+        let claims = views.entry(one.part_of()).or_default();
+        *claims.entry(one.index).or_default() += 1;
+    }
+    let claims = views.values().filter_map(|claims| claims.values().max());
+    claims.sum()
+}
+
+/// Returns true if all relays of some view hold their positions for the same target.
+pub fn has_agreed(seen: &[Seen]) -> bool {
+    seen.iter().filter(|one| one.is_on).any(|one| {
+        let same = |other: &&Seen| {
+            other.is_on
+                && other.phase == Phase::Holding
+                && other.part_of() == one.part_of()
+                && other.target.map(f32::to_bits) == one.target.map(f32::to_bits)
+        };
+        one.phase == Phase::Holding && seen.iter().filter(same).count() == usize::from(one.relays)
+    })
+}
+
+/// Largest number of chains returned; sparse links can allow far more.
+const MOST: usize = 1_000;
+
+/// Returns the length of the longest chains, and those chains whose members all satisfy `with`.
+///
+/// `on` lists the relays in ascending order, from 0; `links` returns true for two linked relays, the lower one first. At most
+/// 1000 chains are returned.
+pub fn longest(
+    on: &[usize],
+    links: impl Fn(usize, usize) -> bool,
+    with: impl Fn(usize) -> bool,
+) -> (usize, Vec<Vec<usize>>) {
+    let onward: Vec<Vec<usize>> = (0..on.len())
+        .map(|at| {
+            let later = at + 1..on.len();
+            later
+                .filter(|next| matches!((on.get(at), on.get(*next)), (Some(one), Some(other)) if links(*one, *other)))
+                .collect()
+        })
+        .collect();
+    let mut lengths = vec![1_usize; on.len()];
+    for (at, next) in onward.iter().enumerate().rev() {
+        let beyond = next.iter().filter_map(|next| lengths.get(*next).copied());
+        let most = beyond.max().unwrap_or(0);
+        if let Some(length) = lengths.get_mut(at) {
+            *length = most + 1;
+        }
+    }
+    let length = lengths.iter().copied().max().unwrap_or(0);
+    let is = |at: &usize, length: usize| {
+        lengths.get(*at) == Some(&length) && on.get(*at).is_some_and(|one| with(*one))
+    };
+    let mut ways: Vec<Vec<usize>> = (0..on.len())
+        .filter(|at| is(at, length))
+        .map(|at| vec![at])
+        .collect();
+    for left in (1..length).rev() {
+        ways = ways
+            .iter()
+            .flat_map(|way| {
+                let next = way.last().and_then(|last| onward.get(*last));
+                let next = next.into_iter().flatten().filter(|at| is(at, left));
+                next.map(|at| [way.as_slice(), &[*at]].concat())
+            })
+            .take(MOST)
+            .collect();
+    }
+    let named = |way: Vec<usize>| {
+        way.into_iter()
+            .filter_map(|at| on.get(at).copied())
+            .collect()
+    };
+    (length, ways.into_iter().map(named).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::longest;
+
+    fn near(one: usize, other: usize) -> bool {
+        one.abs_diff(other) <= 4
+    }
+
+    #[test]
+    fn where_all_hear_their_neighbours_all_are_in_the_chain() {
+        let on: Vec<usize> = (0..8).collect();
+        assert_eq!(longest(&on, near, |_| true), (8, vec![on.clone()]));
+        let left = [0, 1, 4, 5, 7];
+        assert_eq!(longest(&left, near, |_| true), (5, vec![left.to_vec()]));
+        assert_eq!(longest(&[], near, |_| true), (0, vec![]));
+    }
+
+    #[test]
+    fn of_two_neighbours_that_are_not_linked_one_is_left_out() {
+        let on: Vec<usize> = (0..8).collect();
+        let links = |one, other| near(one, other) && (one, other) != (2, 3);
+        let (length, ways) = longest(&on, links, |_| true);
+        assert_eq!(length, 7);
+        assert_eq!(ways, [[0, 1, 2, 4, 5, 6, 7], [0, 1, 3, 4, 5, 6, 7]]);
+        // Relay 2 has no position, so only the chain without it qualifies.
+        let (length, ways) = longest(&on, links, |at| at != 2);
+        assert_eq!((length, ways), (7, vec![vec![0, 1, 3, 4, 5, 6, 7]]));
+    }
+
+    #[test]
+    fn parts_that_do_not_hear_each_other_are_chains_of_their_own() {
+        let on: Vec<usize> = (0..8).collect();
+        let halves = |one: usize, other: usize| near(one, other) && (one < 4) == (other < 4);
+        let both = longest(&on, halves, |_| true);
+        assert_eq!(both, (4, vec![vec![0, 1, 2, 3], vec![4, 5, 6, 7]]));
+        let parts = |one: usize, other: usize| near(one, other) && (one < 3) == (other < 3);
+        assert_eq!(
+            longest(&on, parts, |_| true),
+            (5, vec![vec![3, 4, 5, 6, 7]])
+        );
+        // The five missing relays in a row leave a gap beyond radio range.
+        assert_eq!(longest(&[0, 1, 7], near, |_| true).1, [[0, 1]]);
+    }
+
+    #[test]
+    fn however_many_ways_there_are_only_some_are_looked_at() {
+        let on: Vec<usize> = (0..60).collect();
+        // Twenty groups of three; each chain takes any one relay of each group.
+        let links = |one: usize, other: usize| other / 3 == one / 3 + 1;
+        let (length, ways) = longest(&on, links, |_| true);
+        assert_eq!(length, 20);
+        assert!(ways.len() == 1_000);
+    }
+}
+
+/// Largest distance of positions that count as equal, m.
+const SAME_M: f64 = 1e-3;
+
+/// Positions of a chain; `None` if it did not settle.
+pub type Places = Option<Vec<Point>>;
+
+/// Function that runs a chain to its end; `None` if a relay rejects its settings.
+pub type Run = fn(Setup) -> Option<Outcome>;
+
+/// Cache of reference positions, by the members of the chain and the version of the mission.
+#[derive(Debug)]
+pub struct Optima {
+    run: Run,
+    known: HashMap<(Vec<u16>, u16), Places>,
+}
+
+impl Optima {
+    /// Empty cache; `run` computes missing entries.
+    pub fn new(run: Run) -> Self {
+        Self {
+            run,
+            known: HashMap::new(),
+        }
+    }
+
+    /// Returns true if `places` are the reference positions of relays `nodes` (from 1) and this mission.
+    pub fn is_met(
+        &mut self,
+        setup: &Setup,
+        nodes: &[u16],
+        version: u16,
+        places: &[Option<Point>],
+    ) -> bool {
+        if places.iter().any(Option::is_none) {
+            return false;
+        }
+        let run = self.run;
+        let optimum = self
+            .known
+            .entry((nodes.to_vec(), version))
+            .or_insert_with(|| places_of(&run(alone(setup, nodes, version)?)?));
+        optimum.as_ref().is_some_and(|optimum| {
+            let mut pairs = optimum.iter().zip(places.iter().flatten());
+            optimum.len() == nodes.len() && pairs.all(|(one, other)| apart(*one, *other) < SAME_M)
+        })
+    }
+}
+
+/// Returns a fault-free setup with only `nodes` and the mission of `version`. `None` if the mission or the count is invalid.
+pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
+    let uploaded = setup
+        .uploads
+        .iter()
+        .find(|spec| spec.upload.version() == version);
+    let mission = match uploaded {
+        Some(spec) => Mission::try_new(*spec.upload.config()).ok()?,
+        None => setup.mission,
+    };
+    let mut clean = Setup::new(mission.with_relays(u16::try_from(nodes.len()).ok()?).ok()?);
+    clean.settings = Settings {
+        wiring: Wiring::Pair,
+        auth: None,
+        guard: None,
+        ..setup.settings
+    };
+    for (index, node) in (1..).zip(nodes) {
+        let own = setup.profiles.iter().find(|(of, _)| of == node);
+        clean
+            .profiles
+            .extend(own.map(|(_, profile)| (index, *profile)));
+        if setup.held.contains(node) {
+            clean.held.push(index);
+        }
+    }
+    Some(clean)
+}
+
+/// Returns the final positions of a settled run.
+pub fn places_of(outcome: &Outcome) -> Places {
+    let places = outcome.relays.iter().map(|relay| relay.setpoint.map(point));
+    (outcome.ending == Ending::Settled).then(|| places.collect())?
+}
+
+/// Returns the positions in which a chain of only `nodes` settles without faults.
+pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
+    places_of(&run(alone(setup, nodes, version)?).ok()?)
 }

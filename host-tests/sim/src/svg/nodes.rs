@@ -1,9 +1,7 @@
 //! Tx, Rx and the relays.
 
-use super::axis::{Frame, round_step};
-use super::canvas::{Canvas, Point};
-use super::labels::{Area, Labels, width};
-use super::picture::{Picture, is_gone, length, placed};
+use super::canvas::{Area, Canvas, Frame, Labels, Point, round_step, width};
+use super::picture::{Picture, decibels, is_gone, length, placed, worst};
 
 const SIZE: f64 = 9.0;
 
@@ -93,4 +91,167 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
             canvas.text((x, y + 0.36 * SIZE), "node", &words);
         }
     }
+}
+
+/// Hop classes: dB above the worst hop, colour (Okabe-Ito), width (for colourless prints), legend.
+pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
+    (0.1, "#d55e00", 3.2, "< 0.1 dB"),
+    (1.0, "#e69f00", 2.4, "< 1 dB"),
+    (6.0, "#56b4e9", 2.4, "< 6 dB"),
+    (f64::INFINITY, "#0072b2", 2.4, "≥ 6 dB"),
+];
+
+const UNKNOWN: (&str, f64) = ("#999999", 2.4);
+
+const SIR_SIZE: f64 = 10.0;
+
+/// Distance of a number from its line, more than a relay's radius.
+const GAP: f64 = 4.6;
+
+/// Candidate positions of a number: share of the hop's length, and distance above (negative: below).
+const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
+const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
+
+/// Largest number of hops with stacked numbers; more are thinned out.
+const FEW: usize = 21;
+
+pub(super) struct Hop {
+    number: usize,
+    line: [Point; 2],
+    decibels: Option<f64>,
+    colour: (&'static str, f64),
+    silent: bool,
+}
+
+/// Returns the hops between the relays that have a position.
+pub(super) fn hops(picture: &Picture, frame: &Frame) -> Vec<Hop> {
+    let worst = worst(picture).and_then(decibels);
+    let last = picture.nodes.len() + 1;
+    if last > 1 && (1..last).all(|node| picture.left_out.contains(&node)) {
+        return Vec::new();
+    }
+    let ends = placed(picture).chain([(last, (length(picture), 0.0))]);
+    let mut hops = Vec::new();
+    let mut before = (0, (0.0, 0.0), 0);
+    // Relays outside the chain are skipped.
+    let out = &picture.left_out;
+    for (node, place) in ends.filter(|(node, _)| !out.contains(node)) {
+        let passed = out.iter().filter(|other| (1..node).contains(other));
+        let number = node.saturating_sub(passed.count());
+        // The hops beside a relay without a position are unknown.
+        if number == before.0 + 1 {
+            let decibels = picture.hop_sir.get(number - 1).copied().and_then(decibels);
+            let colour = decibels.zip(worst).map_or(UNKNOWN, |(here, worst)| {
+                let class = CLASSES
+                    .into_iter()
+                    .find(|(below, ..)| here - worst < *below);
+                class.map_or(UNKNOWN, |(_, colour, width, _)| (colour, width))
+            });
+            hops.push(Hop {
+                number,
+                line: [frame.at(before.1), frame.at(place)],
+                decibels,
+                colour,
+                silent: picture.lost.contains(&node) || picture.lost.contains(&before.2),
+            });
+        }
+        before = (number, place, node);
+    }
+    hops
+}
+
+/// Draws the lines; the worst hops last, on top.
+pub(super) fn draw_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
+    let mut order: Vec<&Hop> = hops.iter().collect();
+    order.sort_by(|a, b| a.colour.1.total_cmp(&b.colour.1));
+    for hop in order {
+        let sir = hop
+            .decibels
+            .map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} dB"));
+        canvas.hop(
+            hop.line,
+            hop.colour,
+            hop.silent,
+            &format!("hop {}: SIR {sir}", hop.number),
+        );
+        labels.take_line(hop.line);
+    }
+}
+
+/// Writes the SIRs for which there is room: the worst hop's first, then the two ends', then the others.
+pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
+    let last = hops.last().map_or(0, |hop| hop.number);
+    let lowest = hops.iter().filter_map(|hop| hop.decibels).reduce(f64::min);
+    let dense = hops.len() > FEW;
+    let mut worst_seen = false;
+    let mut order: Vec<(u8, &Hop)> = Vec::new();
+    for hop in hops {
+        // Of several equally bad hops, only the first has priority.
+        let worst = !worst_seen
+            && hop
+                .decibels
+                .zip(lowest)
+                .is_some_and(|(here, lowest)| here <= lowest);
+        worst_seen |= worst;
+        let end = hop.number == 1 || hop.number == last;
+        order.push((if worst { 0 } else { 2 - u8::from(end) }, hop));
+    }
+    order.sort_by_key(|(rank, hop)| (*rank, hop.number));
+    for (_, hop) in order {
+        let Some(value) = hop.decibels else { continue };
+        // The addition turns -0 into 0.
+        let words = format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
+        let size = (width(&words, SIR_SIZE) + 3.0, SIR_SIZE);
+        // In a dense chain the numbers are in one row, each with a line to its hop.
+        let in_row = dense && hop.number != 1 && hop.number != last;
+        let places = if in_row {
+            places(hop, size, &[0.5], &[4.0])
+        } else {
+            places(hop, size, &SHARES, &SIDES)
+        };
+        let room = if in_row { (size.0 + 9.0, size.1) } else { size };
+        let free = places
+            .into_iter()
+            .find(|(_, place)| labels.try_take(Area::around(*place, room)));
+        if let Some((from, (x, y))) = free {
+            leader(canvas, hop, from, (x, y), size);
+            canvas.text((x, y + 0.36 * SIR_SIZE), "halo sir", &words);
+        }
+    }
+}
+
+/// Returns candidate positions of a hop's number, the best first, each with its anchor on the hop.
+fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
+    let [(x1, y1), (x2, y2)] = hop.line;
+    let (run, rise) = (x2 - x1, y2 - y1);
+    let span = run.hypot(rise).max(1e-9);
+    // Normal of the line, pointing upward; to the right for a vertical line.
+    let across = (rise / span, -run / span);
+    let clear = f64::midpoint(across.0.abs() * width, across.1.abs() * height) + GAP;
+    let mut places = Vec::new();
+    for share in shares {
+        let (x, y) = (x1 + share * run, y1 + share * rise);
+        for side in sides {
+            let off = side + clear.copysign(*side);
+            places.push(((x, y), (x + off * across.0, y + off * across.1)));
+        }
+    }
+    places
+}
+
+/// Draws a line from a number to its hop if the hop is much shorter than the number.
+fn leader(canvas: &mut Canvas, hop: &Hop, from: Point, to: Point, (width, height): Point) {
+    let [(x1, y1), (x2, y2)] = hop.line;
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    if (x2 - x1).hypot(y2 - y1) > width || dx.hypot(dy) < 1e-9 {
+        return;
+    }
+    // The line ends at the edge of the number.
+    let share = 1.0
+        - f64::min(
+            width / 2.0 / dx.abs().max(1e-9),
+            height / 2.0 / dy.abs().max(1e-9),
+        )
+        .min(1.0);
+    canvas.line(from, (from.0 + share * dx, from.1 + share * dy), "leader");
 }

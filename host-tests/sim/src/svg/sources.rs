@@ -1,8 +1,6 @@
 //! Interferers: markers on the ground if they are beside the chain, else arrows toward them.
 
-use super::axis::Frame;
-use super::canvas::{Canvas, Point};
-use super::labels::{Area, Labels, width};
+use super::canvas::{Area, Canvas, Frame, Labels, Point, width};
 use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
 
 /// Font size and line spacing of the labels.

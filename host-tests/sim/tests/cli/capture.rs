@@ -48,11 +48,11 @@ fn read(file: &Path) -> Vec<Frame> {
 }
 
 /// Runs with `arguments` and a capture. Returns the report and the frames.
-fn captured(arguments: &[&str]) -> (serde_json::Value, Vec<Frame>) {
+fn captured(arguments: &str) -> (serde_json::Value, Vec<Frame>) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("air.pcapng");
     let name = file.to_str().unwrap();
-    let report = json(&[arguments, &["--capture", name]].concat());
+    let report = json(&format!("{arguments} --capture {name}"));
     let frames = read(&file);
     assert!(frames.is_sorted_by_key(|frame| frame.at), "{arguments:?}");
     (report, frames)
@@ -60,11 +60,8 @@ fn captured(arguments: &[&str]) -> (serde_json::Value, Vec<Frame>) {
 
 #[test]
 fn a_capture_of_links_has_every_message_and_every_byte() {
-    for faults in [
-        &[][..],
-        &["--loss", "0.2", "--corrupt", "0.1", "--reorder", "0.1"],
-    ] {
-        let arguments = [&["--uavs", "5"], faults].concat();
+    for faults in ["", "--loss 0.2 --corrupt 0.1 --reorder 0.1"] {
+        let arguments = format!("--uavs 5 {faults}");
         let (report, frames) = captured(&arguments);
         assert_eq!(report, json(&arguments), "nothing else changes");
         assert_eq!(report["messages"], frames.len());
@@ -95,8 +92,7 @@ fn a_capture_of_links_has_every_message_and_every_byte() {
 
 #[test]
 fn a_capture_of_the_shared_channel_has_what_was_sent_and_the_attacker_too() {
-    let (report, frames) =
-        captured(&["--uavs", "4", "--shared", "--forge", "20", "--replay", "10"]);
+    let (report, frames) = captured("--uavs 4 --shared --forge 20 --replay 10");
     assert!(frames.iter().all(|frame| frame.interface == "channel"));
     let with = |word: &str| frames.iter().filter(|frame| frame.comment == word).count();
     assert_eq!(with("forged by the attacker"), 20);
@@ -111,12 +107,12 @@ fn a_capture_of_the_shared_channel_has_what_was_sent_and_the_attacker_too() {
 #[test]
 fn uploads_of_either_end_are_in_the_capture() {
     for (end, wire, name) in [
-        ("tx", &["--wires"][..], "Tx-1"),
-        ("rx", &["--wires"], "3-Rx"),
-        ("rx", &[], "channel"),
+        ("tx", "--wires", "Tx-1"),
+        ("rx", "--wires", "3-Rx"),
+        ("rx", "", "channel"),
     ] {
-        let arguments = ["--uavs", "3", "--upload", "2:uav_w=2", "--upload-from", end];
-        let (_, frames) = captured(&[&arguments, wire].concat());
+        let arguments = format!("--uavs 3 --upload 2:uav_w=2 --upload-from {end}");
+        let (_, frames) = captured(&format!("{arguments} {wire}"));
         let offers = frames
             .iter()
             .filter(|frame| frame.interface == name && frame.bytes.len() == 137);
@@ -126,14 +122,14 @@ fn uploads_of_either_end_are_in_the_capture() {
 
 #[test]
 fn a_capture_that_cannot_be_written_is_refused_before_the_run() {
-    let (status, line) = refusal(&["--capture", "/nowhere/air.pcapng", "--uavs", "100"]);
+    let (status, line) = refusal("--capture /nowhere/air.pcapng --uavs 100");
     assert_eq!(status, 2);
     assert!(
         line.starts_with("/nowhere/air.pcapng: --capture cannot be written: "),
         "{line}"
     );
     if Path::new("/dev/full").exists() {
-        let output = chain(&["--capture", "/dev/full", "--loss", "0.3"]);
+        let output = chain("--capture /dev/full --loss 0.3");
         let line = String::from_utf8(output.stderr).unwrap();
         assert_eq!(
             (output.status.code(), line.lines().count()),
@@ -155,19 +151,16 @@ fn tshark_names_every_frame_of_a_capture() {
     let dissector = super::example("wireshark/uav_relay.lua");
     for (arguments, names) in [
         (
-            &["--method", "joint", "--auth"][..],
+            "--method joint --auth",
             &["Handshake", "Sweep", "Verdict"][..],
         ),
         (
-            &["--kill", "3@20", "--upload", "30:uav_w=2"],
+            "--kill 3@20 --upload 30:uav_w=2",
             &["Hello", "Proposal", "Decision", "Offer", "Pulse", "Pulsed"],
         ),
-        (
-            &["--method", "adjust", "--rounds", "2"],
-            &["Token", "Moved"],
-        ),
+        ("--method adjust --rounds 2", &["Token", "Moved"]),
     ] {
-        let report = json(&[arguments, &["--capture", file.to_str().unwrap()]].concat());
+        let report = json(&format!("{arguments} --capture {}", file.display()));
         let output = std::process::Command::new("tshark")
             .args(["-X", &format!("lua_script:{dissector}"), "-r"])
             .arg(&file)

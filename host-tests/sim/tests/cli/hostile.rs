@@ -2,14 +2,14 @@
 
 use serde_json::Value;
 
-use super::{chain, json};
+use super::{chain, json, refusal};
 
 #[test]
 fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lost.svg");
     let file_name = file.to_str().unwrap();
-    let report = json(&["--kill", "4@20", "--air", "ideal", "--svg", file_name]);
+    let report = json(&format!("--kill 4@20 --air ideal --svg {file_name}"));
     assert_eq!(
         (
             report["uavs"].as_u64(),
@@ -27,7 +27,7 @@ fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
     assert_eq!(report["lost"][0]["why"], "silent");
     assert!(report["lost"][0]["x_m"].as_f64().unwrap() > 0.0);
     // The remaining chain equals a chain of seven relays from the start.
-    let seven = json(&["--uavs", "7"]);
+    let seven = json("--uavs 7");
     for key in ["sir", "rx_sir", "target"] {
         assert_eq!(report[key], seven[key], "{key}");
     }
@@ -59,7 +59,7 @@ fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
 
 #[test]
 fn the_story_of_a_loss_is_told_in_a_line_for_each_thing_that_happened() {
-    let output = chain(&["--kill", "4@20"]);
+    let output = chain("--kill 4@20");
     assert!(output.status.success() && output.stderr.is_empty());
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
@@ -82,9 +82,9 @@ fn the_story_of_a_loss_is_told_in_a_line_for_each_thing_that_happened() {
 fn a_relay_that_is_switched_on_again_gets_its_place_back() {
     for index in ["1", "4", "8"] {
         let (kill, boot) = (format!("{index}@20"), format!("{index}@60"));
-        let report = json(&["--kill", &kill, "--boot", &boot]);
+        let report = json(&format!("--kill {kill} --boot {boot}"));
         assert_eq!(report["left"].as_u64(), Some(8));
-        assert_eq!(report["sir"], json(&[])["sir"]);
+        assert_eq!(report["sir"], json("")["sir"]);
         let recovery = report["recovery"].as_array().unwrap();
         let index: Value = index.parse::<u64>().unwrap().into();
         let is_back = |one: &Value| one["back"].as_array().unwrap().contains(&index);
@@ -94,22 +94,22 @@ fn a_relay_that_is_switched_on_again_gets_its_place_back() {
 
 #[test]
 fn of_two_parts_the_larger_goes_on_until_they_meet_again() {
-    let report = json(&["--partition", "3@20"]);
+    let report = json("--partition 3@20");
     assert_eq!(report["left"].as_u64(), Some(5));
     let lost = report["lost"].as_array().unwrap();
     assert!(
         lost.len() == 3 && lost.iter().all(|relay| relay["why"] == "apart"),
         "{lost:?}"
     );
-    let healed = json(&["--partition", "3@20-120"]);
+    let healed = json("--partition 3@20-120");
     assert_eq!(healed["left"].as_u64(), Some(8));
-    assert_eq!(healed["sir"], json(&[])["sir"]);
+    assert_eq!(healed["sir"], json("")["sir"]);
 }
 
 /// Quorum of one: of two relays, only the leader may go on alone.
 #[test]
 fn too_few_hold_their_places_and_the_status_is_1() {
-    let output = chain(&["--json", "--uavs", "2", "--kill", "1@20"]);
+    let output = chain("--json --uavs 2 --kill 1@20");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
@@ -119,16 +119,13 @@ fn too_few_hold_their_places_and_the_status_is_1() {
     assert!(report.get("sir").is_none());
     assert_eq!(report["left"].as_u64(), Some(0));
     assert_eq!(report["lost"][1]["why"], "no quorum");
-    assert_eq!(
-        json(&["--uavs", "2", "--kill", "2@20"])["left"].as_u64(),
-        Some(1)
-    );
+    assert_eq!(json("--uavs 2 --kill 2@20")["left"].as_u64(), Some(1));
 }
 
 #[test]
 fn with_tags_an_attacker_changes_nothing() {
-    for extra in [&[][..], &["--kill", "2@20"], &["--wires"]] {
-        let arguments = [&["--uavs", "5", "--forge", "600", "--replay", "600"], extra].concat();
+    for extra in ["", "--kill 2@20", "--wires"] {
+        let arguments = format!("--uavs 5 --forge 600 --replay 600 {extra}");
         let report = json(&arguments);
         let attack = &report["attack"];
         assert_eq!(attack["auth"], true);
@@ -150,16 +147,7 @@ fn with_tags_an_attacker_changes_nothing() {
 /// Relays without tags accept an attacker's frames, and the report shows the consequences.
 #[test]
 fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
-    let attacked = [
-        "--uavs",
-        "4",
-        "--forge",
-        "1000",
-        "--replay",
-        "100",
-        "--no-auth",
-        "--json",
-    ];
+    let attacked = "--uavs 4 --forge 1000 --replay 100 --no-auth --json";
     // The chain may not settle; then the report has an error, and the exit status is 1.
     let output = chain(&attacked);
     assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
@@ -178,5 +166,179 @@ fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     assert!(
         attack["formed"].as_u64() > attack["formed_without"].as_u64(),
         "{attack}"
+    );
+}
+
+#[test]
+fn a_shared_channel_is_csma_unless_said_otherwise() {
+    for (extra, access) in [
+        ("--shared", Some("csma")),
+        ("--air csma", Some("csma")),
+        ("--air aloha", Some("aloha")),
+        ("--air ideal", None),
+        ("--wires", None),
+    ] {
+        let report = json(&format!("--uavs 4 --loss 0.2 {extra}"));
+        assert_eq!(report["air"]["access"].as_str(), access, "{extra:?}");
+        let shared = (extra != "--wires").then_some("shared");
+        assert_eq!(report["channel"].as_str(), shared, "{extra:?}");
+        assert!(report["sir"].as_f64().unwrap() > 1.0, "{extra:?}");
+    }
+}
+
+#[test]
+fn a_slow_link_takes_longer() {
+    let took = |baud| {
+        json(&format!("--baud {baud}"))["virtual_s"]
+            .as_f64()
+            .unwrap()
+    };
+    let (fast, usual, slow) = (took("1000000"), took("115200"), took("9600"));
+    assert!(fast < usual && 5.0 * usual < slow, "{fast} {usual} {slow}");
+}
+
+#[test]
+fn what_the_channel_cannot_carry_is_refused_before_flight() {
+    for (uavs, sharing, least) in [
+        ("2", "csma", 4_694),
+        ("8", "csma", 32_854),
+        ("8", "aloha", 32_854),
+        ("100", "csma", 37_547),
+    ] {
+        let below = (least - 1).to_string();
+        let arguments = format!("--uavs {uavs} --air {sharing} --baud {below}");
+        let (status, line) = refusal(&arguments);
+        assert_eq!(status, 2, "{arguments:?}");
+        let says = format!("--baud {below}: must be within {least} to 10000000: ");
+        assert!(line.starts_with(&says), "{line}");
+    }
+    for (sharing, baud) in [("csma", "32854"), ("ideal", "9600")] {
+        let report = json(&format!("--uavs 8 --air {sharing} --baud {baud}"));
+        assert!(report["sir"].as_f64().unwrap() > 1.0, "{sharing}");
+    }
+    assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
+}
+
+#[test]
+fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
+    let arguments = "--soak 200 --kill 4@20 --boot 4@60";
+    let report = json(&arguments);
+    assert_eq!(report["virtual_s"], 200.0);
+    let number = |key: &str| report[key].as_f64().unwrap();
+    assert!((0.5..0.98).contains(&number("availability")), "{report}");
+    assert!(number("longest_outage_s") > 5.0 && number("first_agreement_s") < 2.0);
+    assert_eq!(report["most_flying"], 1);
+    assert!(number("least_separation_m") > 0.0);
+    let text = String::from_utf8(chain(&arguments).stdout).unwrap();
+    for line in [
+        "air (csma, 115200 baud): load 0.",
+        "availability: 0.",
+        "at the same time: 1",
+        "least separation of two relays: ",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+}
+
+#[test]
+fn a_soak_of_a_good_chain_is_right_all_the_time_by_any_link() {
+    for extra in ["--air ideal", "--wires"] {
+        let report = json(&format!("--soak 60 {extra}"));
+        assert_eq!(report["availability"], 1.0, "{extra:?}");
+        assert_eq!(report["longest_outage_s"], 0.0, "{extra:?}");
+    }
+}
+
+#[test]
+fn losses_in_runs_have_the_mean_share_that_was_asked_for() {
+    let soaked = "--soak 600 --air ideal --loss 0.3";
+    for burst in ["1", "20"] {
+        let report = json(&format!("{soaked} --burst {burst}"));
+        let lost = report["faults"]["lost"].as_f64().unwrap();
+        // On the ideal channel relays 1 to 8 have 4, 5, 6, 7, 7, 6, 5, 4 receivers and send about equally often.
+        let received = report["messages"].as_f64().unwrap() * 5.5;
+        assert!((lost / received - 0.3).abs() < 0.06, "{burst}: {report}");
+    }
+}
+
+#[test]
+fn the_story_tells_who_does_not_hear_whom() {
+    let output = chain("--deaf 4:3@5-9 --soak 20");
+    let text = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "5.000 s  relay 4 does not receive relay 3",
+        "9.000 s  relay 4 receives relay 3 again",
+    ] {
+        assert!(text.contains(line), "{line} in {text}");
+    }
+    let report = json("--deaf 4:3@5 --soak 20");
+    let deaf: Vec<&Value> = report["timeline"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|moment| moment["what"] == "does not receive")
+        .collect();
+    assert_eq!(deaf.len(), 1);
+    assert_eq!(
+        (deaf[0]["relay"].as_u64(), deaf[0]["other"].as_u64()),
+        (Some(4), Some(3))
+    );
+}
+
+const TOML: &str =
+    "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[listen]\n";
+
+#[test]
+fn what_is_heard_comes_from_an_interferer() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("listen.toml");
+    std::fs::write(&file, TOML).unwrap();
+    let name = file.to_str().unwrap();
+    let (status, text) = refusal(&format!("--scenario {name} --uavs 3 --listen"));
+    assert_eq!(status, 2, "{text}");
+    assert!(text.contains("interferer: is missing"), "{text}");
+    let source = "[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";
+    std::fs::write(&file, format!("{TOML}following = true\n{source}")).unwrap();
+    let options = format!("--scenario {name} --uavs 3 --listen --listen-for 30");
+    assert!(json(&options)["sir"].is_number());
+}
+
+/// Checks the strip of events of relays that spread evenly at first. They have agreed on no SIR then.
+#[test]
+fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("listen.svg");
+    let name = file.to_str().unwrap();
+    let options = "--uavs 3 --listen --listen-for 30";
+    let output = chain(&format!("{options} --svg {name}"));
+    assert!(output.status.success(), "{output:?}");
+    let svg = std::fs::read_to_string(&file).unwrap();
+    assert!(svg.contains(">spread<"), "{svg}");
+    assert!(!svg.contains("SIR 0.000"), "{svg}");
+}
+
+/// The SIR and the optimum are those of the remaining relays.
+#[test]
+fn a_lost_relay_does_not_count() {
+    let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";
+    let report = json(&options);
+    let of = |name: &str| report[name].as_f64().unwrap();
+    assert_eq!(report["lost"][0]["index"].as_u64(), Some(4), "{report}");
+    let [worst, true_sir, share] = ["sir", "true_sir", "share_of_optimum"].map(of);
+    assert!((true_sir / worst - 1.0).abs() < 0.01, "{report}");
+    assert!(share > 0.99 && share < 1.01, "{report}");
+    assert!((true_sir / of("optimum_sir") - share).abs() < 1e-6);
+    // The optimum is that of five relays, not six.
+    let five = json("--uavs 5");
+    let optimum = five["sir"].as_f64().unwrap();
+    assert!((of("optimum_sir") / optimum - 1.0).abs() < 1e-3, "{report}");
+    let table = String::from_utf8(chain(&options).stdout).unwrap();
+    let line = table
+        .lines()
+        .find(|line| line.starts_with("true SIR "))
+        .unwrap();
+    assert!(
+        !line.contains("inf") && !line.contains("0.0000 of"),
+        "{line}"
     );
 }

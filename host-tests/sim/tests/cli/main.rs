@@ -8,41 +8,34 @@
     missing_docs
 )]
 
-mod air;
 mod capture;
-mod first;
 mod hostile;
-mod listen;
 mod methods;
 mod upload;
-mod words;
 
 use std::fmt::Write as _;
-use std::process::{Command, Output};
+use std::io::Read as _;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-fn chain(arguments: &[&str]) -> Output {
+fn chain(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_chain"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
-fn json(arguments: &[&str]) -> Value {
-    let mut all = vec!["--json"];
-    all.extend(arguments);
-    let output = chain(&all);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+fn json(arguments: &str) -> Value {
+    let output = chain(&format!("--json {arguments}"));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments}: {errors}");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 /// Returns the exit status and the single line on standard error.
-fn refusal(arguments: &[&str]) -> (i32, String) {
+fn refusal(arguments: &str) -> (i32, String) {
     let output = chain(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");
@@ -51,7 +44,7 @@ fn refusal(arguments: &[&str]) -> (i32, String) {
 
 #[test]
 fn the_json_has_every_field_of_the_contract() {
-    let report = json(&["--uavs", "3", "--seed", "5"]);
+    let report = json("--uavs 3 --seed 5");
     for key in [
         "sir",
         "sir_db",
@@ -97,7 +90,7 @@ fn the_json_has_every_field_of_the_contract() {
 
 #[test]
 fn the_default_is_eight_relays_by_align_and_a_table() {
-    let output = chain(&[]);
+    let output = chain("");
     assert!(output.status.success() && output.stderr.is_empty());
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
@@ -111,72 +104,24 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
 /// Checks the y column of the table, and `altitude` as an alias of `joint`.
 #[test]
 fn the_table_has_y_where_there_is_room_beside_the_line() {
-    let side = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/side.toml");
-    let table = |arguments: &[&str]| String::from_utf8(chain(arguments).stdout).unwrap();
-    let beside = table(&["--scenario", side, "--uavs", "2", "--method", "altitude"]);
+    let side = example("side.toml");
+    let table = |arguments: &str| String::from_utf8(chain(arguments).stdout).unwrap();
+    let beside = table(&format!("--scenario {side} --uavs 2 --method altitude"));
     assert!(
         beside.contains("y [m]") && beside.contains("by `joint`"),
         "{beside}"
     );
-    assert!(!table(&["--uavs", "2"]).contains("y [m]"));
+    assert!(!table("--uavs 2").contains("y [m]"));
 }
 
 #[test]
 fn the_same_seed_prints_the_same_bytes() {
-    let bad_day = [
-        "--json",
-        "--loss",
-        "0.3",
-        "--corrupt",
-        "0.15",
-        "--duplicate",
-        "0.1",
-        "--reorder",
-        "0.1",
-        "--seed",
-    ];
-    let go = |seed| chain(&[&bad_day[..], &[seed]].concat()).stdout;
+    let bad_day = "--json --loss 0.3 --corrupt 0.15 --duplicate 0.1 --reorder 0.1 --seed";
+    let go = |seed| chain(&format!("{bad_day} {seed}")).stdout;
     assert_eq!(go("3"), go("3"));
     assert_ne!(go("3"), go("4"));
     let report: Value = serde_json::from_slice(&go("3")).unwrap();
     assert!(report["faults"]["lost"].as_u64().unwrap() > 0);
-}
-
-#[test]
-fn wrong_options_are_named_with_their_value_and_range() {
-    insta::assert_snapshot!(refusals(&[
-        "--uavs 0",
-        "--uavs 1001",
-        "--uavs many",
-        "--loss 0.95",
-        "--corrupt NaN",
-        "--duplicate -1",
-        "--duplicate=-1",
-        "--reorder x",
-        "--tolerance 0",
-        "--epsilon inf",
-        "--kill 3",
-        "--kill 9@1",
-        "--kill 0@1",
-        "--kill 3@-1",
-        "--boot 3",
-        "--boot 9@1",
-        "--partition 3",
-        "--partition 8@1",
-        "--partition 0@1-2",
-        "--partition 3@5-5",
-        "--uavs 1 --partition 1@1",
-        "--partition 3@1 --wires",
-        "--forge 0",
-        "--replay 100001",
-        "--auth --no-auth",
-        "--shared --wires",
-        "--seed -3",
-        "--method magic",
-        "--nonsense",
-        "--scenario no/such/file.toml",
-        "--svg no/such/folder/a.svg",
-    ]));
 }
 
 /// Returns each of `cases` with its error line; `EXAMPLES` stands for the folder of the examples.
@@ -185,7 +130,7 @@ fn refusals(cases: &[&str]) -> String {
     let mut all = String::new();
     for case in cases {
         let options = case.replace("EXAMPLES/", &examples);
-        let (status, line) = refusal(&options.split(' ').collect::<Vec<_>>());
+        let (status, line) = refusal(&options);
         assert_eq!(status, 2, "{case}: {line}");
         write!(all, "{case}\n    {}", line.replace(&examples, "EXAMPLES/")).unwrap();
     }
@@ -202,7 +147,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     let file = folder.path().join("on-top.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 1000\ny_m = 0\n";
     std::fs::write(&file, text).unwrap();
-    let output = chain(&["--json", "--scenario", file.to_str().unwrap()]);
+    let output = chain(&format!("--json --scenario {}", file.display()));
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
@@ -212,7 +157,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
     assert_eq!(report["best_sir"].as_f64(), Some(0.0));
 
     // Without a scenario the option is wrong; the JSON has the same message.
-    let output = chain(&["--json", "--uavs", "1000"]);
+    let output = chain("--json --uavs 1000");
     assert_eq!(output.status.code(), Some(2));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let error = report["error"].as_str().unwrap();
@@ -224,7 +169,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
 
 #[test]
 fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
-    let output = chain(&["--json", "--uavs", "4", "--kill", "2@0.01", "--wires"]);
+    let output = chain("--json --uavs 4 --kill 2@0.01 --wires");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
@@ -248,12 +193,266 @@ fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
 
 #[test]
 fn a_relay_that_is_described_and_not_there_is_refused() {
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenario.toml");
-    let output = chain(&["--uavs", "4", "--scenario", example]);
+    let example = example("scenario.toml");
+    let output = chain(&format!("--uavs 4 --scenario {example}"));
     assert_eq!(output.status.code(), Some(2));
     let line = String::from_utf8(output.stderr).unwrap();
     assert!(
         line.ends_with("scenario.toml: [[relay]] index = 5: there is no such relay in a chain of 4; allowed: 1 to 4\n"),
         "{line}"
     );
+}
+
+const WRONG: &[&str] = &[
+    "--uavs 0",
+    "--uavs 1001",
+    "--uavs many",
+    "--loss 0.95",
+    "--corrupt NaN",
+    "--duplicate -1",
+    "--duplicate=-1",
+    "--reorder x",
+    "--tolerance 0",
+    "--epsilon inf",
+    "--kill 3",
+    "--kill 9@1",
+    "--kill 0@1",
+    "--kill 3@-1",
+    "--boot 3",
+    "--boot 9@1",
+    "--partition 3",
+    "--partition 8@1",
+    "--partition 0@1-2",
+    "--partition 3@5-5",
+    "--uavs 1 --partition 1@1",
+    "--partition 3@1 --wires",
+    "--forge 0",
+    "--replay 100001",
+    "--auth --no-auth",
+    "--shared --wires",
+    "--seed -3",
+    "--method magic",
+    "--nonsense",
+    "--scenario no/such/file.toml",
+    "--svg no/such/folder/a.svg",
+    "--uavs abc",
+    "--uavs -3",
+    "--uavs 99999999999999999999",
+    "--uavs 3.5",
+    "--seed x",
+    "--seed -1",
+    "--rounds -1",
+    "--closed-loop 3x",
+    "--baud 1e5",
+    "--replay many",
+    "--samples 1000001",
+    "--method foo",
+    "--method alin",
+    "--air foo",
+    "--upload 20 --upload-from moon",
+    "--uav 3",
+    "three",
+    "--svg -",
+    "--capture -",
+    "--loss -0.1",
+    "--uavs 999",
+    "--boot 3@1 --kill 3@5",
+    "--air csma --wires",
+    "--air tdma",
+    "--baud 299",
+    "--burst 0.5",
+    "--burst 2 --loss 0.7",
+    "--deaf 4:3",
+    "--deaf 4@3",
+    "--deaf 4:4@1",
+    "--deaf 4:3@9-5",
+    "--deaf 9:3@1",
+    "--deaf 3:0@1",
+    "--soak 0",
+];
+
+const IGNORED: &[&str] = &[
+    "--epsilon 0.2",
+    "--epsilon 0.2 --method joint",
+    "--explore 5",
+    "--rounds 5 --method joint",
+    "--grid 3x4",
+    "--no-predict --method align-step",
+    "--tolerance 0.01 --method align-step",
+    "--closed-loop 2",
+    "--burst 3",
+    "--samples 5",
+    "--shadow 0",
+    "--move-interferer 1,-2",
+    "--listen-for 30",
+    "--takeover 1@5",
+    "--upload-from tx",
+    "--no-store",
+    "--upload 20 --no-store",
+    "--kill 3@5 --kill 3@9",
+    "--soak 30 --kill 3@30",
+    "--soak 30 --kill 3@5 --boot 3@31",
+    "--soak 30 --partition 3@40-50",
+    "--soak 30 --deaf 3:4@40",
+    "--soak 30 --upload 40:uav_w=2",
+    "--soak 30 --fly --takeover 3@40",
+    "--scenario EXAMPLES/field.toml --method stochastic-step --tolerance 0.01",
+];
+
+#[test]
+fn what_is_wrong_is_named_with_what_is_allowed() {
+    insta::assert_snapshot!(refusals(WRONG));
+}
+
+#[test]
+fn an_option_that_would_be_ignored_is_refused() {
+    insta::assert_snapshot!(refusals(IGNORED));
+}
+
+/// Checks the same options where they have an effect.
+#[test]
+fn an_option_that_is_of_use_is_taken() {
+    for arguments in [
+        "--uavs 2 --method align-step --epsilon 0.5",
+        "--uavs 2 --method adjust --rounds 3 --explore 2 --grid 5x5 --no-predict --tolerance 0.001",
+        "--uavs 3 --loss 0.1 --burst 2",
+        "--uavs 3 --kill 2@20 --boot 2@40 --kill 2@60 --boot 2@80",
+        "--uavs 3 --kill 2@20 --boot 2@20",
+        "--uavs 3 --boot 2@20",
+        "--uavs 3 --soak 30 --kill 2@29",
+    ] {
+        json(arguments);
+    }
+}
+
+/// Errors name keys of a scenario only if the user gave one.
+#[test]
+fn who_has_a_scenario_is_told_its_keys() {
+    let output = chain(&format!(
+        "--scenario {} --uavs 999",
+        example("scenario.toml")
+    ));
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(line.contains("geometry.min_separation_m"), "{line}");
+    let most = json("--uavs 250");
+    assert_eq!(most["uavs"], 250);
+}
+
+/// A mission that was adopted is never reported as not adopted.
+#[test]
+fn what_was_adopted_is_not_denied() {
+    for (arguments, is_denied) in [
+        ("--uavs 2 --upload 20 --kill 1@40", false),
+        ("--wires --upload 20 --kill 4@20", true),
+    ] {
+        let output = chain(arguments);
+        assert_eq!(output.status.code(), Some(1));
+        let all = [output.stdout, output.stderr].concat();
+        let text = String::from_utf8(all).unwrap();
+        assert_eq!(text.contains("mission 1 adopted"), !is_denied, "{text}");
+        for denial in ["was not adopted", "no upload was adopted"] {
+            assert_eq!(text.contains(denial), is_denied, "{denial} in {text}");
+        }
+    }
+}
+
+/// A closed output pipe causes no panic (exit status 101).
+#[test]
+fn whoever_does_not_listen_changes_no_status() {
+    let several = example("multi_interferer.toml");
+    for (arguments, status) in [
+        ("--uavs 3", 0),
+        ("--uavs 3 --json", 0),
+        ("--help", 0),
+        ("--uavs 0", 2),
+        ("--epsilon 1", 2),
+        ("--uavs 2 --kill 1@20", 1),
+        // This scenario prints notes on standard error.
+        (&format!("--uavs 3 --scenario {several}"), 0),
+    ] {
+        for closed in [[true, false], [false, true], [true, true]] {
+            let mut child = Command::new(env!("CARGO_BIN_EXE_chain"))
+                .args(arguments.split_whitespace())
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            let (mut out, mut err) = (child.stdout.take(), child.stderr.take());
+            if closed[0] {
+                out = None;
+            }
+            if closed[1] {
+                err = None;
+            }
+            let (mut said, mut wrong) = (String::new(), String::new());
+            if let Some(mut out) = out {
+                out.read_to_string(&mut said).unwrap();
+            }
+            if let Some(mut err) = err {
+                err.read_to_string(&mut wrong).unwrap();
+            }
+            assert_eq!(
+                child.wait().unwrap().code(),
+                Some(status),
+                "{arguments:?} {closed:?}: {wrong}"
+            );
+            assert!(!wrong.contains("panicked"), "{wrong}");
+        }
+    }
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .unwrap()
+}
+
+/// A build without output for a minute looks like a hang.
+#[test]
+fn no_command_hides_cargos_progress() {
+    let text = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();
+    let aliases: Vec<&str> = text
+        .lines()
+        .filter(|line| line.contains("= \"run "))
+        .collect();
+    assert!(
+        aliases.iter().any(|line| line.starts_with("chain = ")),
+        "{text}"
+    );
+    for line in aliases {
+        let is_quiet = line.contains("--quiet") || line.contains(" -q ");
+        assert!(!is_quiet, "{line}");
+    }
+}
+
+#[test]
+fn the_simulator_builds_without_the_crates_of_other_tools() {
+    let output = Command::new(env!("CARGO"))
+        .current_dir(root())
+        .args(["tree", "--package", "uav-relay-sim", "--locked"])
+        .args(["--edges", "normal,build", "--prefix", "none"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let is_built = |name: &str| text.lines().any(|line| line.starts_with(name));
+    assert!(is_built("uav-relay-scenario v"), "{text}");
+    for other in [
+        "anstream v",
+        "indicatif v",
+        "mavlink v",
+        "pcap-file v",
+        "plotters v",
+        "syn v1.",
+        "syn v2.",
+        "thiserror v1.",
+        "toml_edit v",
+        "uav-relay-decode v",
+        "uav-relay-page v",
+        "wasm-bindgen v",
+    ] {
+        assert!(!is_built(other), "{other}: {text}");
+    }
 }

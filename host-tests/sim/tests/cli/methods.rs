@@ -8,7 +8,7 @@ use super::{chain, example, json, refusal};
 
 #[test]
 fn the_fixed_step_reports_the_papers_sweeps() {
-    let report = json(&["--uavs", "2", "--method", "align-step", "--epsilon", "0.1"]);
+    let report = json("--uavs 2 --method align-step --epsilon 0.1");
     assert_eq!(report["sweeps"].as_u64(), Some(10_245));
     assert!((report["sir"].as_f64().unwrap() - 1.6).abs() < 1e-5);
 }
@@ -16,19 +16,22 @@ fn the_fixed_step_reports_the_papers_sweeps() {
 #[test]
 fn a_method_says_what_scenario_it_needs() {
     for method in ["stochastic", "stochastic-step"] {
-        let (status, line) = refusal(&["--method", method]);
+        let (status, line) = refusal(&format!("--method {method}"));
         assert_eq!(status, 2);
         assert!(line.contains(method) && line.contains("[field]"), "{line}");
     }
     for method in ["align", "align-step", "adjust", "joint"] {
-        let (status, line) = refusal(&["--scenario", &example("field.toml"), "--method", method]);
+        let (status, line) = refusal(&format!(
+            "--scenario {} --method {method}",
+            example("field.toml")
+        ));
         assert_eq!(status, 2);
         assert!(
             line.contains(method) && line.contains("[[interferer]]"),
             "{line}"
         );
     }
-    let (status, line) = refusal(&["--closed-loop", "2"]);
+    let (status, line) = refusal("--closed-loop 2");
     assert_eq!(status, 2);
     assert!(line.contains("--closed-loop"), "{line}");
     for (option, value) in [
@@ -38,7 +41,7 @@ fn a_method_says_what_scenario_it_needs() {
         ("--grid", "1x5"),
         ("--closed-loop", "101"),
     ] {
-        let (status, line) = refusal(&["--method", "adjust", option, value]);
+        let (status, line) = refusal(&format!("--method adjust {option} {value}"));
         assert_eq!(status, 2);
         assert!(line.contains(option), "{line}");
     }
@@ -53,7 +56,7 @@ fn the_joint_figures_hold() {
         ("8", 1.235_66, 1.235_783_8),
         ("50", 6.497_73, 6.498_377_7),
     ] {
-        let report = json(&["--scenario", &file, "--uavs", uavs, "--method", "joint"]);
+        let report = json(&format!("--scenario {file} --uavs {uavs} --method joint"));
         let sir = report["sir"].as_f64().unwrap();
         assert!(sir >= least && sir <= best * (1.0 + 1e-6), "{uavs}: {sir}");
         assert!(report["sweeps"].as_u64().unwrap() <= 17, "{report}");
@@ -64,7 +67,7 @@ fn the_joint_figures_hold() {
                 .all(|h| (20.0..=300.0).contains(&h))
         );
     }
-    let report = json(&["--scenario", &file, "--uavs", "50", "--method", "adjust"]);
+    let report = json(&format!("--scenario {file} --uavs 50 --method adjust"));
     let rounds: Vec<f64> = report["rounds"]
         .as_array()
         .unwrap()
@@ -74,16 +77,9 @@ fn the_joint_figures_hold() {
     assert_eq!(rounds.len(), 501);
     assert!(rounds.windows(2).all(|pair| pair[1] >= pair[0]));
     assert!(report["sir"].as_f64().unwrap() >= 6.40, "{}", report["sir"]);
-    let grid = json(&[
-        "--scenario",
-        &file,
-        "--uavs",
-        "50",
-        "--method",
-        "adjust",
-        "--grid",
-        "41x21",
-    ]);
+    let grid = json(&format!(
+        "--scenario {file} --uavs 50 --method adjust --grid 41x21"
+    ));
     let gain = grid["sir"].as_f64().unwrap() / rounds[0];
     assert!((gain - 1.0).abs() < 1e-6, "{gain}");
 }
@@ -91,29 +87,19 @@ fn the_joint_figures_hold() {
 #[test]
 fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
     let file = example("field.toml");
-    let agreed = json(&["--scenario", &file, "--method", "stochastic"]);
+    let agreed = json(&format!("--scenario {file} --method stochastic"));
     assert_eq!(agreed["sweeps"].as_u64(), Some(1));
     assert!(agreed["promised"].is_boolean());
     let sir = agreed["sir"].as_f64().unwrap();
-    let step = json(&[
-        "--scenario",
-        &file,
-        "--method",
-        "stochastic-step",
-        "--epsilon",
-        "0.01",
-    ]);
+    let step = json(&format!(
+        "--scenario {file} --method stochastic-step --epsilon 0.01"
+    ));
     assert!(step["sweeps"].as_u64().unwrap() > 10);
     assert!(sir >= step["sir"].as_f64().unwrap() - 0.01);
     let measured = |rounds: &str| {
-        let report = json(&[
-            "--scenario",
-            &file,
-            "--method",
-            "stochastic",
-            "--closed-loop",
-            rounds,
-        ]);
+        let report = json(&format!(
+            "--scenario {file} --method stochastic --closed-loop {rounds}"
+        ));
         report["sir"].as_f64().unwrap()
     };
     assert!(measured("6") > 0.97 * sir, "{} {sir}", measured("6"));
@@ -121,15 +107,10 @@ fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
 
 #[test]
 fn a_step_that_is_too_large_says_so() {
-    let output = chain(&[
-        "--json",
-        "--scenario",
-        &example("field.toml"),
-        "--method",
-        "stochastic-step",
-        "--epsilon",
-        "0.2",
-    ]);
+    let output = chain(&format!(
+        "--json --scenario {} --method stochastic-step --epsilon 0.2",
+        example("field.toml")
+    ));
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
@@ -150,14 +131,10 @@ fn every_method_can_be_drawn() {
     ] {
         let file = folder.path().join(format!("{method}.svg"));
         let path = file.to_str().unwrap();
-        json(&[
-            "--scenario",
-            &example(scenario),
-            "--method",
-            method,
-            "--svg",
-            path,
-        ]);
+        json(&format!(
+            "--scenario {} --method {method} --svg {path}",
+            example(scenario)
+        ));
         let svg = std::fs::read_to_string(&file).unwrap();
         roxmltree::Document::parse(&svg).unwrap();
         assert!(svg.contains(method) && !svg.contains("NaN"));
@@ -171,14 +148,11 @@ fn relays_of_a_scenario_keep_what_they_hold() {
     let text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n[power]\ntx_w = 80.0\nuav_w = 1.0\n[[interferer]]\npower_w = 80.0\nx_m = 500.0\ny_m = 400.0\n[[relay]]\nindex = 3\naltitude_m = 30.0\npower_w = 0.5\n";
     std::fs::write(&file, text).unwrap();
     let picture = folder.path().join("mixed.svg");
-    let report = json(&[
-        "--uavs",
-        "4",
-        "--scenario",
-        file.to_str().unwrap(),
-        "--svg",
-        picture.to_str().unwrap(),
-    ]);
+    let report = json(&format!(
+        "--uavs 4 --scenario {} --svg {}",
+        file.display(),
+        picture.display()
+    ));
     let heights: Vec<f64> = report["relays"]
         .as_array()
         .unwrap()
@@ -204,7 +178,7 @@ fn several_interferers_are_flown_as_one_and_a_note_says_so() {
         env!("CARGO_MANIFEST_DIR"),
         "/../../examples/multi_interferer.toml"
     );
-    let output = chain(&["--json", "--uavs", "3", "--scenario", several]);
+    let output = chain(&format!("--json --uavs 3 --scenario {several}"));
     assert!(output.status.success());
     let note = String::from_utf8(output.stderr).unwrap();
     assert!(
@@ -232,7 +206,7 @@ fn several_interferers_are_flown_as_one_and_a_note_says_so() {
         (report["all_loss"].as_f64().unwrap() - lost).abs() < 1e-9 && lost > 0.01,
         "{report}"
     );
-    let table = String::from_utf8(chain(&["--uavs", "3", "--scenario", several]).stdout).unwrap();
+    let table = String::from_utf8(chain(&format!("--uavs 3 --scenario {several}")).stdout).unwrap();
     assert!(
         table.contains("against all interferers: SIR ")
             && table.contains("% below the relays' estimate"),

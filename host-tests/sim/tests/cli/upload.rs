@@ -6,11 +6,11 @@ use serde_json::Value;
 use super::{chain, example, json, refusals};
 
 /// Runs the default scenario with the interferer at x = 800 m, y = -300 m from the start.
-fn from_the_start(folder: &tempfile::TempDir, more: &[&str]) -> Value {
+fn from_the_start(folder: &tempfile::TempDir, more: &str) -> Value {
     let file = folder.path().join("moved.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 800\ny_m = -300\n";
     std::fs::write(&file, text).unwrap();
-    json(&[&["--scenario", file.to_str().unwrap()], more].concat())
+    json(&format!("--scenario {} {more}", file.display()))
 }
 
 const MOVED: &str = "20:x_m=800,y_m=-300";
@@ -37,17 +37,17 @@ fn whats(report: &Value, what: &str) -> usize {
 #[test]
 fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it() {
     let folder = tempfile::tempdir().unwrap();
-    let expected = from_the_start(&folder, &[]);
-    let loss = ["--loss", "0.3", "--corrupt", "0.1", "--seed", "3"];
+    let expected = from_the_start(&folder, "");
+    let loss = "--loss 0.3 --corrupt 0.1 --seed 3";
     for more in [
-        &[][..],
-        &["--upload-from", "rx"],
-        &["--wires"],
-        &["--wires", "--upload-from", "rx"],
+        "",
+        "--upload-from rx",
+        "--wires",
+        "--wires --upload-from rx",
         &loss,
-        &[&loss[..], &["--upload-from", "rx", "--wires"]].concat(),
+        &format!("{loss} --upload-from rx --wires"),
     ] {
-        let report = json(&[&["--upload", MOVED], more].concat());
+        let report = json(&format!("--upload {MOVED} {more}"));
         assert_eq!(places(&report), places(&expected), "{more:?}");
         for key in ["sir", "rx_sir", "target"] {
             assert_eq!(report[key], expected[key], "{key}, {more:?}");
@@ -77,7 +77,7 @@ fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it()
 
 #[test]
 fn without_an_upload_nothing_is_said_of_one() {
-    for report in [json(&[]), json(&["--kill", "4@20"])] {
+    for report in [json(""), json("--kill 4@20")] {
         assert!(report.get("version").is_none());
         assert!(report["relays"][0].get("version").is_none());
     }
@@ -88,7 +88,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("upload.svg");
     let file_name = file.to_str().unwrap();
-    let output = chain(&["--upload", MOVED, "--air", "ideal", "--svg", file_name]);
+    let output = chain(&format!("--upload {MOVED} --air ideal --svg {file_name}"));
     assert!(output.status.success() && output.stderr.is_empty());
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
@@ -122,14 +122,9 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
 #[test]
 fn of_two_uploads_the_later_one_is_flown() {
     let folder = tempfile::tempdir().unwrap();
-    let report = json(&[
-        "--upload",
-        "60:x_m=800,y_m=-300",
-        "--upload",
-        "20:power_w=30",
-    ]);
+    let report = json("--upload 60:x_m=800,y_m=-300 --upload 20:power_w=30");
     assert_eq!(report["version"].as_u64(), Some(2));
-    assert_eq!(places(&report), places(&from_the_start(&folder, &[])));
+    assert_eq!(places(&report), places(&from_the_start(&folder, "")));
     let recovery = report["recovery"].as_array().unwrap();
     let versions: Vec<u64> = recovery
         .iter()
@@ -145,19 +140,16 @@ fn every_key_is_that_of_a_scenario_file() {
     let file = folder.path().join("other.toml");
     let text = "[geometry]\ndistance_m = 900\naltitude_m = 60\naltitude_min_m = 40\naltitude_max_m = 120\nlateral_min_m = -30\nlateral_max_m = 40\nmin_separation_m = 5\n[power]\ntx_w = 70\nuav_w = 2\n[[interferer]]\npower_w = 60\nx_m = 300\ny_m = 200\n";
     std::fs::write(&file, text).unwrap();
-    let shared = ["--method", "joint", "--uavs", "5"];
-    let expected = json(
-        &[
-            &["--scenario", file.to_str().unwrap(), "--tolerance", "0.01"],
-            &shared[..],
-        ]
-        .concat(),
-    );
+    let shared = "--method joint --uavs 5";
+    let expected = json(&format!(
+        "--scenario {} --tolerance 0.01 {shared}",
+        file.display()
+    ));
     let upload = "5:distance_m=900,altitude_m=60,altitude_min_m=40,altitude_max_m=120,lateral_min_m=-30,lateral_max_m=40,min_separation_m=5,tx_w=70,uav_w=2,power_w=60,x_m=300,y_m=200,tolerance=0.01";
-    let report = json(&[&["--upload", upload], &shared[..]].concat());
+    let report = json(&format!("--upload {upload} {shared}"));
     assert_eq!(places(&report), places(&expected));
     // A band of a single altitude follows the common altitude.
-    let report = json(&["--upload", "5:altitude_m=60"]);
+    let report = json("--upload 5:altitude_m=60");
     assert_eq!(report["relays"][0]["h_m"].as_f64(), Some(60.0));
 }
 
@@ -165,14 +157,14 @@ fn every_key_is_that_of_a_scenario_file() {
 #[test]
 fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     let folder = tempfile::tempdir().unwrap();
-    let expected = places(&from_the_start(&folder, &[]));
+    let expected = places(&from_the_start(&folder, ""));
     for index in ["1", "4"] {
         let (kill, boot) = (format!("{index}@60"), format!("{index}@90"));
-        let run = ["--upload", MOVED, "--kill", &kill, "--boot", &boot];
+        let run = format!("--upload {MOVED} --kill {kill} --boot {boot}");
         let stored = json(&run);
         assert_eq!(places(&stored), expected);
         assert_eq!(whats(&stored, "adopted"), 8);
-        let learned = json(&[&run[..], &["--no-store"]].concat());
+        let learned = json(&format!("{run} --no-store"));
         assert_eq!(places(&learned), expected);
         assert_eq!(whats(&learned, "adopted"), 9, "it adopts it anew");
         for report in [stored, learned] {
@@ -187,10 +179,10 @@ fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
 #[test]
 fn the_relays_that_are_left_fly_it() {
     let folder = tempfile::tempdir().unwrap();
-    let seven = from_the_start(&folder, &["--uavs", "7"]);
+    let seven = from_the_start(&folder, "--uavs 7");
     for at in ["5", "20.05", "25", "60"] {
         for index in ["1", "4", "8"] {
-            let report = json(&["--upload", MOVED, "--kill", &format!("{index}@{at}")]);
+            let report = json(&format!("--upload {MOVED} --kill {index}@{at}"));
             assert_eq!(report["left"].as_u64(), Some(7), "{index}@{at}");
             assert_eq!(places(&report), places(&seven), "{index}@{at}");
         }
@@ -199,14 +191,7 @@ fn the_relays_that_are_left_fly_it() {
 
 #[test]
 fn on_wires_nothing_gets_past_a_silent_relay_and_the_status_is_1() {
-    let output = chain(&[
-        "--json",
-        "--upload",
-        "20:x_m=800",
-        "--kill",
-        "4@20",
-        "--wires",
-    ]);
+    let output = chain("--json --upload 20:x_m=800 --kill 4@20 --wires");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let error = report["error"].as_str().unwrap();
@@ -220,7 +205,7 @@ fn on_wires_nothing_gets_past_a_silent_relay_and_the_status_is_1() {
 
 #[test]
 fn an_attacker_changes_nothing_of_it() {
-    let run = ["--upload", MOVED, "--forge", "2000", "--replay", "2000"];
+    let run = format!("--upload {MOVED} --forge 2000 --replay 2000");
     let report = json(&run);
     let attack = &report["attack"];
     for kind in ["forged", "replayed"] {
@@ -231,13 +216,13 @@ fn an_attacker_changes_nothing_of_it() {
         assert_eq!(attack[key].as_u64(), Some(0), "{key} in {attack}");
     }
     let folder = tempfile::tempdir().unwrap();
-    assert_eq!(places(&report), places(&from_the_start(&folder, &[])));
+    assert_eq!(places(&report), places(&from_the_start(&folder, "")));
 }
 
 #[test]
 fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
     let file = example("multi_interferer.toml");
-    let output = chain(&["--scenario", &file, "--upload", "20:x_m=500", "--json"]);
+    let output = chain(&format!("--scenario {file} --upload 20:x_m=500 --json"));
     assert!(output.status.success());
     let notes = String::from_utf8(output.stderr).unwrap();
     assert!(
@@ -281,15 +266,9 @@ fn wrong_uploads_are_named_with_what_is_allowed() {
 #[test]
 fn drones_fly_to_a_receiver_that_moves() {
     let site = example("site.toml");
-    let report = json(&[
-        "--scenario",
-        &site,
-        "--uavs",
-        "4",
-        "--fly",
-        "--upload",
-        "60:rx_lat_deg=47.412,rx_lon_deg=8.552",
-    ]);
+    let report = json(&format!(
+        "--scenario {site} --uavs 4 --fly --upload 60:rx_lat_deg=47.412,rx_lon_deg=8.552"
+    ));
     assert_eq!(report["version"].as_u64(), Some(1));
     assert_eq!(whats(&report, "adopted"), 4);
     for drone in report["drones"].as_array().unwrap() {
@@ -297,13 +276,8 @@ fn drones_fly_to_a_receiver_that_moves() {
         assert!(drone["off_m"].as_f64().unwrap() < 1.0, "{drone}");
     }
     // The positions equal those of a chain that starts with the distance of the new sites.
-    let longer = json(&[
-        "--uavs",
-        "4",
-        "--scenario",
-        &site,
-        "--upload",
-        "1:rx_lat_deg=47.412,rx_lon_deg=8.552",
-    ]);
+    let longer = json(&format!(
+        "--uavs 4 --scenario {site} --upload 1:rx_lat_deg=47.412,rx_lon_deg=8.552"
+    ));
     assert_eq!(places(&report), places(&longer));
 }

@@ -5,9 +5,7 @@ use std::process::{Command, ExitCode};
 
 use clap::Parser;
 use uav_relay_sim::command::{self, Failure};
-use uav_relay_tools::image::board::{BOARDS, Board};
-use uav_relay_tools::image::elf::{Piece, flat, pieces};
-use uav_relay_tools::image::{hex, uf2};
+use uav_relay_tools::image::{BOARDS, Board, Piece, flat, hex, pieces, uf2};
 use uav_relay_tools::provision::config::LEN;
 
 /// Builds a board's image, or converts a configuration block. Writes .bin and .hex, and .uf2 for the Pico 2.
@@ -51,10 +49,10 @@ fn write(options: &Options) -> Result<(), Failure> {
     let whole = flat(&pieces).map_err(Failure::unmet)?;
     let mut files = vec![
         ("bin", whole.bytes.clone()),
-        ("hex", hex::file(&pieces).map_err(Failure::unmet)?.into()),
+        ("hex", hex(&pieces).map_err(Failure::unmet)?.into()),
     ];
     if let Some(family) = board.uf2 {
-        files.push(("uf2", uf2::file(&pieces, family).map_err(Failure::unmet)?));
+        files.push(("uf2", uf2(&pieces, family).map_err(Failure::unmet)?));
     }
     let out = &options.out;
     std::fs::create_dir_all(out)

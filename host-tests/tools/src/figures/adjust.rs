@@ -5,10 +5,9 @@ use serde::Serialize;
 use uav_relay::{Adjust, Local, Method, Mission, Schedule};
 
 use super::chart::{Axis, Chart, Line, Look, Stroke};
-use super::error::FigureError;
-use super::flight::{Flown, fly};
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
+use super::walk::{Flown, fly};
 
 /// Number of relays.
 pub const RELAYS: u16 = 50;
@@ -30,32 +29,25 @@ pub const GRID: Local = Local::Grid {
 
 /// Position of a relay after a number of rounds.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct ShapeRow {
-    /// Number of rounds of Algorithm 2.
-    pub round: u16,
-    /// Index of the relay, from 1.
-    pub relay: u16,
-    /// Position, m from Tx.
-    pub x_m: f32,
-    /// Altitude, m.
-    pub altitude_m: f32,
+struct ShapeRow {
+    round: u16,
+    relay: u16,
+    x_m: f32,
+    altitude_m: f32,
 }
 
 /// SIR of the chain after one round.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct RoundRow {
+struct RoundRow {
     /// Round number; 0 is the chain of Algorithm 1.
-    pub round: u16,
+    round: u16,
     /// SIR of the worst hop with the coarse-to-fine search, linear.
-    pub sir_fine_linear: f32,
+    sir_fine_linear: f32,
     /// SIR of the worst hop with the 41 by 21 grid, linear.
-    pub sir_grid_linear: f32,
+    sir_grid_linear: f32,
 }
 
 /// Runs Algorithm 2 for `relays` relays from `altitude_m` on, with the interferer at (500, 150) m.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn adjusted(
     relays: u16,
     altitude_m: f64,
@@ -83,10 +75,7 @@ fn mission(relays: u16, altitude_m: f64) -> Result<Mission, FigureError> {
 }
 
 /// Returns the relays' positions after each of these numbers of rounds.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
+fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
     let chains: Result<Vec<Vec<ShapeRow>>, FigureError> = rounds
         .par_iter()
         .map(|&round| {
@@ -106,10 +95,7 @@ pub fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
 }
 
 /// Returns the SIR after each round up to `rounds`; a search that has ended keeps its last SIR.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn rounds(rounds: u16) -> Result<Vec<RoundRow>, FigureError> {
+fn rounds(rounds: u16) -> Result<Vec<RoundRow>, FigureError> {
     let (fine, grid) = rayon::join(
         || adjusted(RELAYS, START_M, rounds, Local::Fine),
         || adjusted(RELAYS, START_M, rounds, GRID),
@@ -157,9 +143,6 @@ fn steps(rows: &[ShapeRow], round: u16) -> String {
 }
 
 /// Returns the figure of the positions.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn shapes_sheet() -> Result<Sheet, FigureError> {
     let rows = shapes(&ROUNDS)?;
     let mut lines: Vec<Line> = ROUNDS
@@ -206,9 +189,6 @@ pub fn shapes_sheet() -> Result<Sheet, FigureError> {
 }
 
 /// Returns the figure of the SIR by round.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn rounds_sheet() -> Result<Sheet, FigureError> {
     let most = ROUNDS.iter().copied().fold(0, u16::max);
     let rows = rounds(most)?;

@@ -6,8 +6,7 @@ use uav_relay::Schedule;
 use uav_relay::optimiser::plan;
 
 use super::chart::{Axis, Chart, Line, Look, Panel, Stroke};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{convergence, paper, walk};
 
 /// Number of relays.
@@ -21,25 +20,20 @@ pub const PAPERS_OFFSET_M: f64 = 150.0;
 
 /// SIR at one altitude with one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Lateral offset of the interferer, m.
-    pub interferer_y_m: f64,
-    /// Common altitude, m.
-    pub altitude_m: f64,
+struct Row {
+    interferer_y_m: f64,
+    altitude_m: f64,
     /// SIR of the worst hop by Algorithm 1, linear.
-    pub sir_linear: f64,
+    sir_linear: f64,
     /// SIR with the paper's step of 0.1, linear; only near the paper's best altitude.
-    pub sir_by_step_linear: Option<f64>,
+    sir_by_step_linear: Option<f64>,
 }
 
 /// Altitude range around the paper's best one that is computed in steps of 0.5 m, m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
 /// Computes the chain for each pair of an interferer offset, m, and an altitude, m, 10 to 500.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
+fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
@@ -83,9 +77,6 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 /// Returns the best common altitude, m, and SIR, linear. The interferer is at (500, `y_m`) m, the band is 20 m to 300 m.
 ///
 /// Scans every 5 m, then refines to 0.1 m by ternary search if that gains more than the tolerance of a chain.
-///
-/// # Errors
-/// [`FigureError`].
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;
@@ -149,9 +140,6 @@ fn close_up(rows: &[Row]) -> Panel {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&all_pairs())?;
     let of = |y_m: f64| {

@@ -6,9 +6,8 @@ use uav_relay::Mission;
 use uav_relay::planning::single::{Found, aside, theorems};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
 /// Power of the relay, W.
@@ -34,34 +33,27 @@ const OFFSET_STEP_M: u16 = 5;
 
 /// Best position for one lateral room.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Offset of the interferer, m.
-    pub interferer_y_m: f64,
-    /// Room to each side, m.
-    pub room_m: f64,
-    /// Position along the line, m from Tx.
-    pub x_m: f32,
-    /// Lateral position, m.
-    pub y_m: f32,
+struct Row {
+    interferer_y_m: f64,
+    room_m: f64,
+    x_m: f32,
+    y_m: f32,
     /// SIR of the worse hop, linear.
-    pub sir_linear: f32,
+    sir_linear: f32,
 }
 
 /// SIR with and without lateral and vertical freedom, for one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct PowerRatio {
-    /// Offset of the interferer, m.
-    pub interferer_y_m: f64,
+struct PowerRatio {
+    interferer_y_m: f64,
     /// SIR above the line at the lowest altitude, linear.
-    pub line_sir_linear: f32,
+    line_sir_linear: f32,
     /// SIR above the line at a free altitude, linear.
-    pub altitude_sir_linear: f32,
+    altitude_sir_linear: f32,
     /// SIR with free lateral position at the lowest altitude, linear.
-    pub side_sir_linear: f32,
-    /// SIR with both free, linear.
-    pub both_sir_linear: f32,
-    /// Altitude with both free, m.
-    pub both_altitude_m: f32,
+    side_sir_linear: f32,
+    both_sir_linear: f32,
+    both_altitude_m: f32,
 }
 
 fn mission(offset_m: f64, room_m: f64) -> Result<Mission, FigureError> {
@@ -83,10 +75,7 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
 }
 
 /// Returns the best positions at the lowest altitude for each offset, every `step_m` of room.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
+fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
         for room_m in (0..=MOST_ROOM_M).step_by(usize::from(step_m)) {
@@ -106,10 +95,7 @@ pub fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
 }
 
 /// Returns the SIRs with and without lateral and vertical freedom. The interferer's offset rises by `step_m`.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
+fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
 }
@@ -137,9 +123,6 @@ fn taken() -> Vec<String> {
 }
 
 /// Returns the figure of the positions.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn places_sheet() -> Result<Sheet, FigureError> {
     let rows = data(ROOM_STEP_M)?;
     let lines = |of: fn(&Row) -> (f64, f64)| -> Vec<Line> {
@@ -189,9 +172,6 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
 }
 
 /// Returns the figure of the gain.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {

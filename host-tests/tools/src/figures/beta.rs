@@ -5,8 +5,7 @@ use serde::Serialize;
 use uav_relay::FieldPoint;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 
 /// Shape parameters alpha and beta.
 pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];
@@ -16,21 +15,18 @@ pub const STEPS: u32 = 100;
 
 /// A point of a density.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// First shape parameter.
-    pub alpha: f64,
-    /// Second shape parameter.
-    pub beta: f64,
+struct Row {
+    alpha: f64,
+    beta: f64,
     /// E[`I_max` / I] as used by relays: Upsilon times `I_max`.
-    pub upsilon_times_i_max: f64,
+    upsilon_times_i_max: f64,
     /// Interference as a fraction of `I_max`, 0 to 1.
-    pub interference_over_i_max: f64,
-    /// Probability density.
-    pub density: f64,
+    interference_over_i_max: f64,
+    density: f64,
 }
 
 /// Returns the densities at `steps` + 1 points each, from 0 to 1.
-pub fn data(steps: u32) -> Vec<Row> {
+fn data(steps: u32) -> Vec<Row> {
     let mut rows = Vec::new();
     for (alpha, beta) in SHAPES {
         let Some(upsilon_times_i_max) = FieldPoint::beta_upsilon(alpha, beta, 1.0) else {
@@ -57,9 +53,6 @@ fn density(alpha: f64, beta: f64, y: f64) -> f64 {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(STEPS);
     let lines = SHAPES

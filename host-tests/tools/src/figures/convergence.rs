@@ -4,8 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{paper, walk};
 
 /// Numbers of relays.
@@ -16,22 +15,17 @@ pub const STEP: f64 = 0.1;
 
 /// SIR of a chain after one sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Number of relays.
-    pub relays: u16,
-    /// Number of the sweep, from 1.
-    pub sweep: u32,
+struct Row {
+    relays: u16,
+    sweep: u32,
     /// Target SIR of every hop, linear.
-    pub target_linear: f32,
+    target_linear: f32,
     /// SIR of the worst hop with the relays as far toward Rx as the target allows, linear.
-    pub sir_linear: f64,
+    sir_linear: f64,
 }
 
 /// Returns the sweeps of each chain until it settles, thinned out for drawing.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
+fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let chains: Result<Vec<Vec<Row>>, FigureError> =
         relays.par_iter().map(|&relays| sweeps(relays)).collect();
     Ok(chains?
@@ -70,9 +64,6 @@ fn thinned(rows: &[Row]) -> Vec<Row> {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let lines = |from: u32| -> Vec<Line> {

@@ -5,9 +5,8 @@ use serde::Serialize;
 use uav_relay::{Method, Schedule};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::flight::{Flown, fly};
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
+use super::walk::{Flown, fly};
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 
@@ -16,40 +15,27 @@ pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];
 
 /// Cost for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Number of relays.
-    pub relays: u16,
+struct Row {
+    relays: u16,
     /// Passes with the paper's step of 0.1.
-    pub step_sweeps: u32,
-    /// Frames sent with the paper's step.
-    pub step_messages: u64,
-    /// Bytes sent with the paper's step.
-    pub step_bytes: u64,
-    /// Final SIR with the paper's step, linear.
-    pub step_sir_linear: f64,
+    step_sweeps: u32,
+    step_messages: u64,
+    step_bytes: u64,
+    step_sir_linear: f64,
     /// Passes with bracketed targets, without prediction.
-    pub bracketed_sweeps: u32,
-    /// Frames sent with bracketed targets.
-    pub bracketed_messages: u64,
-    /// Bytes sent with bracketed targets.
-    pub bracketed_bytes: u64,
-    /// Final SIR with bracketed targets, linear.
-    pub bracketed_sir_linear: f64,
+    bracketed_sweeps: u32,
+    bracketed_messages: u64,
+    bracketed_bytes: u64,
+    bracketed_sir_linear: f64,
     /// Passes if the leader first solves the chain from the mission.
-    pub predicted_sweeps: u32,
-    /// Frames sent with prediction.
-    pub predicted_messages: u64,
-    /// Bytes sent with prediction.
-    pub predicted_bytes: u64,
-    /// Final SIR with prediction, linear.
-    pub predicted_sir_linear: f64,
+    predicted_sweeps: u32,
+    predicted_messages: u64,
+    predicted_bytes: u64,
+    predicted_sir_linear: f64,
 }
 
 /// Simulates each chain with the three schedules.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
+fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     relays.par_iter().map(|&relays| row(relays)).collect()
 }
 
@@ -105,9 +91,6 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let ratio = rows.last().map_or(0.0, |row| {

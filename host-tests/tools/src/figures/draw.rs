@@ -2,13 +2,12 @@
 
 use std::fmt::Display;
 
-use plotters::element::DashedPathElement;
+use plotters::element::{DashedPathElement, Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters_backend::{BackendCoord, DrawingErrorKind};
 
-use super::chart::{Chart, Line, Look, Panel, Signs, Stroke};
-use super::scale::Scale;
-use super::signs::{self, Sign};
+use super::chart::{Chart, Line, Look, Panel, Scale, Signs, Stroke};
 
 const WIDTH: u32 = 960;
 const PANEL: u32 = 560;
@@ -40,9 +39,6 @@ impl NotDrawn {
 }
 
 /// Draws `chart` as SVG; `title` is for screen readers.
-///
-/// # Errors
-/// [`NotDrawn`] if the backend fails, or a number does not fit its axis.
 pub fn draw(chart: &Chart, title: &str) -> Result<String, NotDrawn> {
     if !chart.is_drawable() {
         return Err(NotDrawn("a number does not belong on its axis".to_owned()));
@@ -117,7 +113,7 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), NotDrawn> {
 type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>;
 
 fn draw_line(plot: &mut Plot<'_, '_>, line: &Line) -> Result<(), NotDrawn> {
-    let colour = signs::colour(line.look.hue);
+    let colour = colour_of_hue(line.look.hue);
     let points = line.points.iter().copied();
     match dash(line.look.stroke) {
         None => {}
@@ -207,7 +203,7 @@ fn draw_legend(area: &Area<'_>, entries: &[(&str, Look)], columns: usize) -> Res
         let place = |units: u32| i32::try_from(units).unwrap_or(0);
         let x = place(40 + index % columns * column);
         let y = place(GAP + ROW / 2 + index / columns * ROW);
-        let colour = signs::colour(look.hue);
+        let colour = colour_of_hue(look.hue);
         let sample = [(x, y), (x + 76, y)];
         match dash(look.stroke) {
             None => {}
@@ -243,4 +239,75 @@ fn with_title(svg: &str, title: &str) -> String {
         Some((head, body)) => format!("{head} role=\"img\">\n<title>{title}</title>\n{body}"),
         None => svg.to_owned(),
     }
+}
+
+/// Palette of Okabe and Ito, darkest first, without yellow, which is faint on paper.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 0, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+
+const SIZE: i32 = 9;
+
+/// Returns colour number `hue`, modulo the palette.
+pub(super) fn colour_of_hue(hue: usize) -> RGBColor {
+    let [black, ..] = COLOURS;
+    COLOURS.get(hue % COLOURS.len()).copied().unwrap_or(black)
+}
+
+/// The sign of a hue: disc, square, diamond, triangle, cross, ring, inverted triangle.
+pub(super) struct Sign<C> {
+    pub(super) at: C,
+    pub(super) hue: usize,
+}
+
+impl<'a, C> PointCollection<'a, C> for &'a Sign<C> {
+    type Point = &'a C;
+    type IntoIter = std::iter::Once<&'a C>;
+
+    fn point_iter(self) -> Self::IntoIter {
+        std::iter::once(&self.at)
+    }
+}
+
+impl<C, B: DrawingBackend> Drawable<B> for Sign<C> {
+    fn draw<I: Iterator<Item = BackendCoord>>(
+        &self,
+        mut places: I,
+        backend: &mut B,
+        _: (u32, u32),
+    ) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+        let Some((x, y)) = places.next() else {
+            return Ok(());
+        };
+        let colour = colour_of_hue(self.hue);
+        let corners: &[BackendCoord] = match self.hue % COLOURS.len() {
+            0 => return backend.draw_circle((x, y), SIZE.unsigned_abs(), &colour, true),
+            4 => return cross(backend, (x, y), &colour.stroke_width(5)),
+            5 => {
+                let rim = colour.stroke_width(4);
+                return backend.draw_circle((x, y), SIZE.unsigned_abs(), &rim, false);
+            }
+            1 => &[(-8, -8), (8, -8), (8, 8), (-8, 8)],
+            2 => &[(0, -12), (12, 0), (0, 12), (-12, 0)],
+            3 => &[(0, -11), (10, 7), (-10, 7)],
+            _ => &[(0, 11), (10, -7), (-10, -7)],
+        };
+        let around = corners.iter().map(|(dx, dy)| (x + dx, y + dy));
+        backend.fill_polygon(around, &colour)
+    }
+}
+
+fn cross<B: DrawingBackend>(
+    backend: &mut B,
+    (x, y): BackendCoord,
+    style: &ShapeStyle,
+) -> Result<(), DrawingErrorKind<B::ErrorType>> {
+    backend.draw_line((x - SIZE, y - SIZE), (x + SIZE, y + SIZE), style)?;
+    backend.draw_line((x - SIZE, y + SIZE), (x + SIZE, y - SIZE), style)
 }

@@ -5,9 +5,8 @@ use serde::Serialize;
 use uav_relay::planning::fleet::Fewest;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
 /// Largest target, linear SIR; every whole number from 1 to it is computed.
@@ -28,32 +27,22 @@ pub const POWERS_W: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
 
 /// Result for one target in one scenario.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Position of the interferer along x, m.
-    pub interferer_x_m: f64,
-    /// Lateral offset of the interferer, m.
-    pub interferer_y_m: f64,
-    /// Power of each relay, W.
-    pub relay_w: f64,
-    /// Target SIR, linear.
-    pub target_linear: u16,
+struct Row {
+    interferer_x_m: f64,
+    interferer_y_m: f64,
+    relay_w: f64,
+    target_linear: u16,
     /// Fewest relays that reach it, if any number does.
-    pub relays: Option<u16>,
+    relays: Option<u16>,
 }
 
 /// Returns the fewest relays by target and position of the interferer, with relays of 1 W.
-///
-/// # Errors
-/// [`FigureError::Mission`].
-pub fn by_place(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
+fn by_place(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &PLACES_M.map(|place| (place, 1.0)))
 }
 
 /// Returns the fewest relays by target and power of the relays, with the interferer at (500, 400) m.
-///
-/// # Errors
-/// [`FigureError::Mission`].
-pub fn by_power(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
+fn by_power(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &POWERS_W.map(|power| ((500.0, 400.0), power)))
 }
 
@@ -105,9 +94,6 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
 }
 
 /// Returns the figure by position of the interferer.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     let rows = by_place(&all_targets())?;
     let at = |target: u16| {
@@ -144,9 +130,6 @@ pub fn by_place_sheet() -> Result<Sheet, FigureError> {
 }
 
 /// Returns the figure by power of the relays.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn by_power_sheet() -> Result<Sheet, FigureError> {
     let rows = by_power(&all_targets())?;
     Ok(Sheet {

@@ -4,11 +4,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{paper, walk};
-use crate::baseline::random::{DRAWS, mean};
-use crate::baseline::{blind, equal};
+use crate::baseline::{DRAWS, blind_places, equal_places, mean};
 use uav_relay_scenario::scene::Scene;
 
 /// Largest number of relays; every N from 1 to it is drawn.
@@ -19,32 +17,25 @@ pub const SEED: u64 = 1000;
 
 /// SIRs and gains for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Number of relays.
-    pub relays: u16,
+struct Row {
+    relays: u16,
     /// SIR of the worst hop by Algorithm 1, linear.
-    pub sir_linear: f64,
+    sir_linear: f64,
     /// Mean SIR of the worst hop over random chains, linear.
-    pub random_sir_linear: f64,
+    random_sir_linear: f64,
     /// Standard error of that mean, linear.
-    pub random_error_linear: f64,
+    random_error_linear: f64,
     /// SIR of the worst hop of the interference-blind chain, linear.
-    pub blind_sir_linear: f64,
+    blind_sir_linear: f64,
     /// SIR of the worst hop with equal spacing, linear.
-    pub equal_sir_linear: f64,
-    /// Gain over the random mean, percent.
-    pub gain_over_random_percent: f64,
-    /// Gain over the blind chain, percent.
-    pub gain_over_blind_percent: f64,
-    /// Gain over equal spacing, percent.
-    pub gain_over_equal_percent: f64,
+    equal_sir_linear: f64,
+    gain_over_random_percent: f64,
+    gain_over_blind_percent: f64,
+    gain_over_equal_percent: f64,
 }
 
 /// Returns the results for these numbers of relays, against the mean of `draws` random chains.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
+fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
         .map(|&relays| row(relays, draws))
@@ -56,8 +47,8 @@ fn row(relays: u16, draws: u32) -> Result<Row, FigureError> {
     let sir = walk::settled(&mission)?.sir;
     let scene = Scene::new(&paper::multi_hop(), relays).ok_or(FigureError::Unsettled("a scene"))?;
     let random = mean(&scene, draws, SEED + u64::from(relays));
-    let blind = scene.sir_along(&blind::places(&scene));
-    let equal = scene.sir_along(&equal::places(&scene));
+    let blind = scene.sir_along(&blind_places(&scene));
+    let equal = scene.sir_along(&equal_places(&scene));
     let percent = |over: f64| 100.0 * (sir / over - 1.0);
     Ok(Row {
         relays,
@@ -73,9 +64,6 @@ fn row(relays: u16, draws: u32) -> Result<Row, FigureError> {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let relays: Vec<u16> = (1..=MOST_RELAYS).collect();
     let rows = data(&relays, DRAWS)?;

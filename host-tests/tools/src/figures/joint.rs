@@ -7,10 +7,9 @@ use uav_relay::{Local, Method, Schedule};
 use super::adjust::adjusted;
 use super::altitude::best_common;
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::flight::fly;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
+use super::walk::fly;
 
 /// Numbers of relays.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
@@ -22,34 +21,27 @@ const OFFSET_M: f64 = 150.0;
 
 /// Results for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Number of relays.
-    pub relays: u16,
-    /// Best common altitude, m.
-    pub common_altitude_m: f64,
+struct Row {
+    relays: u16,
+    common_altitude_m: f64,
     /// SIR at the best common altitude by Algorithm 1, linear.
-    pub common_sir_linear: f64,
+    common_sir_linear: f64,
     /// SIR after Algorithm 2 from there, linear.
-    pub adjust_sir_linear: f64,
+    adjust_sir_linear: f64,
     /// Messages of both algorithms together.
-    pub adjust_messages: u64,
+    adjust_messages: u64,
     /// SIR of the joint method, linear.
-    pub joint_sir_linear: f64,
-    /// Passes of the joint method.
-    pub joint_passes: u32,
-    /// Messages of the joint method.
-    pub joint_messages: u64,
+    joint_sir_linear: f64,
+    joint_passes: u32,
+    joint_messages: u64,
     /// Gain of Algorithm 2 over the common altitude, percent.
-    pub adjust_gain_percent: f64,
+    adjust_gain_percent: f64,
     /// Gain of the joint method over the common altitude, percent.
-    pub joint_gain_percent: f64,
+    joint_gain_percent: f64,
 }
 
 /// Returns the results for these numbers of relays, with at most `rounds` rounds of Algorithm 2.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(relays: &[u16], rounds: u16) -> Result<Vec<Row>, FigureError> {
+fn data(relays: &[u16], rounds: u16) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
         .map(|&relays| row(relays, rounds))
@@ -76,9 +68,6 @@ fn row(relays: u16, rounds: u16) -> Result<Row, FigureError> {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS, ROUNDS)?;
     let line = |name: &str, index: usize, value: fn(&Row) -> f64| {

@@ -5,9 +5,8 @@ use uav_relay::Mission;
 use uav_relay::planning::single::theorems::equal_altitudes;
 
 use super::chart::{Axis, Chart, Line, Look};
-use super::error::FigureError;
 use super::paper;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
 /// Power of Tx, W, and position of the interferer, m, for each line.
@@ -25,25 +24,18 @@ const FINENESS: u8 = 20;
 
 /// Equal-SIR altitudes at one position, with one interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Power of Tx, W.
-    pub tx_w: f64,
-    /// Position of the interferer along x, m.
-    pub interferer_x_m: f64,
-    /// Lateral offset of the interferer, m.
-    pub interferer_y_m: f64,
-    /// Position of the relay, m from Tx.
-    pub x_m: f32,
+struct Row {
+    tx_w: f64,
+    interferer_x_m: f64,
+    interferer_y_m: f64,
+    x_m: f32,
     /// Lower altitude of equal SIR, m, if any.
-    pub lower_altitude_m: Option<f32>,
+    lower_altitude_m: Option<f32>,
     /// Upper altitude of equal SIR, m, if any.
-    pub upper_altitude_m: Option<f32>,
+    upper_altitude_m: Option<f32>,
 }
 
 /// Returns the mission of one relay of 1 W.
-///
-/// # Errors
-/// [`FigureError::Mission`].
 pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, FigureError> {
     let scenario = Scenario {
         distance_m: DISTANCE_M,
@@ -54,10 +46,7 @@ pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, FigureE
 }
 
 /// Returns the altitudes at `per_m` positions per metre from Tx to Rx.
-///
-/// # Errors
-/// [`FigureError::Mission`].
-pub fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
+fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for choice in CHOICES {
         let mission = mission(choice)?;
@@ -82,9 +71,6 @@ pub fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(FINENESS)?;
     let mut lines = Vec::new();

@@ -6,16 +6,15 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | [`locus`], [`single`], [`single_gains`], [`single_sheet`], [`aside`] | one relay |
+//! | [`locus`], [`single`], [`aside`] | one relay |
 //! | [`fewest`], [`convergence`], [`gain`], [`cost`] | chains at one altitude |
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
 //! | [`sensing`] | an unknown interferer |
 //! | [`paper`] | the paper's scenarios, as missions |
-//! | [`walk`], [`flight`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
-//! | [`chart`], [`scale`], [`draw`] | a chart, its axes, its SVG |
-//! | [`sheet`], [`page`] | a figure with its tables and text; the page of all figures |
-//! | [`error`] | errors |
+//! | [`walk`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
+//! | [`chart`], [`draw`] | a chart, its axes, its SVG |
+//! | [`sheet`] | a figure with its tables and text; the page of all figures; errors |
 
 pub mod adjust;
 pub mod altitude;
@@ -25,26 +24,18 @@ pub mod chart;
 pub mod convergence;
 pub mod cost;
 pub mod draw;
-pub mod error;
 pub mod fewest;
-pub mod flight;
 pub mod gain;
 pub mod joint;
 pub mod locus;
-pub mod page;
 pub mod paper;
-pub mod scale;
 pub mod sensing;
 pub mod sheet;
-mod signs;
 pub mod single;
-pub mod single_gains;
-pub mod single_sheet;
 pub mod stochastic;
 pub mod walk;
 
-use error::FigureError;
-use sheet::Sheet;
+use sheet::{FigureError, Sheet};
 
 /// A figure.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +49,7 @@ pub struct Figure {
 /// The figures in the order of the paper, then this project's own.
 pub const ALL: [Figure; 16] = [
     figure("locus", locus::sheet),
-    figure("single", single_sheet::sheet),
+    figure("single", single::sheet),
     figure("fewest-by-place", fewest::by_place_sheet),
     figure("fewest-by-power", fewest::by_power_sheet),
     figure("convergence", convergence::sheet),

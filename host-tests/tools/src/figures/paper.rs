@@ -2,9 +2,8 @@
 
 use uav_relay::Mission;
 
-use super::error::FigureError;
-use uav_relay_scenario::mission;
-use uav_relay_scenario::{Interference, Scenario, Source};
+use super::sheet::FigureError;
+use uav_relay_scenario::{Interference, Scenario, Source, mission};
 
 /// Relative target tolerance for chains computed without messages: ten times the resolution of an f32.
 pub(super) const FINE: f64 = 1e-6;
@@ -46,17 +45,11 @@ pub fn with_interferer(scenario: Scenario, x_m: f64, y_m: f64) -> Scenario {
 }
 
 /// Returns the mission of `relays` relays in `scenario`, for a chain computed without messages.
-///
-/// # Errors
-/// [`FigureError::Mission`].
 pub fn mission(scenario: &Scenario, relays: u16) -> Result<Mission, FigureError> {
     Ok(mission::mission(scenario, relays, FINE)?.0)
 }
 
 /// Returns the mission of `relays` relays in `scenario`, for a simulated chain.
-///
-/// # Errors
-/// [`FigureError::Mission`].
 pub fn flown(scenario: &Scenario, relays: u16) -> Result<Mission, FigureError> {
     Ok(mission::mission(scenario, relays, FLOWN)?.0)
 }

@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
-use crate::listening::found::{self, LAST, hypothetical, quantile, shadowed, shares, unknown};
-use crate::listening::moving::{self, mean};
-use crate::listening::scene::RandomScene;
+use super::sheet::{FigureError, Sheet, Table};
+use crate::listening::{
+    LAST, RandomScene, Shares, hypothetical, mean, moving_shares, quantile, shadowed, shares,
+    unknown,
+};
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Random scenes per line.
@@ -20,30 +20,26 @@ pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
 /// Share of the optimum after a number of agreements.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Found {
-    /// Name of the kind of scene.
-    pub scene: &'static str,
-    /// Number of relays.
-    pub relays: u16,
+struct Found {
+    scene: &'static str,
+    relays: u16,
     /// Number of agreements based on measurements.
-    pub agreements: usize,
+    agreements: usize,
     /// Median over the scenes of the share of the optimum, linear.
-    pub median_linear: f64,
+    median_linear: f64,
     /// Share that nine of ten scenes reach, linear.
-    pub tenth_linear: f64,
+    tenth_linear: f64,
 }
 
 /// Mean share of the optimum for one speed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Followed {
-    /// Number of relays.
-    pub relays: u16,
-    /// Speed of the interferer, m/s.
-    pub speed_mps: f64,
+struct Followed {
+    relays: u16,
+    speed_mps: f64,
     /// Mean ratio to the optimum at the same moment, for the chain that tracks the interferer.
-    pub followed_linear: f64,
+    followed_linear: f64,
     /// Mean ratio to the optimum at the same moment, for the chain that keeps its first positions.
-    pub stayed_linear: f64,
+    stayed_linear: f64,
 }
 
 type Run = fn(&RandomScene) -> Result<Setup, FigureError>;
@@ -59,13 +55,10 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
 ];
 
 /// Returns the share by agreement, in `scenes` scenes each.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
+fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
-        let each: found::Shares = shares(scenes, relays, sources, run)?;
+        let each: Shares = shares(scenes, relays, sources, run)?;
         for (agreements, mut shares) in each.into_iter().enumerate() {
             rows.push(Found {
                 scene: what,
@@ -80,14 +73,11 @@ pub fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
 }
 
 /// Returns the share by speed, in `scenes` scenes each.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
+fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {
         for speed_mps in SPEEDS_MPS {
-            let shares = moving::shares(scenes, relays, speed_mps)?;
+            let shares = moving_shares(scenes, relays, speed_mps)?;
             rows.push(Followed {
                 relays,
                 speed_mps,
@@ -100,9 +90,6 @@ pub fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {

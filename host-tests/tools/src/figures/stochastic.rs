@@ -6,8 +6,7 @@ use serde::Serialize;
 use uav_relay::Mission;
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
-use super::error::FigureError;
-use super::sheet::{Sheet, Table};
+use super::sheet::{FigureError, Sheet, Table};
 use super::{convergence, paper, walk};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 
@@ -36,32 +35,26 @@ pub enum Kind {
 
 /// Expected SIR of a chain after one sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Row {
-    /// Kind of field.
-    pub field: Kind,
-    /// Number of relays.
-    pub relays: u16,
-    /// Number of the sweep, from 1.
-    pub sweep: u32,
+struct Row {
+    field: Kind,
+    relays: u16,
+    sweep: u32,
     /// Target expected SIR of every hop, linear.
-    pub target_linear: f32,
+    target_linear: f32,
     /// Expected SIR of the worst hop, linear.
-    pub sir_linear: f64,
+    sir_linear: f64,
 }
 
 /// A point of the field.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct PointRow {
-    /// Kind of field.
-    pub field: Kind,
-    /// Position, m from Tx.
-    pub x_m: f64,
+struct PointRow {
+    field: Kind,
+    x_m: f64,
     /// First shape parameter of the Beta distribution of I / `I_max`.
-    pub alpha: f64,
-    /// Second shape parameter.
-    pub beta: f64,
+    alpha: f64,
+    beta: f64,
     /// Largest interference power, W.
-    pub i_max_w: f64,
+    i_max_w: f64,
 }
 
 /// Returns Lambda, W: the power that a relay receives from 1 W right below it.
@@ -71,10 +64,7 @@ fn lambda_w(mission: &Mission) -> f64 {
 }
 
 /// Returns the points of the field.
-///
-/// # Errors
-/// [`FigureError::Mission`].
-pub fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
+fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
     // Upsilon = (1 + beta / (alpha - 1)) / I_max is `part` / Lambda.
@@ -95,9 +85,6 @@ pub fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
 }
 
 /// Returns the mission of `relays` relays in the field.
-///
-/// # Errors
-/// [`FigureError::Mission`].
 pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     let points = field(kind)?;
     let spec = Field {
@@ -119,10 +106,7 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
 }
 
 /// Returns the sweeps of both fields for these numbers of relays, until each chain settles.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
+fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
         for &relays in relays {
@@ -193,9 +177,6 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
 }
 
 /// Returns the figure.
-///
-/// # Errors
-/// Never in practice: see [`FigureError`].
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let panel = |heading: &str, field: Kind| Panel {

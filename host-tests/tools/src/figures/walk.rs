@@ -1,14 +1,16 @@
 //! A whole chain computed without messages, by the functions that relays use for one hop each.
 
-use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::TARGETS;
 use uav_relay::optimiser::pass::{Behind, Link, close};
-use uav_relay::optimiser::plan;
 use uav_relay::optimiser::search::Search;
-use uav_relay::{Heading, Mission, Placement, Profile, Schedule};
-
-use super::error::FigureError;
+use uav_relay::optimiser::{PerTarget, plan};
+use uav_relay::{Heading, Method, Mission, Placement, Profile, Schedule};
 use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::simulator::chain;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
+
+use super::sheet::FigureError;
 
 /// Positions of identical relays.
 #[derive(Clone, PartialEq, Debug)]
@@ -72,9 +74,6 @@ pub struct Sweep {
 }
 
 /// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles. `step` is in linear SIR.
-///
-/// # Errors
-/// [`FigureError::Unsettled`] if no target is met.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -116,9 +115,6 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
 }
 
 /// Returns the chain that the relays of `mission` agree on by Algorithm 1 (Algorithm 4 in a field).
-///
-/// # Errors
-/// [`FigureError::Unsettled`] if no target is met.
 pub fn settled(mission: &Mission) -> Result<Chain, FigureError> {
     let common = |_| mission.config().common;
     let agreed = plan::solve(mission, Schedule::Bracketed, common)?;
@@ -143,4 +139,48 @@ pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
         .collect();
     let sirs = hop_sirs(mission, &standing);
     sirs.into_iter().reduce(f64::min).unwrap_or(0.0)
+}
+
+/// Result of a settled chain.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Flown {
+    /// Positions from Tx to Rx.
+    pub places: Vec<Placement>,
+    /// SIR of the worst hop, linear.
+    pub sir: f64,
+    /// SIR before Algorithm 2 and after each of its rounds, linear.
+    pub rounds: Vec<f32>,
+    /// Passes along the chain.
+    pub sweeps: u32,
+    /// Frames sent on all links.
+    pub messages: u64,
+    /// Bytes sent on all links.
+    pub bytes: u64,
+}
+
+/// Simulates `mission` until it settles; `predict` lets the leader first solve the chain itself.
+pub fn fly(
+    mission: &Mission,
+    method: Method,
+    schedule: Schedule,
+    predict: bool,
+) -> Result<Flown, FigureError> {
+    let mut setup = Setup::new(*mission);
+    setup.settings.method = method;
+    setup.settings.schedule = schedule;
+    setup.settings.predict = predict;
+    let outcome: Outcome = chain::run(setup)?;
+    let places: Option<Vec<Placement>> =
+        outcome.relays.iter().map(|relay| relay.setpoint).collect();
+    match places {
+        Some(places) if outcome.ending == Ending::Settled => Ok(Flown {
+            sir: worst(mission, &places),
+            places,
+            rounds: outcome.rounds,
+            sweeps: outcome.sweeps,
+            messages: outcome.messages,
+            bytes: outcome.bytes,
+        }),
+        _ => Err(FigureError::Unsettled("a simulated chain")),
+    }
 }

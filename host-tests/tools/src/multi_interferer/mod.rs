@@ -8,14 +8,8 @@
 //! All values are f64 in SI units, x along the ground from Tx (0) to Rx (D), y to the right; SIRs are linear. No relay is behind
 //! its predecessor. All chains except polished ones are above the line (y = 0).
 
-mod altitude;
-mod crossing;
-mod line;
 mod optimum;
 mod polish;
-mod spans;
-mod stages;
 
-pub use altitude::best_common_altitude;
-pub use optimum::{Chain, optimum};
+pub use optimum::{Chain, best_common_altitude, optimum};
 pub use polish::{Polished, polish};

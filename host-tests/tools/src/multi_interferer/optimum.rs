@@ -1,8 +1,6 @@
 //! The best chain against the true sum of the interference, for relays at one fixed altitude.
 
-use super::line::Line;
-use super::spans::Span;
-use super::stages::Stages;
+use uav_relay_scenario::hypothetical::{Centre, graded};
 use uav_relay_scenario::scene::Scene;
 
 /// Relative bracket width at which the bisection of the target ends.
@@ -106,4 +104,503 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
         }
     }
     Some(below)
+}
+
+/// Number of scanned altitudes with equal spacing; as many again have equal ratios.
+const SCANNED: u32 = 24;
+
+const TOPS: usize = 3;
+
+/// Golden-section steps per refined maximum. The interval shrinks by about 5e-6, the loss in SIR by its square.
+const STEPS: u32 = 25;
+
+const COMMON_TOLERANCE: f64 = 1e-11;
+
+/// Returns the best chain whose relays share one altitude of the band. Never worse than at either end of the band.
+///
+/// Scans the band and refines the three highest maxima; a narrower maximum between scanned altitudes may be missed. `None` as for
+/// [`optimum`](super::optimum()), if a relay has a fixed altitude of its own, and for an empty band. Work: about 120 optima.
+pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
+    let band = scene.band;
+    if scene.relays.iter().any(|relay| relay.holds) || !(band.least_m <= band.most_m) {
+        return None;
+    }
+    let reached = |h: f64| best_at_altitude(scene, h, COMMON_TOLERANCE).unwrap_or(0.0);
+    let scanned: Vec<(f64, f64)> = altitudes(band.least_m, band.most_m)
+        .into_iter()
+        .map(|h| (h, reached(h)))
+        .collect();
+    let mut tops: Vec<(f64, f64, f64)> = Vec::new();
+    for (at, &(h, sir)) in scanned.iter().enumerate() {
+        let left = at.checked_sub(1).and_then(|at| scanned.get(at));
+        let right = scanned.get(at + 1);
+        let is_top = [left, right]
+            .into_iter()
+            .flatten()
+            .all(|side| side.1 <= sir);
+        if is_top {
+            let end = |side: Option<&(f64, f64)>| side.map_or(h, |side| side.0);
+            tops.push((sir, end(left), end(right)));
+        }
+    }
+    tops.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let refined = tops
+        .iter()
+        .take(TOPS)
+        .map(|&(_, low, high)| golden(low, high, STEPS, reached));
+    let best = scanned
+        .iter()
+        .copied()
+        .chain(refined)
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    at_altitude(scene, best.0)
+}
+
+/// Returns the altitudes of the scan in rising order; a single one if the band is a point.
+fn altitudes(least: f64, most: f64) -> Vec<f64> {
+    let shares = (0..=SCANNED).map(|i| f64::from(i) / f64::from(SCANNED));
+    let mut altitudes: Vec<f64> = shares
+        .flat_map(|share| {
+            [
+                least + share * (most - least),
+                least * (most / least).powf(share),
+            ]
+        })
+        .map(|h| h.clamp(least, most))
+        .collect();
+    altitudes.sort_by(f64::total_cmp);
+    altitudes.dedup();
+    altitudes
+}
+
+/// Returns the best argument of a golden-section search on [`low`, `high`], and the value there.
+pub(super) fn golden(
+    mut low: f64,
+    mut high: f64,
+    steps: u32,
+    f: impl Fn(f64) -> f64,
+) -> (f64, f64) {
+    let ratio = (5_f64.sqrt() - 1.0) / 2.0;
+    let at = |x: f64| (x, f(x));
+    let (mut a, mut b) = (
+        at(high - ratio * (high - low)),
+        at(low + ratio * (high - low)),
+    );
+    for _ in 0..steps {
+        if a.1 < b.1 {
+            (low, a) = (a.0, b);
+            b = at(low + ratio * (high - low));
+        } else {
+            (high, b) = (b.0, a);
+            a = at(high - ratio * (high - low));
+        }
+    }
+    if a.1 < b.1 { b } else { a }
+}
+
+// Exact sets of positions from which each relay's part of the chain can reach Rx. They belong to one target SIR and altitude.
+//
+// For a receiver at y the SIR of a hop depends only on its length, so the sender may be anywhere in [y - d(y), y - s]: d(y) the
+// hop range at the target, s the least separation. Backwards from Rx, the feasible positions of relay k are the union of these
+// intervals over those of relay k + 1. Over an interval of y with d(y) >= s this union is again an interval, from the least y -
+// d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
+// target can be bisected.
+
+/// A feasible hop: for a relay anywhere in `from`, some position of the next relay in `to` works.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    from: Span,
+    to: Span,
+    /// The receiver position in `to` with the farthest reach back.
+    farthest: f64,
+}
+
+struct Stage {
+    stride: Stride,
+    steps: Vec<Step>,
+}
+
+/// A target that every hop except the first can meet.
+pub(super) struct Stages<'a> {
+    line: &'a Line<'a>,
+    apart: f64,
+    target: f64,
+    /// Relays N - 1 down to 1.
+    before: Vec<Stage>,
+    /// Positions of relay 1 that are feasible for the hops after it.
+    first: Vec<Span>,
+}
+
+/// Hop ranges for one stride, computed once for consecutive relays of equal power.
+struct Reach {
+    stride: Stride,
+    hearing: Vec<Span>,
+    minima: Vec<f64>,
+}
+
+impl<'a> Stages<'a> {
+    /// Computes the sets for `target` (linear, > 0) and a separation of `apart` metres. `None` if one is empty.
+    ///
+    /// Work: a scan of the line's nodes for every change of power along the chain, and a few intervals per relay.
+    pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
+        let (last, others) = line.scene.relays.split_last()?;
+        let mut spans = vec![Span {
+            low: line.last_from(last.power_w, target)?,
+            high: line.scene.distance_m,
+        }];
+        let mut stages = Vec::with_capacity(others.len());
+        let mut reach: Option<Reach> = None;
+        for relay in others.iter().rev() {
+            let stride = line.stride(relay.power_w, target);
+            let reach = match reach.take().filter(|reach| reach.stride == stride) {
+                Some(same) => reach.insert(same),
+                None => reach.insert(Reach {
+                    stride,
+                    hearing: line.hearing(stride, apart),
+                    minima: line.far_receivers(stride),
+                }),
+            };
+            let steps = steps(line, reach, &spans, apart);
+            spans = merged(steps.iter().map(|step| step.from).collect());
+            if spans.is_empty() {
+                return None;
+            }
+            stages.push(Stage { stride, steps });
+        }
+        Some(Self {
+            line,
+            apart,
+            target,
+            before: stages,
+            first: spans,
+        })
+    }
+
+    /// Returns true if the first hop meets the target as well.
+    pub(super) fn is_met(&self) -> bool {
+        let best = self.line.best_first(&self.first);
+        best.is_some_and(|x| self.line.first_sir(x) >= self.target)
+    }
+
+    /// Returns a chain that meets the target if [`Stages::is_met`], rising in x. `None` if the sets are not connected.
+    ///
+    /// Each relay is as near to an even division of the remaining distance as the target allows.
+    pub(super) fn chain(&self) -> Option<Vec<f64>> {
+        let d = self.line.scene.distance_m;
+        let mut hops = self.before.len() as f64 + 2.0;
+        let mut x = self.first_place(d / hops)?;
+        let mut places = vec![x];
+        for stage in self.before.iter().rev() {
+            hops -= 1.0;
+            x = self.next_place(stage, x, x + (d - x) / hops)?;
+            places.push(x);
+        }
+        Some(places)
+    }
+
+    fn first_place(&self, wish: f64) -> Option<f64> {
+        let best = self.line.best_first(&self.first)?;
+        let span = self.first.iter().find(|span| span.contains(best))?;
+        Some(toward(best, wish.clamp(span.low, span.high), |x| {
+            self.line.first_sir(x) >= self.target
+        }))
+    }
+
+    /// Returns the position of the next relay nearest to `wish` that hears a relay at `x`.
+    fn next_place(&self, stage: &Stage, x: f64, wish: f64) -> Option<f64> {
+        let steps = stage.steps.iter().filter(|step| step.from.contains(x));
+        let places = steps.map(|step| {
+            let near = x + self.apart;
+            // `sure` hears x: either it is close enough, or it is the position with the farthest reach back.
+            let sure = step.farthest.max(near).min(step.to.high);
+            let wish = wish.clamp(step.to.low.max(near).min(sure), step.to.high);
+            toward(sure, wish, |y| self.line.heard_from(stage.stride, y) <= x)
+        });
+        places.min_by(|a, b| (a - wish).abs().total_cmp(&(b - wish).abs()))
+    }
+}
+
+/// Returns the positions from which the next relay, somewhere in `spans`, can be reached.
+fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
+    let receivers = common(spans, &reach.hearing);
+    receivers
+        .into_iter()
+        .filter_map(|to| {
+            let inside = reach.minima.iter().filter(|&&y| to.contains(y));
+            let (farthest, least) = [to.low, to.high]
+                .iter()
+                .chain(inside)
+                .map(|&y| (y, line.heard_from(reach.stride, y)))
+                .min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let from = Span {
+                low: least.max(0.0),
+                high: to.high - apart,
+            };
+            (from.low <= from.high).then_some(Step { from, to, farthest })
+        })
+        .collect()
+}
+
+/// Returns `wish` if `holds` is true there. Otherwise returns the last such point on the way from `sure`, where it is true.
+fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    if holds(wish) {
+        wish
+    } else {
+        boundary(sure, wish, holds)
+    }
+}
+
+/// Cell width relative to the distance to the nearest source.
+const STEP: f64 = 0.02;
+
+const CELLS: f64 = 500.0;
+
+/// Line above the ground at one altitude. Its samples catch every turn of the interference.
+pub(super) struct Line<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) altitude_m: f64,
+    nodes: Vec<f64>,
+    /// Quiet r = (I + N)^(-1/2) at the nodes, W^(-1/2).
+    quiet: Vec<f64>,
+    slope: Vec<f64>,
+    tops: Vec<f64>,
+}
+
+/// Hop range at some target SIR, per unit of quiet at the receiver: range = `stride` times quiet, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stride(f64);
+
+impl<'a> Line<'a> {
+    pub(super) fn new(scene: &'a Scene, altitude_m: f64) -> Self {
+        let mut centres: Vec<Centre> = scene
+            .sources
+            .iter()
+            .map(|source| Centre {
+                at: source.x_m,
+                width: source.y_m.hypot(altitude_m),
+            })
+            .collect();
+        centres.push(Centre {
+            at: 0.0,
+            width: altitude_m,
+        });
+        let d = scene.distance_m;
+        let nodes = graded(0.0, d, &centres, STEP, d / CELLS);
+        let mut line = Self {
+            scene,
+            altitude_m,
+            nodes,
+            quiet: Vec::new(),
+            slope: Vec::new(),
+            tops: Vec::new(),
+        };
+        let sampled = line.nodes.iter().map(|&x| line.quiet_and_slope(x));
+        (line.quiet, line.slope) = sampled.unzip();
+        let rises: Vec<f64> = line.nodes.iter().map(|&x| line.first_rise(x)).collect();
+        let turns = crossings(&line.nodes, &rises, 0.0, |x| line.first_rise(x));
+        line.tops = falling(&turns);
+        line
+    }
+
+    fn quiet_and_slope(&self, x: f64) -> (f64, f64) {
+        let (mut power, mut change) = (self.scene.noise_w, 0.0);
+        for source in &self.scene.sources {
+            let dx = x - source.x_m;
+            let squared = dx * dx + source.y_m * source.y_m + self.altitude_m * self.altitude_m;
+            let received = source.power_w / (self.scene.eta * squared);
+            power += received;
+            change -= received * 2.0 * dx / squared;
+        }
+        let quiet = 1.0 / power.sqrt();
+        (quiet, -0.5 * quiet * change / power)
+    }
+
+    /// Returns half the relative slope of the first hop's SIR at `x`, 1/m.
+    fn first_rise(&self, x: f64) -> f64 {
+        let (quiet, slope) = self.quiet_and_slope(x);
+        slope / quiet - x / (x * x + self.altitude_m * self.altitude_m)
+    }
+
+    pub(super) fn first_sir(&self, x: f64) -> f64 {
+        self.scene.sir_at(self.scene.tx(), (x, self.altitude_m))
+    }
+
+    /// Returns the position in `spans` with the best first hop; `None` if there are no spans.
+    pub(super) fn best_first(&self, spans: &[Span]) -> Option<f64> {
+        let ends = spans.iter().flat_map(|span| [span.low, span.high]);
+        let inside = |x: &&f64| spans.iter().any(|span| span.contains(**x));
+        ends.chain(self.tops.iter().filter(inside).copied())
+            .max_by(|&a, &b| self.first_sir(a).total_cmp(&self.first_sir(b)))
+    }
+
+    /// Returns the stride of a relay with `power_w` watts at `target` (linear, > 0).
+    pub(super) fn stride(&self, power_w: f64, target: f64) -> Stride {
+        Stride((power_w / (self.scene.mu_los * target)).sqrt())
+    }
+
+    /// Returns the sender position nearest to Tx that a receiver at `x` still hears; may lie behind Tx.
+    pub(super) fn heard_from(&self, stride: Stride, x: f64) -> f64 {
+        x - stride.0 * self.quiet_and_slope(x).0
+    }
+
+    /// Returns the local minima of [`Line::heard_from`] inside the line.
+    pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
+        // The slope of `heard_from` is 1 - stride x slope of the quiet.
+        let level = 1.0 / stride.0;
+        falling(&crossings(&self.nodes, &self.slope, level, |x| {
+            self.quiet_and_slope(x).1
+        }))
+    }
+
+    /// Returns the receiver positions whose hop range is at least `apart` metres (>= 0).
+    pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
+        let level = apart / stride.0;
+        let turns = crossings(&self.nodes, &self.quiet, level, |x| {
+            self.quiet_and_slope(x).0
+        });
+        let hears = |x: f64| self.quiet_and_slope(x).0 >= level;
+        let mut spans = Vec::new();
+        let mut low = hears(0.0).then_some(0.0);
+        for turn in turns {
+            if turn.rising {
+                low = Some(turn.at);
+            } else if let Some(low) = low.take() {
+                spans.push(Span { low, high: turn.at });
+            }
+        }
+        let high = self.scene.distance_m;
+        spans.extend(low.map(|low| Span { low, high }));
+        spans
+    }
+
+    /// Returns the position nearest to Tx at which the last relay meets `target` at Rx. The relay has `power_w` watts; `target` is
+    /// linear and above 0.
+    ///
+    /// At least 0; `None` if the target is missed even above Rx.
+    pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
+        let scene = self.scene;
+        let squared = power_w / (scene.eta * target * (scene.interference_rx_w() + scene.noise_w));
+        let across = squared - self.altitude_m * self.altitude_m;
+        (across >= 0.0).then(|| (scene.distance_m - across.sqrt()).max(0.0))
+    }
+}
+
+/// Returns the falling crossings. Maxima of the integral, or points where the function drops below the level.
+fn falling(turns: &[Crossing]) -> Vec<f64> {
+    let falling = turns.iter().filter(|turn| !turn.rising);
+    falling.map(|turn| turn.at).collect()
+}
+
+/// The interval [low, high]; a point where they are equal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+impl Span {
+    pub(super) fn contains(&self, x: f64) -> bool {
+        (self.low..=self.high).contains(&x)
+    }
+}
+
+/// Returns the union of `spans` as disjoint intervals in rising order.
+pub(super) fn merged(mut spans: Vec<Span>) -> Vec<Span> {
+    spans.sort_by(|a, b| a.low.total_cmp(&b.low));
+    let mut union: Vec<Span> = Vec::with_capacity(spans.len());
+    for span in spans {
+        match union.last_mut() {
+            Some(last) if span.low <= last.high => last.high = last.high.max(span.high),
+            _ => union.push(span),
+        }
+    }
+    union
+}
+
+/// Returns the intersection of two lists of disjoint intervals in rising order.
+pub(super) fn common(a: &[Span], b: &[Span]) -> Vec<Span> {
+    let pairs = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
+    pairs
+        .map(|(a, b)| Span {
+            low: a.low.max(b.low),
+            high: a.high.min(b.high),
+        })
+        .filter(|span| span.low <= span.high)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Span, common, merged};
+
+    fn spans(ends: &[(f64, f64)]) -> Vec<Span> {
+        ends.iter().map(|&(low, high)| Span { low, high }).collect()
+    }
+
+    #[test]
+    fn overlaps_and_touches_are_merged() {
+        let union = merged(spans(&[(4.0, 5.0), (0.0, 3.0), (1.0, 2.0), (5.0, 6.0)]));
+        assert_eq!(union, spans(&[(0.0, 3.0), (4.0, 6.0)]));
+        assert_eq!(merged(Vec::new()), Vec::new());
+    }
+
+    #[test]
+    fn points_may_be_common() {
+        let (a, b) = (
+            spans(&[(0.0, 2.0), (3.0, 9.0)]),
+            spans(&[(2.0, 4.0), (8.0, 8.0)]),
+        );
+        assert_eq!(common(&a, &b), spans(&[(2.0, 2.0), (3.0, 4.0), (8.0, 8.0)]));
+    }
+}
+
+/// Bisection steps: more than enough to collapse any f64 interval in metres to adjacent numbers.
+const HALVINGS: u32 = 200;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Crossing {
+    pub(super) at: f64,
+    /// True if the function is below the level before the crossing and not below it after.
+    pub(super) rising: bool,
+}
+
+/// Returns the crossings of `level` by `exact` in rising order. `values` are those at the rising `nodes`.
+///
+/// Two crossings within one cell are missed. Work: about 60 evaluations per crossing.
+pub(super) fn crossings(
+    nodes: &[f64],
+    values: &[f64],
+    level: f64,
+    exact: impl Fn(f64) -> f64,
+) -> Vec<Crossing> {
+    let samples = nodes.iter().zip(values);
+    let cells = samples.clone().zip(samples.skip(1));
+    cells
+        .filter(|((_, left), (_, right))| (**left < level) != (**right < level))
+        .map(|((&low, &left), (&high, _))| {
+            let below = left < level;
+            Crossing {
+                at: boundary(low, high, |x| (exact(x) < level) == below),
+                rising: below,
+            }
+        })
+        .collect()
+}
+
+/// Returns the last point from `inside` towards `outside` at which `holds` is still true. Either direction.
+///
+/// `holds` must be true at `inside` and false at `outside`; if it changes more than once, one of the changes is found.
+pub(super) fn boundary(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = inside.midpoint(outside);
+        if middle.total_cmp(&inside).is_eq() || middle.total_cmp(&outside).is_eq() {
+            break;
+        }
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
 }

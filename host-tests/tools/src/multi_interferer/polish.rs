@@ -4,9 +4,8 @@
 //! to maximise the worse of the two; passes along the chain and back spread the gain. The search improves an approximate
 //! placement but cannot move the chain to the other side of an interferer.
 
-use super::altitude::golden;
-use uav_relay_scenario::scene::Corridor;
-use uav_relay_scenario::scene::{Place, Relay, Scene, Sender};
+use super::optimum::golden;
+use uav_relay_scenario::scene::{Corridor, Place, Relay, Scene, Sender};
 
 const ROUNDS: u32 = 200;
 

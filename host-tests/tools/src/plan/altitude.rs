@@ -11,9 +11,7 @@ use uav_relay::optimiser::spacing::Stand;
 use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
-use super::found::{NoPlan, Plan, Why};
-use super::profiles::ProfiledMission;
-use super::source;
+use super::{NoPlan, Plan, ProfiledMission, Why, source};
 use uav_relay_scenario::Scenario;
 
 type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;

@@ -2,36 +2,28 @@
 //!
 //! | interference | file |
 //! | --- | --- |
-//! | one interferer | `one`, `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
-//! | a field | `field`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
-//! | several interferers | `several`: the hypothetical interferer, or the true sum where that is not good enough |
+//! | one interferer | `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
+//! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
+//! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
 //!
 //! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
 //! optimal.
 
 mod altitude;
-mod cases;
-mod field;
 pub mod flown;
-mod found;
 pub mod map;
 mod multi_interferer;
-pub mod noise;
-mod one;
-mod profiles;
 pub mod rate;
 pub mod report;
-mod request;
 mod source;
-pub mod stored_plan;
-mod unit;
 
-use uav_relay_scenario::{Interference, Scenario};
+use uav_relay::{Mission, Placement, Profile};
+use uav_relay_scenario::hypothetical::Hypothetical;
+use uav_relay_scenario::mission::Refusal;
+use uav_relay_scenario::{Interference, Scenario, mission};
+use uav_relay_sim::report::hop_sirs;
 
 pub use altitude::solved;
-pub use found::{Fitted, LOSS, NoPlan, Plan, Theorem, Why};
-pub use request::{Number, PlanRequest};
-pub use unit::Unit;
 
 /// Plans `ask` in `scenario`.
 ///
@@ -42,11 +34,11 @@ pub use unit::Unit;
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     match &scenario.interference {
-        Interference::Field(_) => field::plan(scenario, ask),
+        Interference::Field(_) => source::plan_in_field(scenario, ask),
         Interference::Sources(sources) if sources.len() > 1 => {
             multi_interferer::plan(scenario, ask)
         }
-        Interference::Sources(_) => one::plan(scenario, ask),
+        Interference::Sources(_) => source::plan(scenario, ask),
     }
 }
 
@@ -65,4 +57,254 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
         return Ok(());
     };
     Err(NoPlan::Wrong(wrong))
+}
+
+/// Requested number of relays.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Number {
+    /// A given number, 1 to 1000: the plan has their best positions.
+    Of(u16),
+    /// The fewest that give every hop this SIR, linear, above 0.
+    Meeting(f64),
+}
+
+/// Request to the planner.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlanRequest {
+    /// Number of relays.
+    pub number: Number,
+    /// True if altitudes may be chosen from the scenario's band.
+    pub free_altitude: bool,
+    /// Required x of the only relay, m, 0 to D; its altitude is then chosen from the band.
+    pub x_m: Option<f64>,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1.
+    pub tolerance: f64,
+}
+
+/// Tolerated loss of positions against the best ones, as a fraction of the SIR.
+pub const LOSS: f64 = 0.01;
+
+/// The theorem and case that placed the only relay.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Theorem {
+    /// 1 to 3; 4 for one relay beside the line, which is not in the paper.
+    pub number: u8,
+    /// Number of the case in the paper; 0 for a case that the paper omits.
+    pub case: u8,
+    /// Explanation of the case for the user.
+    pub words: String,
+}
+
+/// The hypothetical interferer that replaces several.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Fitted {
+    /// Power, position and error of the hypothetical interferer.
+    pub hypothetical: Hypothetical,
+    /// SIR (linear) against all interferers of the positions that are best against it. `None` if there are none.
+    pub sir: Option<f64>,
+    /// True if those positions are the plan's. Otherwise the plan's are the best found against all interferers.
+    pub kept: bool,
+}
+
+/// A plan: positions of the relays and their SIRs.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Plan {
+    /// Mission of the relays.
+    pub mission: Mission,
+    /// Positions and profiles, relay 1 first.
+    pub places: Vec<(Placement, Profile)>,
+    /// SIR (linear) of hops 1 to N + 1.
+    pub sirs: Vec<f64>,
+    /// Name of the algorithm that found the positions.
+    pub how: &'static str,
+    /// True if it is proven that no positions are better, or that no fewer relays suffice.
+    pub proven: bool,
+    /// Theorem that placed the only relay, if one did.
+    pub theorem: Option<Theorem>,
+    /// Best SIR (linear) of as many relays, if known; only for a target.
+    pub most: Option<f64>,
+    /// Present with several interferers.
+    pub fitted: Option<Fitted>,
+}
+
+/// Reason for which the request cannot be met.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Why {
+    /// An explanation.
+    Plain(String),
+    /// The target cannot be met by any number of relays.
+    Short {
+        /// Requested SIR, linear.
+        target: f64,
+        /// Best SIR found, linear.
+        most: f64,
+        /// Number of relays with the best SIR; `None` if more might do better.
+        relays: Option<u16>,
+    },
+}
+
+impl Why {
+    /// Returns the reason in one line, with SIRs in `unit`.
+    pub fn say(&self, unit: Unit) -> String {
+        match self {
+            Self::Plain(line) => line.clone(),
+            Self::Short {
+                target,
+                most,
+                relays,
+            } => {
+                let limit = Mission::MAX_RELAYS;
+                let (target, most) = (unit.asked(*target), unit.say(*most));
+                match relays {
+                    Some(relays) => format!(
+                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the most is {most}, with {relays}"
+                    ),
+                    None => format!(
+                        "no number of relays that was tried, up to {limit}, gives every hop an SIR of {target}: the most found is {most}"
+                    ),
+                }
+            }
+        }
+    }
+}
+
+impl Default for Why {
+    fn default() -> Self {
+        Self::Plain(String::new())
+    }
+}
+
+/// Reason for which there is no plan.
+#[derive(Clone, PartialEq, Debug)]
+pub enum NoPlan {
+    /// The scenario is not a valid mission, or the request does not fit it.
+    Wrong(String),
+    /// The request cannot be met; with the best SIR found (linear).
+    Unmet(Why, Option<f64>),
+}
+
+impl From<Refusal> for NoPlan {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::NoRoom { .. } => Self::Unmet(Why::Plain(refusal.to_string()), None),
+            other => Self::Wrong(other.to_string()),
+        }
+    }
+}
+
+impl Plan {
+    /// Returns the SIR (linear) of the worst hop.
+    pub fn sir(&self) -> f64 {
+        self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0)
+    }
+
+    fn chain(&self) -> Vec<Placement> {
+        self.places.iter().map(|(place, _)| *place).collect()
+    }
+}
+
+/// Largest number of relays while the number is not yet known.
+const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
+
+/// A mission, the relays' own profiles and the indices of relays with a fixed altitude.
+struct ProfiledMission {
+    mission: Mission,
+    own: Vec<(u16, Profile)>,
+    held: Vec<u16>,
+}
+
+impl ProfiledMission {
+    fn new(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Self, NoPlan> {
+        let (mission, own) = mission::mission(scenario, relays, tolerance)?;
+        Ok(Self {
+            mission,
+            own,
+            held: mission::held(scenario, relays),
+        })
+    }
+
+    fn profile(&self, index: u16) -> Profile {
+        self.own
+            .iter()
+            .find(|(at, _)| *at == index)
+            .map_or(self.mission.config().common, |(_, profile)| *profile)
+    }
+
+    fn level(&self) -> bool {
+        let common = self.mission.config().common;
+        self.own
+            .iter()
+            .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
+    }
+
+    /// Returns the plan with these positions; its SIRs are computed by the crate's own formulas.
+    fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
+        let held: Vec<(Placement, Profile)> = (1..)
+            .zip(places)
+            .map(|(index, place)| {
+                let profile = Profile {
+                    altitude_m: place.altitude_m,
+                    ..self.profile(index)
+                };
+                (*place, profile)
+            })
+            .collect();
+        Plan {
+            mission: self.mission,
+            sirs: hop_sirs(&self.mission, &held),
+            places: held,
+            how,
+            proven,
+            theorem: None,
+            most: None,
+            fitted: None,
+        }
+    }
+}
+
+/// Returns true if there is no least separation, or `is_as_good` says that removing it gains nothing.
+fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
+    let free = Scenario {
+        min_separation_m: 0.0,
+        ..scenario.clone()
+    };
+    !(scenario.min_separation_m > 0.0) || is_as_good(&free) == Some(true)
+}
+
+/// Unit of SIRs.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Unit {
+    /// Ratio of powers.
+    #[default]
+    Linear,
+    /// Decibels.
+    Decibels,
+}
+
+impl Unit {
+    /// Formats an SIR (linear) in this unit, rounded as a result.
+    pub fn say(self, sir: f64) -> String {
+        match self {
+            Self::Linear => format!("{sir:.6}"),
+            Self::Decibels => format!("{:.3} dB", 10.0 * sir.log10()),
+        }
+    }
+
+    /// Formats an SIR (linear) in this unit with all the digits of the request.
+    pub fn asked(self, sir: f64) -> String {
+        match self {
+            Self::Linear => format!("{sir}"),
+            // Rounds off the error of converting decibels to linear and back.
+            Self::Decibels => format!("{} dB", (10.0 * sir.log10() * 1e9).round() / 1e9),
+        }
+    }
+
+    /// Formats an SIR (linear) in both units, this one first.
+    pub fn both(self, sir: f64) -> String {
+        let sir_db = 10.0 * sir.log10();
+        match self {
+            Self::Linear => format!("SIR {sir:.6} ({sir_db:.3} dB)"),
+            Self::Decibels => format!("{sir_db:.3} dB (SIR {sir:.6})"),
+        }
+    }
 }

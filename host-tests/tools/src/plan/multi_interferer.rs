@@ -5,10 +5,10 @@
 
 use uav_relay::Placement;
 
-use super::found::{Fitted, LOSS, NoPlan, Plan, Why};
-use super::profiles::{MOST_RELAYS, ProfiledMission};
-use super::request::{Number, PlanRequest};
-use super::{altitude, one, source};
+use super::{
+    Fitted, LOSS, MOST_RELAYS, NoPlan, Number, Plan, PlanRequest, ProfiledMission, Why, altitude,
+    source,
+};
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
 use uav_relay_scenario::hypothetical::Hypothetical;
 use uav_relay_scenario::mission::{self, Refusal};
@@ -93,7 +93,7 @@ impl Planner<'_> {
             number: Number::Of(relays),
             ..*self.ask
         };
-        let by_one = match one::plan(&with_one(self.scenario, &self.hypothetical), &ask) {
+        let by_one = match source::plan(&with_one(self.scenario, &self.hypothetical), &ask) {
             Ok(plan) => {
                 let sir = scene.chain_sir(&plan.chain());
                 Some((plan, sir))

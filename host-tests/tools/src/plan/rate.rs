@@ -7,8 +7,7 @@
 use serde::Serialize;
 use uav_relay_scenario::{Interference, Scenario};
 
-use super::found::{NoPlan, Plan};
-use super::request::{Number, PlanRequest};
+use super::{NoPlan, Number, Plan, PlanRequest};
 
 /// Largest number of relays tried where a plan takes milliseconds.
 const MOST_FAST: u16 = 200;
@@ -62,9 +61,6 @@ impl Rates {
     /// Plans 1, 2, 3 and more relays. It ends when no larger number can carry more, or at the limit for a few seconds.
     ///
     /// `target_bps` is the wanted rate.
-    ///
-    /// # Errors
-    /// [`NoPlan`] if no number of relays has a plan.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,

@@ -3,14 +3,10 @@
 //! | file | content |
 //! | --- | --- |
 //! | [`config`] | block format, byte by byte; a crate of its own, shared with the firmware |
-//! | [`block`] | the block of one drone |
-//! | [`firmware`] | section `[network]` against what the firmware supports |
-//! | [`folder`] | the blocks of a whole flight: all of them, or none |
-//! | [`summary`] | `summary.txt`: the folder's content and the commands to flash it |
+//! | [`block`] | the block of one drone, and section `[network]` against what the firmware supports |
+//! | [`folder`] | the blocks of a whole flight: all of them, or none; with `summary.txt`, the commands to flash them |
 
 pub mod block;
-pub mod firmware;
 pub mod folder;
-pub mod summary;
 
 pub use uav_relay_block as config;

@@ -164,10 +164,10 @@ fn pictures_are_documents_whose_words_are_inside() {
 #[test]
 fn a_second_run_writes_the_same_bytes() {
     let dir = TempDir::new().unwrap();
-    let mut arguments = vec!["--out", dir.path().to_str().unwrap()];
-    for name in ["locus", "gain", "stochastic", "rounds"] {
-        arguments.extend(["--only", name]);
-    }
+    let arguments = format!(
+        "--out {} --only locus --only gain --only stochastic --only rounds",
+        dir.path().display()
+    );
     let output = figures(&arguments);
     assert!(output.status.success());
     let said = String::from_utf8(output.stdout).unwrap();
@@ -194,7 +194,7 @@ fn a_second_run_writes_the_same_bytes() {
 
 #[test]
 fn a_wrong_name_is_answered_with_the_right_ones() {
-    let output = figures(&["--only", "locus", "--only", "nothing"]);
+    let output = figures("--only locus --only nothing");
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty());
     let line = String::from_utf8(output.stderr).unwrap();
@@ -213,7 +213,7 @@ fn a_place_that_cannot_be_written_is_named() {
     let dir = TempDir::new().unwrap();
     let file = dir.path().join("file");
     fs::write(&file, "").unwrap();
-    let output = figures(&["--only", "beta", "--out", file.to_str().unwrap()]);
+    let output = figures(&format!("--only beta --out {}", file.display()));
     assert_eq!(output.status.code(), Some(2));
     let line = String::from_utf8(output.stderr).unwrap();
     assert_eq!(line.trim_end().lines().count(), 1, "{line}");
@@ -222,7 +222,7 @@ fn a_place_that_cannot_be_written_is_named() {
 
 #[test]
 fn help_lists_the_figures() {
-    let output = figures(&["--help"]);
+    let output = figures("--help");
     assert!(output.status.success());
     let help = String::from_utf8(output.stdout).unwrap();
     assert!(
@@ -251,7 +251,10 @@ fn every_finished_figure_is_told() {
     let folder = TempDir::new().unwrap();
     let names = [ALL[0].name, ALL[1].name];
     let out = folder.path().to_str().unwrap();
-    let output = figures(&["--out", out, "--only", names[0], "--only", names[1]]);
+    let output = figures(&format!(
+        "--out {out} --only {} --only {}",
+        names[0], names[1]
+    ));
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stderr).unwrap();
     let lines: Vec<&str> = text.lines().collect();

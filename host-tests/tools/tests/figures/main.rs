@@ -12,9 +12,7 @@
 )]
 
 mod altitudes;
-mod aside;
 mod chains;
-mod fields;
 mod files;
 mod single;
 
@@ -24,9 +22,9 @@ use std::sync::OnceLock;
 
 use tempfile::TempDir;
 
-fn figures(arguments: &[&str]) -> Output {
+fn figures(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_figures"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
@@ -35,7 +33,7 @@ fn written() -> &'static Path {
     static DIR: OnceLock<TempDir> = OnceLock::new();
     DIR.get_or_init(|| {
         let dir = TempDir::new().unwrap();
-        let output = figures(&["--out", dir.path().to_str().unwrap()]);
+        let output = figures(&format!("--out {}", dir.path().display()));
         let errors = String::from_utf8_lossy(&output.stderr);
         let is_progress = |line: &str| line.contains(" figures: ");
         assert!(

@@ -4,10 +4,7 @@
 use std::process::{Command, Output};
 
 use ihex::{Reader, Record};
-use uav_relay_tools::image::board::Board;
-use uav_relay_tools::image::elf::{Piece, flat, pieces};
-use uav_relay_tools::image::uf2::{Family, PAGE};
-use uav_relay_tools::image::{hex, uf2};
+use uav_relay_tools::image::{Board, Family, PAGE, Piece, flat, hex, pieces, uf2};
 use uav_relay_tools::provision::config::LEN;
 
 fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
@@ -61,7 +58,7 @@ fn an_image_is_stored_where_its_elf_says_and_blank_in_between() {
 #[test]
 fn a_reader_of_intel_hex_finds_the_same_bytes() {
     let example = example();
-    let file = hex::file(&example).unwrap();
+    let file = hex(&example).unwrap();
     let mut found = vec![0xFF; 0x3_0005];
     let mut above = 0;
     let mut ended = false;
@@ -83,7 +80,7 @@ fn a_reader_of_intel_hex_finds_the_same_bytes() {
 #[test]
 fn a_uf2_file_has_whole_blocks_with_whole_pages() {
     let example = example();
-    let file = uf2::file(&example, Family::RP2350).unwrap();
+    let file = uf2(&example, Family::RP2350).unwrap();
     let word = |block: &[u8], at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
     assert_eq!(file.len() % 512, 0);
     let count = u32::try_from(file.len() / 512).unwrap();
@@ -125,9 +122,9 @@ fn what_is_no_image_is_refused_in_one_line() {
     assert!(flat(&pieces(&far).unwrap()).is_err());
 }
 
-fn image(arguments: &[&str]) -> Output {
+fn image(arguments: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_image"));
-    command.args(arguments).output().unwrap()
+    command.args(arguments.split_whitespace()).output().unwrap()
 }
 
 #[test]
@@ -135,14 +132,11 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     std::fs::write(path("relay3.bin"), [5; LEN]).unwrap();
-    let done = image(&[
-        "--board",
-        "pico2",
-        "--block",
-        &path("relay3.bin"),
-        "--out",
-        &path("out"),
-    ]);
+    let done = image(&format!(
+        "--board pico2 --block {} --out {}",
+        path("relay3.bin"),
+        path("out")
+    ));
     assert!(done.status.success(), "{done:?}");
     let uf2 = std::fs::read(path("out/relay3.uf2")).unwrap();
     assert_eq!(uf2.len(), 2 * 512);
@@ -150,16 +144,13 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
     std::fs::write(path("short.bin"), [5; 7]).unwrap();
     for (arguments, says) in [
         (
-            vec!["--board", "pico2", "--block", &path("short.bin")],
+            &*format!("--board pico2 --block {}", path("short.bin")),
             "7 bytes; a block has 380",
         ),
-        (vec!["--board", "pico3"], "one of stm32f405"),
-        (
-            vec!["--board", "pico2", "--block", "nowhere.bin"],
-            "nowhere.bin",
-        ),
+        ("--board pico3", "one of stm32f405"),
+        ("--board pico2 --block nowhere.bin", "nowhere.bin"),
     ] {
-        let refused = image(&arguments);
+        let refused = image(arguments);
         let line = String::from_utf8_lossy(&refused.stderr).into_owned();
         assert_eq!(refused.status.code(), Some(2), "{line}");
         assert!(line.contains(says) && line.lines().count() == 1, "{line}");

@@ -1,20 +1,23 @@
 //! Output and error messages of `cargo provision`.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::process::{Command, Output};
 
 use uav_relay::{Adjust, Measure, Method};
 use uav_relay_scenario::Scenario;
+use uav_relay_scenario::number::narrow;
 use uav_relay_tools::provision::block::Flight;
-use uav_relay_tools::provision::config::Block;
+use uav_relay_tools::provision::config::{Block, secret};
 
-use super::{of_paper, paper, provision, reads, refusal};
+use super::{example, of_paper, paper, provision, reads, refusal, write_key};
 
 #[test]
 fn the_command_writes_the_block() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay3.bin");
-    let output = provision(&of_paper(out.to_str().unwrap()));
+    let output = provision(&of_paper(&out));
     assert!(output.status.success(), "{output:?}");
     assert_eq!(std::fs::read(&out).unwrap(), paper());
     let text = String::from_utf8(output.stdout).unwrap();
@@ -29,31 +32,28 @@ fn the_command_writes_what_the_relay_is_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay.bin");
     let file = folder.path().join("field.toml");
-    let written = |more: &[&str]| {
-        let output = provision(&[&of_paper(out.to_str().unwrap()), more].concat());
+    let written = |more: &str| {
+        let output = provision(&format!("{} {more}", of_paper(&out)));
         assert!(output.status.success(), "{output:?}");
         let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
         reads(&block).unwrap()
     };
-    assert_eq!(written(&["--method", "align"]), reads(&paper()).unwrap());
-    assert_eq!(written(&["--method", "joint"]).method, Method::Joint);
+    assert_eq!(written("--method align"), reads(&paper()).unwrap());
+    assert_eq!(written("--method joint").method, Method::Joint);
     let adjust = Adjust::default();
-    assert_eq!(
-        written(&["--method", "adjust"]).method,
-        Method::Adjust(adjust)
-    );
+    assert_eq!(written("--method adjust").method, Method::Adjust(adjust));
     let adjust = Adjust {
         rounds: 7,
         explore_m: 2.5,
         ..adjust
     };
     assert_eq!(
-        written(&["--method", "adjust", "--rounds", "7", "--explore", "2.5"]).method,
+        written("--method adjust --rounds 7 --explore 2.5").method,
         Method::Adjust(adjust)
     );
     std::fs::write(&file, toml(3)).unwrap();
     let file = file.to_str().unwrap();
-    let config = written(&["--scenario", file, "--samples", "2000"]);
+    let config = written(&format!("--scenario {file} --samples 2000"));
     let flight = Flight::new(&Scenario::load(Path::new(file)).unwrap(), 5, 1e-4, 7).unwrap();
     assert_eq!(config.mission, *flight.mission());
     assert_eq!(
@@ -105,7 +105,7 @@ fn what_is_wrong_is_said_in_one_line() {
         "--uavs 5 --index 1 --out /nowhere/block.bin".to_owned(),
     ] {
         let options = case.replace("FOLDER", name);
-        let line = refusal(&options.split(' ').collect::<Vec<_>>());
+        let line = refusal(&options);
         write!(all, "{case}\n    {}", line.replace(name, "FOLDER")).unwrap();
     }
     insta::assert_snapshot!(all);
@@ -118,44 +118,37 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("block.bin");
     let out = out.to_str().unwrap();
-    let plain = ["--index", "1", "--out", out, "--uavs"];
+    let plain = format!("--index 1 --out {out} --uavs");
     for (arguments, least, in_range, ms, most) in [
-        (&["26"][..], 117_334, 26, 5_093, 25),
-        (&["9", "--baud", "37546"], 37_547, 9, 5_001, 8),
-        (&["100", "--in-range", "40"], 183_040, 40, 7_945, 25),
-        (
-            &["5", "--in-range", "9", "--baud", "9600"],
-            18_774,
-            5,
-            9_778,
-            3,
-        ),
-        (&["50", "--baud", "57600"], 229_974, 50, 19_963, 13),
+        ("26", 117_334, 26, 5_093, 25),
+        ("9 --baud 37546", 37_547, 9, 5_001, 8),
+        ("100 --in-range 40", 183_040, 40, 7_945, 25),
+        ("5 --in-range 9 --baud 9600", 18_774, 5, 9_778, 3),
+        ("50 --baud 57600", 229_974, 50, 19_963, 13),
     ] {
-        let baud = arguments.iter().skip_while(|it| **it != "--baud").nth(1);
-        let baud = baud.unwrap_or(&"115200");
+        let baud = arguments.split_once("--baud ").map_or("115200", |it| it.1);
         let line = format!(
             "--baud {baud}: must be within {least} to 10000000: {in_range} relays share the channel at one place: it needs {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; fewer with --in-range, none with --wires\n"
         );
-        assert_eq!(refusal(&[&plain[..], arguments].concat()), line);
+        assert_eq!(refusal(&format!("{plain} {arguments}")), line);
     }
     assert!(!Path::new(out).exists());
     for arguments in [
-        &["25"][..],
-        &["26", "--wires"],
-        &["26", "--in-range", "9"],
-        &["26", "--baud", "117334"],
-        &["9", "--baud", "37547"],
-        &["50", "--baud", "57600", "--probe-after-ms", "19963"],
+        "25",
+        "26 --wires",
+        "26 --in-range 9",
+        "26 --baud 117334",
+        "9 --baud 37547",
+        "50 --baud 57600 --probe-after-ms 19963",
     ] {
-        let output = provision(&[&plain[..], arguments].concat());
+        let output = provision(&format!("{plain} {arguments}"));
         assert!(output.status.success(), "{output:?}");
     }
     let slow: Block = std::fs::read(out).unwrap().try_into().unwrap();
     assert_eq!(reads(&slow).unwrap().probe_after_ms, 19_963);
-    let too_fast = ["50", "--baud", "57600", "--probe-after-ms", "19962"];
-    refusal(&[&plain[..], &too_fast].concat());
-    let both = [&plain[..], &["9", "--wires", "--baud", "9600"]].concat();
+    let too_fast = "50 --baud 57600 --probe-after-ms 19962";
+    refusal(&format!("{plain} {too_fast}"));
+    let both = format!("{plain} 9 --wires --baud 9600");
     assert!(refusal(&both).contains("--wires"));
 }
 
@@ -164,14 +157,15 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay.bin");
     let file = folder.path().join("chain.toml");
-    let scenario = std::fs::read_to_string(super::example()).unwrap();
-    let run = |sections: &str, more: &[&str]| {
+    let scenario = std::fs::read_to_string(example()).unwrap();
+    let run = |sections: &str, more: &str| {
         std::fs::write(&file, format!("{scenario}\n{sections}\n")).unwrap();
-        let file = file.to_str().unwrap();
-        let all = ["--scenario", file, "--uavs", "5", "--index", "3", "--out"];
-        provision(&[&all[..], &[out.to_str().unwrap()], more].concat())
+        let (file, out) = (file.display(), out.display());
+        provision(&format!(
+            "--scenario {file} --uavs 5 --index 3 --out {out} {more}"
+        ))
     };
-    let written = |sections: &str, more: &[&str]| {
+    let written = |sections: &str, more: &str| {
         let output = run(sections, more);
         assert!(output.status.success(), "{output:?}");
         let block: Block = std::fs::read(&out).unwrap().try_into().unwrap();
@@ -180,27 +174,24 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     };
     let network = |keys: &str| format!("[network]\n{keys}");
     let joint = network("method = \"joint\"");
-    assert_eq!(written("", &[]).0, Method::Align);
-    assert_eq!(written(&network("baud = 115200"), &[]).0, Method::Align);
+    assert_eq!(written("", "").0, Method::Align);
+    assert_eq!(written(&network("baud = 115200"), "").0, Method::Align);
     let adjust = network("method = \"adjust\"");
-    assert_eq!(written(&adjust, &[]).0, Method::Adjust(Adjust::default()));
+    assert_eq!(written(&adjust, "").0, Method::Adjust(Adjust::default()));
     let rounds = Adjust {
         rounds: 7,
         ..Adjust::default()
     };
-    assert_eq!(
-        written(&adjust, &["--rounds", "7"]).0,
-        Method::Adjust(rounds)
-    );
-    let (method, said) = written(&joint, &[]);
+    assert_eq!(written(&adjust, "--rounds 7").0, Method::Adjust(rounds));
+    let (method, said) = written(&joint, "");
     assert_eq!(method, Method::Joint);
     assert!(!said.contains("--method"), "{said}");
-    let (method, said) = written(&joint, &["--method", "align"]);
+    let (method, said) = written(&joint, "--method align");
     assert_eq!(method, Method::Align);
     let line = "--method align replaces network.method = \"joint\" of ";
     assert!(said.starts_with(line), "{said}");
     let others = network("id = 9\nrelays = 7\nprobe_after_ms = 5000\ndead_after_ms = 15000");
-    let (_, said) = written(&others, &["--network", "3"]);
+    let (_, said) = written(&others, "--network 3");
     let lines: Vec<&str> = said.lines().collect();
     assert!(
         lines[0].starts_with("--network 3 replaces network.id = 9 of "),
@@ -210,7 +201,7 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
         lines[1].starts_with("--uavs 5 replaces network.relays = 7 of "),
         "{said}"
     );
-    let (_, said) = written(&network("id = 9\nrelays = 5"), &["--network", "9"]);
+    let (_, said) = written(&network("id = 9\nrelays = 5"), "--network 9");
     assert!(!said.contains("counts"), "{said}");
     let mut planned =
         "\n[plan]\nuavs = 5\ntolerance = 1e-4\nmethod = \"align\"\nsir_db = 3.0\n".to_owned();
@@ -243,7 +234,7 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
             "network.method = \"joint\": must be \"align\", as its [plan] has it",
         ),
     ] {
-        let output = run(&sections, &[]);
+        let output = run(&sections, "");
         assert_eq!(output.status.code(), Some(2), "{sections}: {output:?}");
         let line = String::from_utf8(output.stderr).unwrap();
         assert_eq!(line.trim_end().lines().count(), 1, "{line}");
@@ -262,9 +253,383 @@ fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
         uav_relay_scenario::DEFAULT
     );
     std::fs::write(&file, text).unwrap();
-    let scenario = ["--scenario", file.to_str().unwrap()];
-    let line = refusal(&[&of_paper(out.to_str().unwrap())[..], &scenario].concat());
+    let scenario = format!("--scenario {}", file.display());
+    let line = refusal(&format!("{} {scenario}", of_paper(&out)));
     let named = "companion.autopilot = \"udp:localhost:0\" has no PORT within 1 to 65535; allowed: a tty, or udp:HOST:PORT";
     assert!(line.contains(named), "{line}");
     assert!(!out.exists(), "nothing is written");
+}
+
+fn plan(arguments: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_plan"))
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap()
+}
+
+fn planned(arguments: &str) -> String {
+    let output = plan(arguments);
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn text(path: &Path) -> String {
+    path.to_str().unwrap().to_owned()
+}
+
+fn names(dir: &Path) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(dir).unwrap();
+    entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect()
+}
+
+/// Asserts that the block of relay `index` matches the plan, and that the summary lists it.
+fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
+    let plan = scenario.plan.as_ref().unwrap();
+    let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
+        .unwrap()
+        .try_into()
+        .unwrap();
+    let config = reads(&block).unwrap();
+    assert_eq!((config.identity.network, config.identity.index), (9, index));
+    assert_eq!(config.mission.relays(), plan.uavs);
+    assert_eq!(config.method, Method::Align);
+    assert!(config.sites.is_some());
+    assert_eq!(secret(&block).unwrap().map(|secret| secret.epoch), Some(77));
+    // The summary has the relay's position on the line and on earth, and the command for its file.
+    let place = plan.places[usize::from(index) - 1];
+    let row = summary
+        .lines()
+        .find(|line| line.trim_start().starts_with(&format!("relay{index}.bin ")))
+        .unwrap();
+    let numbers: Vec<f64> = row
+        .split_whitespace()
+        .skip(1)
+        .map(|word| word.parse().unwrap())
+        .collect();
+    assert!(
+        (numbers[0] - place.x_m).abs() < 1e-3 && (numbers[2] - place.altitude_m).abs() < 1e-2,
+        "{row}"
+    );
+    let at = scenario.line.unwrap().axis.point(uav_relay::Placement {
+        x_m: narrow(place.x_m),
+        y_m: narrow(place.y_m),
+        altitude_m: narrow(place.altitude_m),
+    });
+    let at = at.unwrap();
+    assert!(
+        (numbers[3] * 1e7 - f64::from(at.lat_e7)).abs() < 1.5,
+        "{row}"
+    );
+    assert!(
+        (numbers[4] * 1e7 - f64::from(at.lon_e7)).abs() < 1.5,
+        "{row}"
+    );
+    assert!(
+        summary.contains(&format!("--base-address 0x080E0000 relay{index}.bin\n")),
+        "{summary}"
+    );
+}
+
+#[test]
+fn a_plan_goes_to_every_drone() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, key, dir] = ["plan.toml", "key.txt", "blocks"].map(|name| folder.path().join(name));
+    let decibels = text(&example().with_file_name("decibels.toml"));
+    let said = planned(&format!(
+        "--scenario {decibels} --target-sir-db 8 --out {}",
+        text(&file)
+    ));
+    let scenario = Scenario::load(&file).unwrap();
+    let plan = scenario.plan.clone().unwrap();
+    assert!(
+        said.contains(&format!("{} relays that reach", plan.uavs)),
+        "{said}"
+    );
+    assert!(plan.sir_db >= 8.0, "{}", plan.sir_db);
+    // The rest of the scenario is unchanged.
+    let before = std::fs::read_to_string(&decibels).unwrap();
+    assert!(std::fs::read_to_string(&file).unwrap().starts_with(&before));
+
+    write_key(&key, &"0123456789abcdef".repeat(4));
+    let command = said
+        .lines()
+        .last()
+        .unwrap()
+        .trim()
+        .replace("DIR", &text(&dir));
+    let words = command.strip_prefix("cargo provision ").unwrap();
+    let more = format!("--network 9 --key-file {} --epoch 77", key.display());
+    let output = provision(&format!("{words} {more}"));
+    assert!(
+        output.status.success() && output.stderr.is_empty(),
+        "{output:?}"
+    );
+    let mut expected: BTreeSet<String> = (1..=plan.uavs)
+        .map(|index| format!("relay{index}.bin"))
+        .collect();
+    expected.insert("summary.txt".to_owned());
+    assert_eq!(names(&dir), expected);
+    let summary = std::fs::read_to_string(dir.join("summary.txt")).unwrap();
+    for index in 1..=plan.uavs {
+        is_provisioned(&scenario, &dir, index, &summary);
+    }
+    assert!(!summary.contains("0123456789abcdef"));
+
+    // Existing blocks stay without --force; with it nothing of a larger flight remains.
+    let again = refusal(words);
+    assert!(
+        again.contains("relay1.bin exists already; --force"),
+        "{again}"
+    );
+    let small = folder.path().join("small.toml");
+    planned(&format!("--uavs 2 --out {}", small.display()));
+    std::fs::write(dir.join("notes.txt"), "mine").unwrap();
+    let output = provision(&format!(
+        "--scenario {} --all --out-dir {} --force",
+        small.display(),
+        dir.display()
+    ));
+    assert!(output.status.success(), "{output:?}");
+    let left = ["notes.txt", "relay1.bin", "relay2.bin", "summary.txt"].map(str::to_owned);
+    assert_eq!(names(&dir), left.into());
+}
+
+#[test]
+fn a_joint_plan_is_flown_jointly_and_planned_anew_in_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, dir] = ["plan.toml", "blocks"].map(|name| text(&folder.path().join(name)));
+    let altitudes = text(&example().with_file_name("altitudes.toml"));
+    planned(&format!("--scenario {altitudes} --uavs 3 --out {file}"));
+    let line = plan(&format!("--scenario {file} --uavs 4 --out {file}"));
+    let line = String::from_utf8(line.stderr).unwrap();
+    assert!(
+        line.contains("exists already; --force overwrites it"),
+        "{line}"
+    );
+    planned(&format!(
+        "--scenario {file} --uavs 4 --altitude free --out {file} --force"
+    ));
+    let written = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(written.matches("[plan]").count(), 1, "{written}");
+    let output = provision(&format!("--scenario {file} --all --out-dir {dir}"));
+    assert!(output.status.success(), "{output:?}");
+    let block: Block = std::fs::read(Path::new(&dir).join("relay4.bin"))
+        .unwrap()
+        .try_into()
+        .unwrap();
+    assert_eq!(reads(&block).unwrap().method, Method::Joint);
+}
+
+#[test]
+fn all_or_none_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("blocks");
+    // A block that no drone accepts: a field with more points than it can hold.
+    let points = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
+        .map(|x| format!("{{ x_m = {x}, alpha = 3, beta = 2 }}"))
+        .join(", ");
+    let field = format!(
+        "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[field]\ni_max_w = 1e-9\nbeta = [{points}]\n"
+    );
+    let file = folder.path().join("field.toml");
+    std::fs::write(&file, field).unwrap();
+    let wide = format!(
+        "--scenario {} --uavs 3 --all --out-dir {}",
+        file.display(),
+        dir.display()
+    );
+    let line = refusal(&wide);
+    assert!(line.contains("a drone has room for 16 points"), "{line}");
+    assert!(!dir.exists());
+    // A folder with the name of a block cannot be replaced: files renamed before are removed again.
+    std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
+    let line = refusal(&format!(
+        "--uavs 3 --all --out-dir {} --force",
+        dir.display()
+    ));
+    assert!(
+        line.starts_with("--out-dir ") && line.contains("relay2.bin"),
+        "{line}"
+    );
+    assert_eq!(names(&dir), BTreeSet::from(["relay2.bin".to_owned()]));
+}
+
+#[test]
+fn what_does_not_go_together_is_said_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, old, dir] =
+        ["plan.toml", "old.toml", "blocks"].map(|name| text(&folder.path().join(name)));
+    planned(&format!("--uavs 3 --out {file}"));
+    let written = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&old, written.replace("uav_w = 1.0 ", "uav_w = 2.0 ")).unwrap();
+    let places = [
+        (text(folder.path()), "FOLDER"),
+        (text(example().parent().unwrap()), "EXAMPLES"),
+    ];
+    let mut lines = String::new();
+    for case in [
+        "--scenario FOLDER/plan.toml --uavs 4",
+        "--scenario FOLDER/plan.toml --method joint",
+        "--scenario FOLDER/plan.toml --tolerance 0.01",
+        "--scenario FOLDER/old.toml",
+        "",
+        "--uavs 3 --index 1",
+        "--uavs 3 --rounds 4",
+        "--uavs 3 --explore 4",
+        "--uavs 3 --stand-in",
+        "--scenario EXAMPLES/scenario.toml --uavs 3",
+        "--scenario EXAMPLES/multi_interferer.toml --uavs 8",
+        "--uavs 3.5",
+        "--uavs 3 --network x",
+        "--uavs 3 --method algn",
+        "--uavs 3 --epoch 4",
+    ] {
+        let mut options = format!("{case} --all --out-dir {dir}");
+        for (place, name) in &places {
+            options = options.replace(name, place);
+        }
+        let mut line = refusal(&options);
+        for (place, name) in &places {
+            line = line.replace(place, name);
+        }
+        write!(lines, "{case}\n    {line}").unwrap();
+        assert!(!Path::new(&dir).exists(), "{case}");
+    }
+    insta::assert_snapshot!(lines);
+    let line = refusal(&format!("--uavs 3 --index 1 --out {file} --force"));
+    assert!(line.contains("--all"), "{line}");
+}
+
+/// The refused loss is the planner's best over what the relays settle on.
+#[test]
+fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let [out, dir] = ["block.bin", "blocks"].map(|name| text(&folder.path().join(name)));
+    let several = text(&example().with_file_name("multi_interferer.toml"));
+    let report = planned(&format!("--scenario {several} --uavs 8 --json"));
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let loss = report["hypothetical"]["loss"].as_f64().unwrap();
+    assert!(loss > 0.15, "{report}");
+    let words = format!("{:.1} % less than the best positions", 100.0 * loss);
+    let one = format!("--scenario {several} --uavs 8 --index 2 --out {out}");
+    let line = refusal(&one);
+    assert!(
+        line.contains(&words) && line.contains("cargo chain --listen"),
+        "{line}"
+    );
+    assert!(!Path::new(&out).exists());
+    let planned = plan(&format!("--scenario {several} --uavs 8 --out {out}"));
+    let line = String::from_utf8(planned.stderr).unwrap();
+    assert!(
+        planned.status.code() == Some(1) && line.contains(&words),
+        "{line}"
+    );
+    assert!(!Path::new(&out).exists());
+    for arguments in [
+        &one[..],
+        &format!("--scenario {several} --uavs 8 --all --out-dir {dir}"),
+    ] {
+        let output = provision(&format!("{arguments} --stand-in"));
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success() && line.contains(&words), "{line}");
+    }
+    // Two interferers next to each other lose nothing.
+    let near = std::fs::read_to_string(&several).unwrap();
+    let near = near
+        .replace("x_m = 200.0", "x_m = 790.0")
+        .replace("y_m = 300.0", "y_m = 150.0");
+    let file = folder.path().join("near.toml");
+    std::fs::write(&file, near).unwrap();
+    let output = provision(&format!(
+        "--scenario {} --uavs 8 --index 2 --out {out}",
+        file.display()
+    ));
+    assert!(output.status.success(), "{output:?}");
+}
+
+/// Returns drone.toml without the settings that the firmware does not support.
+fn for_the_firmware(text: &str) -> String {
+    let own = ["baud = 57600", "probe_after_ms", "dead_after_ms"];
+    let kept = text
+        .lines()
+        .filter(|line| !own.iter().any(|key| line.starts_with(key)));
+    kept.collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_next_command_takes_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scenario, file, dir, key] =
+        ["mine.toml", "plan.toml", "blocks", "network7.key"].map(|name| folder.path().join(name));
+    let drone = std::fs::read_to_string(example().with_file_name("drone.toml")).unwrap();
+    let [mine, planned_file] = [text(&scenario), text(&file)];
+    std::fs::write(&scenario, &drone).unwrap();
+    write_key(&key, &"0123456789abcdef".repeat(4));
+    let arguments = format!("--scenario {mine} --uavs 3 --out {planned_file}");
+    // The published example is for Linux computers.
+    let said = planned(&arguments);
+    assert!(
+        said.contains("network.baud = 57600: must be 115200"),
+        "{said}"
+    );
+    assert!(
+        said.ends_with(&format!(
+            "  cargo companion --config {planned_file} --index INDEX\n"
+        )),
+        "{said}"
+    );
+    let line = refusal(&format!(
+        "--scenario {planned_file} --all --out-dir {}",
+        text(&dir)
+    ));
+    assert!(line.contains("network.baud = 57600"), "{line}");
+    // For the firmware the last line is a command that succeeds.
+    std::fs::write(&scenario, for_the_firmware(&drone)).unwrap();
+    let said = planned(&format!("{arguments} --force"));
+    let command = said.lines().last().unwrap().trim();
+    let command = command.replace("DIR", &text(&dir));
+    let words = command.strip_prefix("cargo provision ").unwrap();
+    let output = provision(words);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(names(&dir).len(), 4);
+}
+
+#[test]
+fn a_plan_and_a_network_of_different_sizes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scenario, file, dir] =
+        ["mine.toml", "plan.toml", "blocks"].map(|name| text(&folder.path().join(name)));
+    let drone = std::fs::read_to_string(example().with_file_name("drone.toml")).unwrap();
+    let drone = for_the_firmware(&drone).replace("key_file", "# key_file");
+    std::fs::write(&scenario, drone.replace("relays = 3", "relays = 4")).unwrap();
+    let words =
+        "network.relays = 4 contradicts plan.uavs; allowed: 6, the number of relays of the plan";
+    for wanted in ["--uavs 6", "--target-sir-db 3"] {
+        let arguments = format!("--scenario {scenario} --out {file} {wanted}");
+        let output = plan(&arguments);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        assert!(
+            line.contains("network.relays = 4 contradicts plan.uavs; allowed: "),
+            "{line}"
+        );
+        assert!(!Path::new(&file).exists());
+    }
+    // A file edited by hand.
+    planned(&format!("--scenario {scenario} --uavs 4 --out {file}"));
+    let four = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&scenario, four.replace("relays = 4", "relays = 6")).unwrap();
+    planned(&format!(
+        "--scenario {scenario} --uavs 6 --out {file} --force"
+    ));
+    let six = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, six.replace("relays = 6", "relays = 4")).unwrap();
+    for more in ["", "--uavs 6", "--uavs 4"] {
+        let all = format!("--scenario {file} --all --out-dir {dir}");
+        let line = refusal(&format!("{all} {more}"));
+        assert!(line.contains(words), "{line}");
+        assert!(!Path::new(&dir).exists());
+    }
 }

@@ -8,13 +8,9 @@
     missing_docs
 )]
 
-mod all;
 mod block;
 mod command;
-mod listen;
-mod ranges;
-mod secret;
-mod sites;
+mod parts;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -75,28 +71,20 @@ fn changed(mut block: Block, at: usize, bytes: &[u8]) -> Block {
     block
 }
 
-fn of_paper(out: &str) -> [&str; 8] {
-    [
-        "--uavs",
-        "5",
-        "--index",
-        "3",
-        "--network",
-        "7",
-        "--out",
-        out,
-    ]
+fn of_paper(out: impl AsRef<Path>) -> String {
+    let out = out.as_ref().display();
+    format!("--uavs 5 --index 3 --network 7 --out {out}")
 }
 
-fn provision(arguments: &[&str]) -> Output {
+fn provision(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_provision"))
-        .args(arguments)
+        .args(arguments.split_whitespace())
         .output()
         .unwrap()
 }
 
 /// Returns the single line on standard error of a run that exits with status 2.
-fn refusal(arguments: &[&str]) -> String {
+fn refusal(arguments: &str) -> String {
     let output = provision(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.trim_end().lines().count(), 1, "{arguments:?}: {text}");

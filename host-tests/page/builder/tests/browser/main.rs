@@ -3,13 +3,10 @@
 //! | file | content |
 //! | --- | --- |
 //! | `chromium` | a browser, over its own protocol |
-//! | `opened` | the page in it, and user actions |
-//! | `numbers` | comparison with the command |
-//! | `hand` | mouse, finger and keyboard input |
-//! | `wrong` | error messages |
+//! | `opened` | the page in it, user actions, and comparison with the command |
+//! | `hand` | mouse, finger and keyboard input, and error messages |
 //! | `played` | playing a run |
-//! | `speed` | loading and response times |
-//! | `layout` | wide and narrow, light and dark, and accessibility |
+//! | `layout` | wide and narrow, light and dark, accessibility, and response times |
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -21,8 +18,5 @@
 mod chromium;
 mod hand;
 mod layout;
-mod numbers;
 mod opened;
 mod played;
-mod speed;
-mod wrong;

@@ -1,13 +1,14 @@
 //! Transmission of frames between relays over links or an ideal shared channel.
 
-use uav_relay::{Instant, Port};
+use std::fmt::Write as _;
 
-use super::super::attack::Recorded;
-use super::super::faults::Faults;
-use super::super::queue::QueuedEvent;
-use super::receiver::Receiver;
-use super::recorded::link;
-use super::state::Chain;
+use uav_relay::{Instant, Port, Side, Wiring};
+
+use super::{Chain, QueuedEvent};
+use crate::simulator::attack::Recorded;
+use crate::simulator::faults::{Arrival, Faults};
+use crate::simulator::medium::{Agenda, AirEvent, Sent};
+use crate::simulator::outcome::{Link, OnAir, Shot, Transmission};
 
 impl Chain {
     pub(super) fn transmit(&mut self, index: usize, port: Port, frame: &[u8]) {
@@ -105,5 +106,248 @@ impl Chain {
         self.bursts
             .as_mut()
             .is_some_and(|bursts| bursts.loses(from, to, &mut self.rng))
+    }
+}
+
+/// Receiving node: a relay or a ground station, from 0.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Receiver {
+    Relay(usize),
+    Ground(usize),
+}
+
+impl Chain {
+    /// Passes a frame to the node's radio. Returns false if there is no simulated channel.
+    pub(super) fn broadcast(&mut self, node: usize, frame: &[u8]) -> bool {
+        let Some(medium) = &mut self.medium else {
+            return false;
+        };
+        let mut agenda = Agenda::new();
+        if medium.offer(self.now, node, frame, &mut agenda) {
+            self.outcome.messages += 1;
+            self.outcome.bytes += frame.len() as u64;
+        }
+        self.expect(agenda);
+        true
+    }
+
+    pub(super) fn on_air(&mut self, event: AirEvent) {
+        let Some(mut medium) = self.medium.take() else {
+            return;
+        };
+        let mut agenda = Agenda::new();
+        let sent = medium.happen(self.now, event, |node| self.hearers(node), &mut agenda);
+        self.medium = Some(medium);
+        self.expect(agenda);
+        if let Some(sent) = sent {
+            self.deliver(&sent);
+        }
+    }
+
+    fn expect(&mut self, agenda: Agenda) {
+        for (at, event) in agenda {
+            self.queue.put(at, 0, QueuedEvent::Air(event));
+        }
+    }
+
+    /// Returns the nodes in range of `node`.
+    fn hearers(&self, node: usize) -> Vec<usize> {
+        let relays = self.members.len();
+        match node.checked_sub(relays) {
+            None => {
+                let stations = 0..self.stations.len();
+                let near = stations.filter(|at| self.reaches_ground(node, Port::Shared, *at));
+                let mut hearers = self.in_range(node);
+                hearers.extend(near.map(|at| relays + at));
+                hearers
+            }
+            Some(at) => (0..relays)
+                .filter(|relay| self.reaches_ground(*relay, Port::Shared, at))
+                .collect(),
+        }
+    }
+
+    fn deliver(&mut self, sent: &Sent) {
+        let relays = self.members.len();
+        let arrives = self.now + self.setup.link.latency;
+        // A frame that some receiver missed would be no replay when sent again.
+        if sent.missed == 0 {
+            self.overhear(&sent.frame, Port::Shared, arrives);
+        }
+        let receivers = sent.heard_by.iter().map(|node| {
+            node.checked_sub(relays)
+                .map_or(Receiver::Relay(*node), Receiver::Ground)
+        });
+        let mut note = self.send(sent.from, &sent.frame, Port::Shared, arrives, receivers);
+        if sent.missed > 0 {
+            let missed = format!("{} in range did not receive it", sent.missed);
+            note = if note.is_empty() {
+                missed
+            } else {
+                format!("{missed}; {note}")
+            };
+        }
+        self.keep_frame(self.now, Link::Shared, &sent.frame, note);
+    }
+}
+
+impl Chain {
+    /// Removes and returns the frames sent by `until`, ordered by their end, if recording is on.
+    pub fn frames(&mut self, until: Instant) -> Vec<OnAir> {
+        self.record
+            .as_mut()
+            .map(|record| record.take(until))
+            .unwrap_or_default()
+    }
+
+    /// Returns the time of a frame's last bit from its arrival time.
+    pub(super) fn sent_at(&self, arrives: Instant) -> Instant {
+        let latency = self.setup.link.latency.as_micros();
+        Instant::from_micros(arrives.as_micros().saturating_sub(latency))
+    }
+
+    pub(super) fn keep_frame(&mut self, at: Instant, link: Link, frame: &[u8], note: String) {
+        if let Some(record) = &mut self.record {
+            record.put(at, link, frame, note);
+        }
+    }
+
+    /// Appends to `note` the faults of `frame` on its path to `receiver`.
+    pub(super) fn remark(
+        &self,
+        note: &mut String,
+        receiver: Receiver,
+        frame: &[u8],
+        arrivals: &[Arrival],
+    ) {
+        if self.record.is_none() {
+            return;
+        }
+        let mut fates = Vec::new();
+        match arrivals {
+            [] => fates.push("lost"),
+            [_] => {}
+            _ => fates.push("twice"),
+        }
+        if arrivals.iter().any(|arrival| arrival.bytes != frame) {
+            fates.push("changed");
+        }
+        if arrivals.iter().any(|arrival| arrival.late > 0) {
+            fates.push("late");
+        }
+        if fates.is_empty() {
+            return;
+        }
+        let whom = match receiver {
+            Receiver::Relay(at) => format!("relay {}", at + 1),
+            Receiver::Ground(at) => match self.stations.get(at).map(|station| station.end) {
+                Some(Side::Downstream) => "Rx".to_owned(),
+                _ => "Tx".to_owned(),
+            },
+        };
+        if !note.is_empty() {
+            note.push_str("; ");
+        }
+        _ = write!(note, "at {whom}: {}", fates.join(", "));
+    }
+}
+
+/// Returns the link at `port` of relay `index` (from 0).
+pub(super) fn link(index: usize, port: Port) -> Link {
+    let number = u16::try_from(index).unwrap_or(u16::MAX);
+    match port {
+        Port::Shared => Link::Shared,
+        Port::Upstream => Link::After(number),
+        Port::Downstream => Link::After(number.saturating_add(1)),
+    }
+}
+
+/// Largest difference of the numbers of two neighbours, whatever the radio range.
+const NEIGHBOUR: usize = 4;
+
+impl Chain {
+    /// Returns the range of a relay, in relays.
+    pub(super) fn reach(&self) -> usize {
+        match self.setup.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => self.setup.radio_reach,
+        }
+    }
+
+    /// Returns true if a partition separates relays `one` and `other` (from 0) now.
+    pub(super) fn are_parted(&self, one: usize, other: usize) -> bool {
+        let parts = &self.setup.partitions;
+        parts
+            .iter()
+            .any(|part| part.parts(number(one), number(other), self.now))
+    }
+
+    /// Returns true if no failure keeps relay `by` from receiving relay `of` (from 0) now. Range is not checked.
+    pub(super) fn hears(&self, by: usize, of: usize) -> bool {
+        let deaf = &self.setup.deaf;
+        !self.are_parted(by, of)
+            && !deaf
+                .iter()
+                .any(|deaf| deaf.applies(number(by), number(of), self.now))
+    }
+
+    /// Returns true if relays `one` and `other` (from 0) can be neighbours now: linked both ways and near.
+    pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
+        let most = self.reach().min(NEIGHBOUR);
+        one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)
+    }
+
+    /// Returns the relays that receive relay `index` (from 0) on a shared channel.
+    pub(super) fn in_range(&self, index: usize) -> Vec<usize> {
+        let reach = self.setup.radio_reach;
+        let until = self.members.len().min(index + reach + 1);
+        (index.saturating_sub(reach)..until)
+            .filter(|by| *by != index && self.hears(*by, index))
+            .collect()
+    }
+}
+
+fn number(index: usize) -> u16 {
+    u16::try_from(index + 1).unwrap_or(u16::MAX)
+}
+
+impl Chain {
+    /// Records the state of relay `index` (from 0) if it changed.
+    pub(super) fn film(&mut self, index: usize) {
+        let (Some(film), Some(member)) = (&mut self.outcome.film, self.members.get_mut(index))
+        else {
+            return;
+        };
+        let is_on = member.killed.is_none();
+        let before = member.filmed;
+        let place = if is_on {
+            member.relay.setpoint()
+        } else {
+            before.and_then(|(_, place)| place)
+        };
+        if before != Some((is_on, place)) {
+            member.filmed = Some((is_on, place));
+            film.shots.push(Shot {
+                at: self.now,
+                relay: member.node,
+                is_on,
+                place,
+                messages: self.outcome.messages,
+            });
+        }
+    }
+
+    pub(super) fn film_frame(&mut self, index: usize, port: Port) {
+        if let (Some(film), Some(member)) = (&mut self.outcome.film, self.members.get(index)) {
+            film.sent.push(Transmission {
+                at: self.now,
+                relay: member.node,
+                to: match port {
+                    Port::Upstream => Some(Side::Upstream),
+                    Port::Downstream => Some(Side::Downstream),
+                    Port::Shared => None,
+                },
+            });
+        }
     }
 }

@@ -1,15 +1,13 @@
 //! Drones with autopilots: time steps, MAVLink exchange with the relays, and distances.
 
-use uav_relay::HoldReason;
 use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::{Duration, Instant, Side};
+use uav_relay::{Duration, HoldReason, Instant, Side};
 
-use super::super::drones::{Nearest, Point, apart};
-use super::super::fleet::Vehicle;
-use super::super::outcome::TimelineEvent;
-use super::super::queue::QueuedEvent;
-use super::state::Chain;
+use super::{Chain, QueuedEvent};
+use crate::simulator::drones::{Flight, Nearest, Point, apart, placement, point};
+use crate::simulator::fleet::Vehicle;
+use crate::simulator::outcome::TimelineEvent;
 
 /// Time step of the flight.
 const STEP: Duration = Duration::from_millis(50);
@@ -225,6 +223,75 @@ impl Chain {
                 let there = agreed.and_then(|place| vehicle.there(place));
                 let there = there.is_some_and(|place| apart(place, vehicle.at()) < THERE_M);
                 vehicle.link.is_flown() && there
+            })
+    }
+}
+
+impl Chain {
+    /// Creates the drones, if any, and starts their time steps.
+    pub(super) fn take_off(&mut self) {
+        if let Some(spec) = &self.setup.flight {
+            self.flight = Some(Flight::new(spec, self.setup.seed));
+            self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
+        }
+        self.line_up();
+    }
+
+    /// Advances all drones by one time step; those with living relays report their positions.
+    pub(super) fn fly(&mut self) {
+        let now = self.now;
+        let Some(mut flight) = self.flight.take() else {
+            return;
+        };
+        let reports = flight.go_on();
+        for index in 0..flight.drones.len() {
+            let at = if reports {
+                flight.reported(index)
+            } else {
+                None
+            };
+            let Some(member) = self.members.get_mut(index) else {
+                continue;
+            };
+            if member.killed.is_some() {
+                continue;
+            }
+            if let Some(at) = at {
+                member.relay.handle_position(now, now, placement(at));
+            }
+            if let Some(place) = member.relay.setpoint()
+                && let Some(drone) = flight.drones.get_mut(index)
+            {
+                drone.goal = point(place);
+            }
+            if reports {
+                self.drain(index);
+            }
+        }
+        self.keep(flight.nearest(now));
+        self.queue.put(now + flight.step, 0, QueuedEvent::Fly);
+        self.flight = Some(flight);
+    }
+
+    /// Updates the closest approach.
+    pub(super) fn keep(&mut self, nearest: Option<Nearest>) {
+        let known = self.outcome.nearest;
+        if nearest.is_some_and(|it| known.is_none_or(|known| it.apart_m < known.apart_m)) {
+            self.outcome.nearest = nearest;
+        }
+    }
+
+    /// Returns true if every drone with a living relay is at its agreed position, by its own estimate.
+    pub(super) fn has_arrived(&self) -> bool {
+        let Some(flight) = &self.flight else {
+            return true;
+        };
+        let living = self.members.iter().zip(&flight.drones);
+        living
+            .filter(|(member, _)| member.killed.is_none())
+            .all(|(member, drone)| {
+                let agreed = member.relay.agreed_place();
+                agreed.is_some_and(|place| apart(point(place), drone.taken()) < 1e-3)
             })
     }
 }

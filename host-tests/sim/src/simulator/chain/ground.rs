@@ -1,16 +1,21 @@
 //! Ground stations of a run: uploads and measurements.
 
-use uav_relay::MAX_FRAME;
-use uav_relay::{Port, Side, Wiring};
+use rand::RngExt;
+use uav_relay::ground::{Ground, Progress};
+use uav_relay::sensing::belief::Told;
+use uav_relay::{Duration, Instant, MAX_FRAME, Phase, Placement, Port, Sample, Side, Wiring};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
-use super::super::outcome::{Moment, TimelineEvent};
-use super::super::queue::QueuedEvent;
-use super::super::record::Link;
-use super::super::true_interference::TrueInterference;
-use super::receiver::Receiver;
-use super::state::Chain;
+use super::air::{Receiver, link};
+use super::{Chain, Member, QueuedEvent};
+use crate::simulator::attack::{AttackKind, Attacker, NETWORK, Way, destination, fate, forge};
+use crate::simulator::drones::{Drone, placement};
+use crate::simulator::faults::Line;
+use crate::simulator::fleet::Vehicle;
+use crate::simulator::outcome::{Link, Moment, TimelineEvent};
+use crate::simulator::setup::Setup;
+use crate::simulator::true_interference::{Stand, TrueInterference};
 
 impl Chain {
     pub(super) fn begin_upload(&mut self, which: usize) {
@@ -143,5 +148,249 @@ impl Chain {
             target: None,
             sweeps: 0,
         });
+    }
+}
+
+/// Ground station: the transmitter or the receiver.
+#[derive(Debug)]
+pub(super) struct Station {
+    pub(super) end: Side,
+    pub(super) ground: Ground,
+    pub(super) line: Line,
+    pub(super) wake: Option<Instant>,
+}
+
+impl Station {
+    /// Returns true during an upload.
+    pub(super) fn is_busy(&self) -> bool {
+        matches!(
+            self.ground.progress(),
+            Progress::Offering | Progress::Held { .. } | Progress::Adopted { .. }
+        )
+    }
+}
+
+/// Creates the stations that upload or measure; none without keys.
+pub(super) fn stations(setup: &Setup) -> Vec<Station> {
+    let Some(proof) = setup.proof(1) else {
+        return Vec::new();
+    };
+    let uploads = setup.uploads.iter().map(|spec| spec.end);
+    let measures = setup.sky.as_ref().filter(|sky| sky.handed.is_empty());
+    let both = measures.map(|_| [Side::Upstream, Side::Downstream]);
+    let mut ends: Vec<Side> = uploads.chain(both.into_iter().flatten()).collect();
+    ends.sort();
+    ends.dedup();
+    ends.into_iter()
+        .map(|end| Station {
+            end,
+            ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
+            line: Line::default(),
+            wake: None,
+        })
+        .collect()
+}
+
+impl Chain {
+    /// Measures at every living relay and takes a snapshot of the positions.
+    pub(super) fn measure_all(&mut self) {
+        let Some(sky) = self.setup.sky.clone() else {
+            return;
+        };
+        let now = self.now;
+        let scene = sky.scene_at(now);
+        let (mut nodes, mut places) = (Vec::new(), Vec::new());
+        if now == Instant::ZERO + sky.period {
+            for (node, sample) in &sky.handed {
+                let mut members = self.members.iter_mut();
+                if let Some(member) = members.find(|member| member.node == *node) {
+                    member.relay.handle_sample(now, *sample);
+                }
+            }
+        }
+        for index in 0..self.members.len() {
+            let flown = self
+                .flight
+                .as_ref()
+                .and_then(|flight| flight.drones.get(index))
+                .map(Drone::taken)
+                .or_else(|| self.fleet.get(index).map(Vehicle::at))
+                .map(placement);
+            let Some(member) = self.members.get_mut(index) else {
+                continue;
+            };
+            if member.killed.is_some() {
+                continue;
+            }
+            nodes.push(member.node);
+            let Some(at) = flown.or(member.relay.setpoint()) else {
+                continue;
+            };
+            places.push(at);
+            if !sky.handed.is_empty() || sky.once && member.measured == Some(at) {
+                continue;
+            }
+            member.measured = Some(at);
+            let power_w = sky.heard_w(&scene, member.node, now, at, &mut self.rng);
+            member.relay.handle_sample(
+                now,
+                Sample::Heard {
+                    at,
+                    power_w: narrow(power_w),
+                },
+            );
+            if sky.ends_measure(now)
+                && !self.setup.auth
+                && member.node == self.setup.mission.relays()
+            {
+                let power_w = narrow(sky.receiver_w(&scene, now, member.node, &mut self.rng));
+                member
+                    .relay
+                    .handle_sample(now, Sample::Receiver { power_w });
+            }
+        }
+        if sky.ends_measure(now) && sky.handed.is_empty() {
+            self.measure_at_ends(&sky, &scene);
+        }
+        self.stand(nodes, places);
+        if now < sky.until {
+            self.queue.put(now + sky.period, 0, QueuedEvent::Listen);
+        } else {
+            self.listened = true;
+        }
+    }
+
+    fn stand(&mut self, nodes: Vec<u16>, places: Vec<Placement>) {
+        let agreed = self
+            .members
+            .iter()
+            .filter(|member| member.killed.is_none())
+            .all(|member| member.relay.phase() == Phase::Holding);
+        let goals = self.setpoints();
+        if agreed && goals.is_some() && goals != self.agreed {
+            self.agreed.clone_from(&goals);
+            self.agreements += 1;
+        }
+        let leader = self.members.first();
+        self.outcome.stands.push(Stand {
+            believed: leader.map_or_else(Told::default, |leader| leader.relay.belief()),
+            at: self.now,
+            nodes,
+            places,
+            goals,
+            agreements: self.agreements,
+        });
+    }
+}
+
+/// Retry delay of an attacker that has no recorded frame yet.
+const WAIT: Duration = Duration::from_millis(10);
+
+impl Chain {
+    /// Creates the attacker of the setup and schedules its frames.
+    pub(super) fn expect_an_attack(&mut self) {
+        let Some(attack) = self.setup.attack else {
+            return;
+        };
+        let mut attacker = Attacker::new(attack, self.setup.seed);
+        for (at, kind) in attacker.plan(&self.setup.link) {
+            self.queue.put(at, 0, QueuedEvent::AttackKind(kind));
+            self.ahead += 1;
+        }
+        self.attacker = Some(attacker);
+    }
+
+    /// Sends one frame of the attacker to a living relay, or retries later if there is nothing to replay.
+    pub(super) fn strike(&mut self, kind: AttackKind) {
+        let now = self.now;
+        let Some(mut attacker) = self.attacker.take() else {
+            return;
+        };
+        let frame = match kind {
+            AttackKind::Forge => {
+                let way = self.way(&mut attacker);
+                let heard = attacker.recall(now);
+                let heard = heard.as_ref().map(|heard| heard.bytes.as_slice());
+                let bytes = forge(&self.setup.mission, way, heard, &mut attacker.rng);
+                Some((self.port(way), bytes))
+            }
+            AttackKind::Replay => attacker
+                .recall(now)
+                .map(|recorded| (recorded.port, recorded.bytes)),
+        };
+        match frame {
+            Some((port, bytes)) => {
+                let astray = kind == AttackKind::Replay && attacker.rng.random_range(0..4) == 0;
+                let to = destination(&bytes).filter(|_| !astray);
+                if let Some(to) = self.reached(to, &mut attacker) {
+                    self.hit(to, kind, port, &bytes);
+                }
+            }
+            None if now < attacker.attack.until => {
+                self.queue.put(now + WAIT, 0, QueuedEvent::AttackKind(kind));
+                self.ahead += 1;
+            }
+            None => {}
+        }
+        self.attacker = Some(attacker);
+    }
+
+    /// Returns a random relay and a possible neighbour or ground station as the sender.
+    fn way(&self, attacker: &mut Attacker) -> Way {
+        let relays = self.setup.mission.relays();
+        let reach = match self.setup.settings.wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => 4,
+        };
+        let to = attacker.rng.random_range(1..=relays);
+        let off = attacker.rng.random_range(1..=reach);
+        let before = attacker.rng.random::<bool>() && off <= to || to + off > relays + 1;
+        Way {
+            from: if before {
+                to.saturating_sub(off)
+            } else {
+                to + off
+            },
+            to,
+        }
+    }
+
+    fn port(&self, way: Way) -> Port {
+        match self.setup.settings.wiring {
+            Wiring::Shared => Port::Shared,
+            Wiring::Pair if way.from < way.to => Port::Upstream,
+            Wiring::Pair => Port::Downstream,
+        }
+    }
+
+    /// Returns the index (from 0) of relay `to` (from 1). If that one is not alive, it is a random living relay.
+    fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
+        let living = |member: &Member| member.killed.is_none();
+        let meant = to.and_then(|to| usize::from(to).checked_sub(1));
+        let meant = meant.filter(|index| self.members.get(*index).is_some_and(living));
+        meant.or_else(|| {
+            let count = self.members.iter().filter(|member| living(member)).count();
+            let pick = attacker.rng.random_range(0..count.max(1));
+            let all = self.members.iter().enumerate();
+            let picked = |(_, member): &(usize, &Member)| living(member);
+            all.filter(picked).nth(pick).map(|(index, _)| index)
+        })
+    }
+
+    /// Delivers the frame and records how the relay classified it.
+    fn hit(&mut self, index: usize, kind: AttackKind, port: Port, bytes: &[u8]) {
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        let before = *member.relay.stats();
+        member.relay.handle_bytes(self.now, port, bytes);
+        let name = fate(&before, member.relay.stats());
+        *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
+        let note = match kind {
+            AttackKind::Forge => "forged by the attacker",
+            AttackKind::Replay => "replayed by the attacker",
+        };
+        self.keep_frame(self.now, link(index, port), bytes, note.to_owned());
+        self.drain(index);
     }
 }

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use uav_relay_xtask::FUZZ_TARGETS;
 
-use super::evidence::Evidence;
+use super::Evidence;
 
 /// Target of the firmware.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use super::image::{build, run};
-use super::row::{Row, row};
+use super::{Row, row};
 
 pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     let counted = count(&build("cost", &["--features", "internals"])?)?;

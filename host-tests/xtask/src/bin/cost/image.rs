@@ -7,7 +7,7 @@ use object::{Object as _, ObjectSection as _, SectionFlags};
 use uav_relay_xtask::stack::Calls;
 use uav_relay_xtask::toolchain::llvm_tool;
 
-use super::row::{Row, row};
+use super::{Row, row};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 

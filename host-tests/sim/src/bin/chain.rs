@@ -1,0 +1,248 @@
+//! `cargo chain`: simulated relays run the on-board code and find their positions over simulated links.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, BufWriter, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use uav_relay_capture::{Capture, Direction, Frame, Interface};
+use uav_relay_scenario::Scenario;
+use uav_relay_sim::cli::{Options, Prepared, Refused};
+use uav_relay_sim::command::Failure;
+use uav_relay_sim::report::{AttackReport, ChainReport, seconds};
+use uav_relay_sim::simulator::chain::Chain;
+use uav_relay_sim::simulator::outcome::{Link, OnAir, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::{command, svg};
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => command::ended(run(&options)),
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let (scenario, name) = match &options.scenario {
+        Some(file) => {
+            let scenario =
+                Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?;
+            (scenario, Some(file.display().to_string()))
+        }
+        None => (Scenario::default(), None),
+    };
+    let mut run = match Prepared::new(options, scenario, name.as_deref()) {
+        Ok(prepared) => prepared,
+        Err(Refused::Failed(failure)) => return Err(failure),
+        Err(Refused::Reported(report, None)) => return show(options, &report),
+        Err(Refused::Reported(report, Some(failure))) => {
+            if options.json {
+                command::print(&command::json(&*report)?);
+            }
+            return Err(failure);
+        }
+    };
+    let mut capture = match &options.capture {
+        Some(file) => Some(AirCapture::begin(file, &run.setup)?),
+        None => None,
+    };
+    let recorded = Setup {
+        record: capture.is_some(),
+        ..run.setup.clone()
+    };
+    let outcome = fly(&run, recorded, capture.as_mut())?;
+    capture.map_or(Ok(()), AirCapture::finish)?;
+    let mut report = run.report(&outcome);
+    if run.setup.attack.is_some() {
+        let quiet = Setup {
+            attack: None,
+            ..run.setup.clone()
+        };
+        let attack = AttackReport::new(run.setup.auth, &outcome, &fly(&run, quiet, None)?);
+        report.error = report.error.or_else(|| attack.harm());
+        report.attack = Some(attack);
+    }
+    if let Some(file) = &options.svg {
+        command::write(file, &svg::draw(&run.picture(&outcome, &report)))?;
+    }
+    show(options, &report)
+}
+
+fn fly(
+    run: &Prepared<'_>,
+    setup: Setup,
+    mut capture: Option<&mut AirCapture>,
+) -> Result<Outcome, Failure> {
+    let mut chain = run.fly(setup, |chain| watch(chain, &mut capture))?;
+    if let Some(capture) = capture {
+        capture.follow(&mut chain, true)?;
+    }
+    Ok(chain.finish())
+}
+
+/// Runs the chain until it settles, with a progress line.
+fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
+    let mut line = Progress::begin();
+    while !chain.step(20_000) {
+        if let Some(capture) = capture {
+            capture.follow(chain, false)?;
+        }
+        line.show(|| {
+            let (sweeps, now) = chain.progress();
+            format!("sweep {sweeps}, {:.0} s of virtual time", seconds(now))
+        });
+    }
+    Ok(())
+}
+
+/// Prints the report; an error in it is returned as the failure.
+fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
+    command::print(&if options.json {
+        command::json(report)?
+    } else {
+        report.table()
+    });
+    match &report.error {
+        None => Ok(()),
+        Some(error) => Err(Failure::unmet(error.clone())),
+    }
+}
+
+/// Run time before the line is shown.
+const SILENT: Duration = Duration::from_secs(1);
+
+/// Update interval of the line.
+const EVERY: Duration = Duration::from_millis(100);
+
+const ERASE: &str = "\r\u{1b}[K";
+
+/// Progress line on standard error, erased at the end of the run.
+struct Progress {
+    started: Instant,
+    shown: Option<Instant>,
+    is_terminal: bool,
+}
+
+impl Progress {
+    fn begin() -> Self {
+        Self {
+            started: Instant::now(),
+            shown: None,
+            is_terminal: io::stderr().is_terminal(),
+        }
+    }
+
+    /// Shows `text` if an update is due.
+    fn show(&mut self, text: impl FnOnce() -> String) {
+        let elapsed = self.started.elapsed();
+        let is_due = self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
+        if self.is_terminal && elapsed > SILENT && is_due {
+            write(&format!("{ERASE}{} s: {}", elapsed.as_secs(), text()));
+            self.shown = Some(Instant::now());
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.shown.is_some() {
+            write(ERASE);
+        }
+    }
+}
+
+/// Ignores write errors: a closed terminal is not an error of the run.
+fn write(text: &str) {
+    let mut out = io::stderr();
+    _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// Capture of a run, with virtual times.
+struct AirCapture {
+    file: PathBuf,
+    capture: Capture<BufWriter<File>>,
+    interfaces: BTreeMap<Link, Interface>,
+    relays: u16,
+}
+
+impl AirCapture {
+    /// Creates `file` for a run of `setup`.
+    fn begin(file: &Path, setup: &Setup) -> Result<Self, Failure> {
+        // The key is not secret: it is drawn from the seed, for this run only.
+        let key = setup.secret().map_or_else(String::new, |key| {
+            key.iter().fold(", key ".to_owned(), |mut text, byte| {
+                _ = write!(text, "{byte:02x}");
+                text
+            })
+        });
+        let relays = setup.mission.relays();
+        let comment = format!("{relays} simulated relays, seed {}{key}", setup.seed);
+        let begun = File::create(file).and_then(|out| {
+            Capture::new(BufWriter::new(out), "cargo chain of uav-relay", &comment)
+        });
+        Ok(Self {
+            capture: begun.map_err(|error| failed(file, &error))?,
+            file: file.to_owned(),
+            interfaces: BTreeMap::new(),
+            relays,
+        })
+    }
+
+    /// Writes the frames that have ended by now, or all frames if `to_the_end` is true.
+    fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
+        let until = if to_the_end {
+            uav_relay::Instant::from_micros(u64::MAX)
+        } else {
+            chain.progress().1
+        };
+        for frame in chain.frames(until) {
+            let written = self.write(&frame);
+            written.map_err(|error| failed(&self.file, &error))?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, frame: &OnAir) -> io::Result<()> {
+        let interface = match self.interfaces.get(&frame.link) {
+            Some(known) => *known,
+            None => self.open(frame.link)?,
+        };
+        let frame = Frame {
+            at: Duration::from_micros(frame.at.as_micros()),
+            bytes: &frame.bytes,
+            len: frame.bytes.len(),
+            direction: Direction::Unknown,
+            comment: &frame.note,
+        };
+        self.capture.frame(interface, &frame)
+    }
+
+    fn open(&mut self, link: Link) -> io::Result<Interface> {
+        let node = |number| match number {
+            0 => "Tx".to_owned(),
+            number if number > self.relays => "Rx".to_owned(),
+            number => format!("{number}"),
+        };
+        let name = match link {
+            Link::Shared => "channel".to_owned(),
+            Link::After(before) => format!("{}-{}", node(before), node(before + 1)),
+        };
+        let interface = self.capture.interface(&name, "")?;
+        self.interfaces.insert(link, interface);
+        Ok(interface)
+    }
+
+    fn finish(self) -> Result<(), Failure> {
+        let ended = self.capture.finish();
+        ended.map(drop).map_err(|error| failed(&self.file, &error))
+    }
+}
+
+fn failed(file: &Path, error: &io::Error) -> Failure {
+    let line = format!("{}: --capture cannot be written: {error}", file.display());
+    Failure::input(line)
+}

@@ -1,0 +1,681 @@
+//! Drones with simulated autopilots, connected to their relays by MAVLink.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::flight::autopilot::carrot::Pace;
+use uav_relay::flight::autopilot::{Autopilot, Kind};
+use uav_relay::flight::axis::Axis;
+use uav_relay::flight::mavlink::frame::{CHECKSUM, HEADER, MAGIC, checksum, find_known, id};
+use uav_relay::{Duration, Geodetic, Instant, Placement, Sites};
+
+use super::drones::{Body, Point, placement, point, sum};
+
+/// Takeover of a drone by its pilot.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Takeover {
+    /// Relay number of the drone, from 1.
+    pub relay: u16,
+    /// Start time.
+    pub from: Instant,
+    /// End time, if any: the pilot then hands the drone over once it hovers without traffic.
+    pub until: Option<Instant>,
+    /// Position to which the pilot flies, m along the run's line, to its right and up. `None` to climb in place.
+    pub to: Option<Point>,
+}
+
+/// Parameters of all drones of a run.
+#[derive(Clone, PartialEq, Debug)]
+pub struct FleetSpec {
+    /// Line on earth along which they fly.
+    pub axis: Axis,
+    /// Position of each drone's first hand-over, m along the line, to its right and up; it takes off below.
+    pub start: Vec<Point>,
+    /// Takeovers by pilots.
+    pub takeovers: Vec<Takeover>,
+    /// Restarts of autopilots in the air: relay number from 1, and time.
+    pub restarts: Vec<(u16, Instant)>,
+    /// Standard deviation of the gusts, m/s.
+    pub gust_mps: f64,
+    /// Bound on each drone's constant position error per axis, m.
+    pub bias_m: f64,
+    /// Bound on the additional error of each position report per axis, m.
+    pub noise_m: f64,
+}
+
+impl FleetSpec {
+    /// Returns PX4 and ArduCopter for alternate drones.
+    const fn kind(index: usize) -> Kind {
+        if index.is_multiple_of(2) {
+            Kind::Px4
+        } else {
+            Kind::ArduCopter
+        }
+    }
+}
+
+/// Returns a line of the given length eastward from 47.4 N, 8.54 E, for scenarios without sites. `None` for an invalid length.
+pub fn somewhere(distance_m: f64) -> Option<Axis> {
+    const TX: [f64; 2] = [47.4, 8.54];
+    let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;
+    let line = |east_deg: f64| {
+        let rx = Geodetic::from_degrees(TX[0], TX[1] + east_deg, 420.0)?;
+        Axis::try_new(tx, rx).ok()
+    };
+    // A degree of longitude is about 75 km there; two iterations reach the resolution of the coordinates.
+    let mut east_deg = distance_m / 75_000.0;
+    for _ in 0..3 {
+        east_deg *= distance_m / line(east_deg)?.distance_m();
+    }
+    line(east_deg)
+}
+
+/// First random-number stream of the drones, one per drone.
+const DRONES: u64 = 1_000;
+
+/// Speed and climb rate, m/s, and acceleration, m/s².
+const SPEED_MPS: f64 = 10.0;
+const CLIMB_MPS: f64 = 2.0;
+const ACCELERATION_MPS2: f64 = 3.0;
+
+/// Target timeout after which a PX4 leaves OFFBOARD and hovers (COM_OBL_RC_ACT 5).
+const LOST: Duration = Duration::from_millis(1_000);
+
+/// Time of streamed targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
+const RESUMES: Duration = Duration::from_millis(1_200);
+
+/// Duration of an autopilot's restart.
+const AWAY: Duration = Duration::from_millis(3_000);
+
+/// Time within which the link learns of a new mode or state, reported once a second.
+const TOLD_WITHIN: Duration = Duration::from_millis(1_500);
+
+/// Climb of a pilot who takes over, away from the chain, m.
+const ASIDE_M: f64 = 15.0;
+
+/// Values of `MAV_LANDED_STATE`.
+const ON_GROUND: u8 = 1;
+const IN_AIR: u8 = 2;
+const TAKING_OFF: u8 = 3;
+const LANDING: u8 = 4;
+
+#[derive(Clone, Copy, Debug)]
+struct Rate {
+    id: u32,
+    interval: Option<Duration>,
+    due: Instant,
+}
+
+/// Drone, its autopilot, and the relay's link to it.
+#[derive(Debug)]
+pub(super) struct Vehicle {
+    kind: Kind,
+    spec: FleetSpec,
+    pub(super) link: Autopilot,
+    /// Sites of the relay's mission if they differ from the run's line.
+    pub(super) sites: Option<Sites>,
+    pilot: Pilot,
+    body: Body,
+    gust: Point,
+    bias: Point,
+    armed: bool,
+    landed: u8,
+    mode: Mode,
+    /// Current target of the autopilot: where it hovers or flies to.
+    goal: Point,
+    /// Height of the first hand-over, m.
+    climbs_to_m: f64,
+    /// True while the pilot sees no other drone near.
+    pub(super) is_clear: bool,
+    told_at: Option<Instant>,
+    /// True while a PX4 is in its failsafe; it resumes OFFBOARD when targets are streamed again.
+    is_failing: bool,
+    streamed_since: Instant,
+    began: Instant,
+    away_until: Option<Instant>,
+    rates: [Rate; 4],
+    sequence: u8,
+    /// Grace period in which the link may not know yet that it must not send targets.
+    unknown_until: Instant,
+    pub(super) strays: u64,
+    rng: ChaCha8Rng,
+}
+
+impl Vehicle {
+    /// Drone `index` (from 0) on the ground.
+    pub(super) fn new(spec: &FleetSpec, index: usize, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(DRONES + u64::try_from(index).unwrap_or(0));
+        let start = spec.start.get(index).copied().unwrap_or_default();
+        let at = [start[0], start[1], 0.0];
+        let bias = [0; 3].map(|_| spec.bias_m * rng.random_range(-1.0..=1.0));
+        Self {
+            kind: FleetSpec::kind(index),
+            link: Autopilot::new(spec.axis, Pace::default(), Instant::ZERO),
+            sites: None,
+            pilot: Pilot::new(index, &spec.takeovers),
+            body: Body::hovering(at),
+            gust: [0.0; 3],
+            bias,
+            armed: false,
+            landed: ON_GROUND,
+            mode: Mode::Sticks,
+            goal: at,
+            climbs_to_m: start[2],
+            is_clear: true,
+            told_at: None,
+            is_failing: false,
+            streamed_since: Instant::ZERO,
+            began: Instant::ZERO,
+            away_until: None,
+            rates: Self::rates(Instant::ZERO),
+            sequence: 0,
+            unknown_until: Instant::ZERO,
+            strays: 0,
+            rng,
+            spec: spec.clone(),
+        }
+    }
+
+    /// Returns the initial message rates: heartbeats only.
+    fn rates(now: Instant) -> [Rate; 4] {
+        let often = Some(Duration::from_millis(1_000));
+        [
+            (id::HEARTBEAT, often),
+            (id::GLOBAL_POSITION_INT, None),
+            (id::EXTENDED_SYS_STATE, None),
+            (id::POSITION_TARGET_GLOBAL_INT, None),
+        ]
+        .map(|(id, interval)| Rate {
+            id,
+            interval,
+            due: now,
+        })
+    }
+
+    /// Returns the line of the relay's placements.
+    fn line(&self) -> Axis {
+        let moved = self.sites.and_then(|sites| Axis::between(sites).ok());
+        moved.unwrap_or(self.spec.axis)
+    }
+
+    /// Returns the drone's position along its relay's line.
+    pub(super) fn along(&self) -> Point {
+        if self.sites.is_none() {
+            return self.body.at;
+        }
+        let on_earth = self.spec.axis.point(placement(self.body.at));
+        let along = on_earth.and_then(|at| self.line().place(at));
+        along.map_or([f64::NAN; 3], point)
+    }
+
+    /// Converts a placement of the relay to the run's line.
+    pub(super) fn there(&self, place: Placement) -> Option<Point> {
+        let on_earth = self.line().point(place)?;
+        self.spec.axis.place(on_earth).map(point)
+    }
+
+    pub(super) const fn at(&self) -> Point {
+        self.body.at
+    }
+
+    /// Returns true while the drone moves at more than 0.5 m/s along an axis.
+    pub(super) fn moves(&self) -> bool {
+        self.body.velocity_mps.iter().any(|v| v.abs() > 0.5)
+    }
+
+    pub(super) const fn flies(&self) -> bool {
+        self.landed != ON_GROUND
+    }
+
+    /// Returns true unless the pilot has taken over.
+    pub(super) fn is_lent(&self, now: Instant) -> bool {
+        !self.pilot.has_sticks(now)
+    }
+
+    /// Returns true if the drone is in the air and neither taking off, landing nor flown by its pilot.
+    pub(super) fn is_in_its_hands(&self, now: Instant) -> bool {
+        self.landed == IN_AIR && self.mode != Mode::Sticks && self.is_lent(now)
+    }
+
+    /// Restarts the autopilot; it is silent for [`AWAY`].
+    pub(super) fn restart(&mut self, now: Instant) {
+        self.away_until = Some(now + AWAY);
+        self.mode = Mode::Hold;
+        self.is_failing = false;
+        // A climb continues: no pilot would hand over a drone that stopped on the way up.
+        if self.landed == IN_AIR {
+            self.goal = self.taken();
+        }
+        self.told_at = None;
+        self.pilot.has_seen_a_restart(now);
+    }
+
+    /// Reboots the relay's link, which loses its state.
+    pub(super) fn boot(&mut self, now: Instant) {
+        self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
+        self.sites = None;
+        self.pilot.has_seen_a_restart(now);
+    }
+
+    pub(super) fn land(&mut self) {
+        if self.landed == IN_AIR {
+            self.landed = LANDING;
+            self.mode = Mode::Sticks;
+            self.goal = self.taken();
+            self.goal[2] = self.bias[2];
+        }
+    }
+
+    /// Advances by `step_s` seconds to `now` and delivers the due messages to the relay's link.
+    pub(super) fn go_on(&mut self, now: Instant, step_s: f64) {
+        self.choose(now);
+        self.fly(step_s);
+        if self.away_until.is_some_and(|until| until > now) {
+            return;
+        }
+        if self.away_until.take().is_some() {
+            self.began = now;
+            self.rates = Self::rates(now);
+        }
+        for which in 0..self.rates.len() {
+            let Some(rate) = self.rates.get_mut(which) else {
+                continue;
+            };
+            if let Some(interval) = rate.interval
+                && rate.due <= now
+            {
+                rate.due = now + interval;
+                let id = rate.id;
+                if let Some(says) = self.says(now, id) {
+                    self.sequence = self.sequence.wrapping_add(1);
+                    self.link.handle_bytes(now, &says.frame(self.sequence));
+                }
+            }
+        }
+    }
+
+    /// Updates the mode and, on a change, starts the grace period of the link.
+    fn choose(&mut self, now: Instant) {
+        let before = (self.landed, self.mode);
+        self.decide(now);
+        if before != (self.landed, self.mode) {
+            self.unknown_until = now + TOLD_WITHIN;
+        }
+    }
+
+    /// Returns true if targets are allowed now: a PX4 in flight accepts them in any mode.
+    fn may_be_told(&self) -> bool {
+        match self.landed {
+            IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
+            _ => false,
+        }
+    }
+
+    fn decide(&mut self, now: Instant) {
+        if !self.armed && self.pilot.has_armed(now) {
+            self.armed = true;
+            self.landed = TAKING_OFF;
+            self.goal = self.taken();
+            self.goal[2] = self.climbs_to_m;
+        }
+        if self.landed == TAKING_OFF && (self.taken()[2] - self.climbs_to_m).abs() < 0.3 {
+            self.landed = IN_AIR;
+            self.pilot.is_up(now);
+        }
+        if self.landed == LANDING && self.body.at[2] < 0.2 {
+            self.landed = ON_GROUND;
+            self.body.velocity_mps = [0.0; 3];
+        }
+        if self.landed != IN_AIR {
+            return;
+        }
+        let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
+        let hovers = self.body.velocity_mps.iter().all(|v| v.abs() < 0.3);
+        if let Some(mode) = self.pilot.chooses(now, hovers && self.is_clear)
+            && (mode != self.mode || mode == Mode::Companion)
+        {
+            let refuses = self.kind == Kind::Px4 && (!streamed || self.is_failing);
+            // A mode selected by the pilot ends the failsafe; OFFBOARD is tried again afterwards.
+            self.is_failing = false;
+            if mode == self.mode {
+                // The mode was selected before the link started: change it once so that the link sees the pilot's choice.
+                self.mode = Mode::Hold;
+                self.goal = self.taken();
+                self.pilot.tries_again(now);
+            } else if refuses && mode == Mode::Companion {
+                self.pilot.tries_again(now);
+            } else {
+                self.mode = mode;
+                self.goal = self.taken();
+                if mode == Mode::Sticks {
+                    self.goal[2] += ASIDE_M;
+                    self.goal = self.pilot.flies_to(now).unwrap_or(self.goal);
+                }
+            }
+        }
+        if self.kind == Kind::Px4 && self.mode == Mode::Companion && !streamed {
+            self.mode = Mode::Hold;
+            self.is_failing = true;
+            self.pilot.has_seen_a_restart(now);
+            self.goal = self.taken();
+        }
+        if !streamed {
+            self.streamed_since = now;
+        }
+        if self.is_failing && now.since(self.streamed_since) >= RESUMES {
+            self.mode = Mode::Companion;
+            self.is_failing = false;
+        }
+    }
+
+    fn fly(&mut self, step_s: f64) {
+        if !self.flies() {
+            return;
+        }
+        let speed = match self.landed {
+            TAKING_OFF | LANDING => CLIMB_MPS,
+            _ => SPEED_MPS,
+        };
+        let to = sum(self.goal, self.bias.map(|part| -part));
+        self.body.fly(to, speed, ACCELERATION_MPS2, step_s);
+        // Gusts have a correlation time of about 2 s.
+        let keeps = (-step_s / 2.0).exp();
+        let drawn = self.spec.gust_mps * (3.0 * (1.0 - keeps * keeps)).sqrt();
+        for (gust, at) in self.gust.iter_mut().zip(&mut self.body.at) {
+            *gust = *gust * keeps + drawn * self.rng.random_range(-1.0..=1.0);
+            *at += *gust * step_s;
+        }
+    }
+
+    /// Returns the drone's own position estimate: the true position plus the bias.
+    fn taken(&self) -> Point {
+        sum(self.body.at, self.bias)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "wraps after 49 days")]
+    fn says(&mut self, now: Instant, id: u32) -> Option<SensorReading> {
+        match id {
+            id::HEARTBEAT => Some(SensorReading::Heartbeat {
+                autopilot: match self.kind {
+                    Kind::Px4 => 12,
+                    Kind::ArduCopter => 3,
+                },
+                armed: self.armed,
+                custom_mode: match (self.kind, self.mode) {
+                    (Kind::Px4, Mode::Sticks) => 3 << 16,
+                    (Kind::Px4, Mode::Hold) => 4 << 16 | 3 << 24,
+                    (Kind::Px4, Mode::Companion) => 6 << 16,
+                    (Kind::ArduCopter, Mode::Sticks) => 16,
+                    (Kind::ArduCopter, Mode::Hold) => 5,
+                    (Kind::ArduCopter, Mode::Companion) => 4,
+                },
+                is_critical: self.is_failing,
+            }),
+            id::EXTENDED_SYS_STATE => Some(SensorReading::State {
+                landed: self.landed,
+            }),
+            id::GLOBAL_POSITION_INT => {
+                let taken = self.taken();
+                let noise = self.spec.noise_m;
+                let said = taken.map(|part| part + noise * self.rng.random_range(-1.0..=1.0));
+                Some(SensorReading::Position {
+                    boot_ms: (now.since(self.began).as_micros() / 1_000) as u32,
+                    at: self.spec.axis.point(placement(said))?,
+                })
+            }
+            _ if self.kind == Kind::ArduCopter && self.mode == Mode::Companion => {
+                Some(SensorReading::Target {
+                    at: self.spec.axis.point(placement(self.goal))?,
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// Handles a MAVLink frame from the relay's link.
+    pub(super) fn hear(&mut self, now: Instant, frame: &[u8]) {
+        if self.away_until.is_some() {
+            return;
+        }
+        match heard(frame) {
+            Some(Heard::Interval { id, interval_us }) => {
+                for rate in self.rates.iter_mut().filter(|rate| rate.id == id) {
+                    rate.interval = Some(Duration::from_micros(interval_us));
+                    rate.due = now;
+                }
+            }
+            Some(Heard::Target(at)) => {
+                let is_stray = !self.may_be_told() && now > self.unknown_until;
+                self.strays += u64::from(is_stray);
+                self.told_at = Some(now);
+                if self.mode == Mode::Companion
+                    && let Some(place) = self.spec.axis.place(at)
+                {
+                    self.goal = point(place);
+                }
+            }
+            Some(Heard::Sync(asked)) => {
+                self.sequence = self.sequence.wrapping_add(1);
+                let answer = SensorReading::Sync { asked }.frame(self.sequence);
+                self.link.handle_bytes(now, &answer);
+            }
+            None => {}
+        }
+    }
+}
+
+/// Take-off time of the first drone, and interval between drones.
+const FIRST_S: u64 = 5;
+const NEXT_MS: u64 = 500;
+
+/// Delay of the hand-over after the climb, and after a restart of the autopilot.
+const LOOKS_S: u64 = 2;
+const RECOVERS_S: u64 = 10;
+
+/// Flight mode.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Mode {
+    /// Pilot control.
+    Sticks,
+    /// Hover, controlled by the autopilot alone.
+    Hold,
+    /// Control by the relay's setpoint.
+    Companion,
+}
+
+#[derive(Clone, Debug)]
+struct Pilot {
+    arms_at: Instant,
+    /// Time of the next hand-over, once known.
+    hands_over_at: Option<Instant>,
+    takeovers: Vec<Takeover>,
+}
+
+impl Pilot {
+    fn new(index: usize, all: &[Takeover]) -> Self {
+        let later = u64::try_from(index).unwrap_or(0) * NEXT_MS;
+        let own = |takeover: &&Takeover| usize::from(takeover.relay) == index + 1;
+        Self {
+            arms_at: Instant::from_millis(1_000 * FIRST_S + later),
+            hands_over_at: None,
+            takeovers: all.iter().filter(own).copied().collect(),
+        }
+    }
+
+    fn has_armed(&self, now: Instant) -> bool {
+        now >= self.arms_at
+    }
+
+    /// Handles the end of the climb.
+    fn is_up(&mut self, now: Instant) {
+        // Keep a later hand-over time: the autopilot may have restarted during the climb.
+        let looked = now + Duration::from_millis(1_000 * LOOKS_S);
+        self.hands_over_at = self.hands_over_at.max(Some(looked));
+    }
+
+    /// Handles a restart of the autopilot.
+    fn has_seen_a_restart(&mut self, now: Instant) {
+        self.hands_over_at = Some(now + Duration::from_millis(1_000 * RECOVERS_S));
+    }
+
+    /// Returns the mode that the pilot selects now, if any. `may_hand_over` is false while the drone moves or traffic is near.
+    fn chooses(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
+        if self.has_sticks(now) {
+            // Schedule a hand-over after the takeover.
+            self.hands_over_at = Some(now);
+            return Some(Mode::Sticks);
+        }
+        if may_hand_over && self.hands_over_at.is_some_and(|at| at <= now) {
+            self.hands_over_at = None;
+            return Some(Mode::Companion);
+        }
+        None
+    }
+
+    /// Returns the position to which the pilot flies the drone during a takeover, if any.
+    fn flies_to(&self, now: Instant) -> Option<Point> {
+        let during = |it: &&Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
+        self.takeovers.iter().find(during)?.to
+    }
+
+    /// Schedules another attempt after the autopilot rejected the mode.
+    fn tries_again(&mut self, now: Instant) {
+        self.hands_over_at = Some(now + Duration::from_millis(1_000 * LOOKS_S));
+    }
+
+    fn has_sticks(&self, now: Instant) -> bool {
+        let during = |it: &Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
+        self.takeovers.iter().any(during)
+    }
+}
+
+/// MAVLink system ID.
+const SYSTEM: u8 = 1;
+
+/// Message sent by the autopilot.
+#[derive(Clone, Copy, Debug)]
+enum SensorReading {
+    Heartbeat {
+        autopilot: u8,
+        armed: bool,
+        custom_mode: u32,
+        /// True for `MAV_STATE` 5 (critical): failsafe.
+        is_critical: bool,
+    },
+    /// Reply to a TIMESYNC request.
+    Sync {
+        asked: u64,
+    },
+    State {
+        landed: u8,
+    },
+    Position {
+        boot_ms: u32,
+        at: Geodetic,
+    },
+    Target {
+        at: Geodetic,
+    },
+}
+
+impl SensorReading {
+    fn frame(self, sequence: u8) -> Vec<u8> {
+        let mut payload = Vec::new();
+        let id = match self {
+            Self::Heartbeat {
+                autopilot,
+                armed,
+                custom_mode,
+                is_critical,
+            } => {
+                payload.extend(custom_mode.to_le_bytes());
+                // Quadrotor; custom mode; active or critical.
+                let status = if is_critical { 5 } else { 4 };
+                payload.extend([2, autopilot, 1 | if armed { 128 } else { 0 }, status, 3]);
+                id::HEARTBEAT
+            }
+            Self::Sync { asked } => {
+                payload.extend(1_u64.to_le_bytes());
+                payload.extend(asked.to_le_bytes());
+                id::TIMESYNC
+            }
+            Self::State { landed } => {
+                payload.extend([0, landed]);
+                id::EXTENDED_SYS_STATE
+            }
+            Self::Position { boot_ms, at } => {
+                payload.extend(boot_ms.to_le_bytes());
+                for part in [at.lat_e7, at.lon_e7, at.amsl_mm, 0] {
+                    payload.extend(part.to_le_bytes());
+                }
+                payload.extend([0; 8]);
+                id::GLOBAL_POSITION_INT
+            }
+            Self::Target { at } => {
+                payload.extend([0; 4]);
+                payload.extend(at.lat_e7.to_le_bytes());
+                payload.extend(at.lon_e7.to_le_bytes());
+                #[expect(clippy::cast_precision_loss, reason = "the wire has an f32")]
+                payload.extend((at.amsl_mm as f32 / 1e3).to_le_bytes());
+                payload.extend([0; 32]);
+                payload.extend([0xF8, 0x0D, 5]);
+                id::POSITION_TARGET_GLOBAL_INT
+            }
+        };
+        framed(id, &payload, sequence)
+    }
+}
+
+fn framed(id: u32, payload: &[u8], sequence: u8) -> Vec<u8> {
+    let [a, b, c, _] = id.to_le_bytes();
+    let length = u8::try_from(payload.len()).unwrap_or(u8::MAX);
+    let mut frame = vec![MAGIC, length, 0, 0, sequence, SYSTEM, 1, a, b, c];
+    frame.extend(payload);
+    if let (Some(known), Some(covered)) = (find_known(id), frame.get(1..)) {
+        frame.extend(checksum(covered, known).to_le_bytes());
+    }
+    frame
+}
+
+/// Message received by the autopilot.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Heard {
+    /// Message interval request, µs.
+    Interval { id: u32, interval_us: u64 },
+    /// Position target.
+    Target(Geodetic),
+    /// TIMESYNC request; the value is returned.
+    Sync(u64),
+}
+
+/// Decodes a received frame; `None` for messages that the autopilot ignores.
+fn heard(frame: &[u8]) -> Option<Heard> {
+    let end = frame.len().checked_sub(CHECKSUM)?;
+    let header = frame.first_chunk::<HEADER>()?;
+    let [.., a, b, c] = *header;
+    let payload = frame.get(HEADER..end)?;
+    let bytes = |at: usize| [0, 1, 2, 3].map(|i| payload.get(at + i).copied().unwrap_or(0));
+    let float = |at| f64::from(f32::from_le_bytes(bytes(at)));
+    match u32::from_le_bytes([a, b, c, 0]) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "numbers of messages and microseconds"
+        )]
+        id::COMMAND_LONG => Some(Heard::Interval {
+            id: float(0) as u32,
+            interval_us: float(4) as u64,
+        }),
+        #[expect(clippy::cast_possible_truncation, reason = "millimetres")]
+        id::SET_POSITION_TARGET_GLOBAL_INT => Some(Heard::Target(Geodetic {
+            lat_e7: i32::from_le_bytes(bytes(4)),
+            lon_e7: i32::from_le_bytes(bytes(8)),
+            amsl_mm: (float(12) * 1e3).round() as i32,
+        })),
+        id::TIMESYNC => {
+            let [low, high] = [8, 12].map(|at| u64::from(u32::from_le_bytes(bytes(at))));
+            Some(Heard::Sync(high << 32 | low))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,590 @@
+//! Events for the operator name the node and the cause.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::unnecessary_wraps,
+    clippy::redundant_closure_for_method_calls,
+    reason = "as every test may"
+)]
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay::{
+    Auth, Event, Ground, Identity, Instant, Interference, Interferer, Key, MAX_FRAME, Mission,
+    MissionConfig, Port, Progress, Relay, Settings, Side, Upload, Wiring,
+};
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::mission::mission as of_scenario;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::faults::OneWayFailure;
+use uav_relay_sim::simulator::outcome::{Moment, Outcome, TimelineEvent};
+use uav_relay_sim::simulator::setup::Setup;
+
+fn at(seconds: u64) -> Instant {
+    Instant::from_millis(1_000 * seconds)
+}
+
+fn of(outcome: &Outcome, what: fn(TimelineEvent) -> bool) -> Vec<(u16, Option<u16>)> {
+    let moments = outcome.moments.iter().filter(|moment| what(moment.what));
+    moments
+        .map(|&Moment { relay, other, .. }| (relay, other))
+        .collect()
+}
+
+/// A dead relay is reported by its number; its replacement is reported by its own.
+#[test]
+fn who_is_lost_and_who_is_found_is_told_by_its_number() {
+    let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
+    setup.kills = vec![(3, at(60))];
+    let outcome = run(setup).unwrap();
+    let mut lost = of(&outcome, |what| matches!(what, TimelineEvent::Lost(_)));
+    lost.sort_unstable();
+    assert_eq!(lost, [(2, Some(3)), (4, Some(3))]);
+    let found = of(&outcome, |what| matches!(what, TimelineEvent::Found(_)));
+    assert!(
+        found.contains(&(2, Some(4))) && found.contains(&(4, Some(2))),
+        "{found:?}"
+    );
+    assert!(
+        found.iter().all(|(_, other)| *other != Some(3)),
+        "{found:?}"
+    );
+}
+
+/// Relay 3 does not receive relay 2. Relay 2 receives relay 3 and must be told why they are no neighbours.
+#[test]
+fn a_relay_that_is_not_heard_is_told_by_whom() {
+    let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
+    setup.deaf = vec![OneWayFailure {
+        by: 3,
+        of: 2,
+        from: at(60),
+        until: None,
+    }];
+    let outcome = run(setup).unwrap();
+    assert_eq!(
+        of(&outcome, |what| what == TimelineEvent::NotHeard),
+        [(2, Some(3))]
+    );
+}
+
+/// Lost and corrupted frames never cause reports of deaf nodes, wrong keys or old epochs.
+#[test]
+fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
+    for seed in 1..=3 {
+        let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(300));
+        setup.faults.loss = 0.3;
+        setup.faults.corrupt = 0.1;
+        setup.auth = true;
+        setup.seed = seed;
+        let outcome = run(setup).unwrap();
+        let told = of(&outcome, |what| {
+            let causes = [
+                TimelineEvent::NotHeard,
+                TimelineEvent::MissionMismatch,
+                TimelineEvent::KeyMismatch,
+                TimelineEvent::EpochWentBack,
+                TimelineEvent::DuplicateIndex,
+            ];
+            causes.contains(&what)
+        });
+        assert_eq!(told, [], "seed {seed}");
+    }
+}
+
+/// Two of five relays have no quorum. They keep requesting a view but report this once.
+#[test]
+fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
+    let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));
+    setup.kills = vec![(1, at(60)), (2, at(60)), (3, at(60))];
+    let outcome = run(setup).unwrap();
+    for what in [TimelineEvent::NoQuorum, TimelineEvent::LeaseLapsed] {
+        let mut told = outcome.moments.clone();
+        told.retain(|moment| moment.what == what);
+        let mut by: Vec<u16> = told.iter().map(|moment| moment.relay).collect();
+        by.sort_unstable();
+        assert_eq!(by, [4, 5], "{what:?}");
+    }
+}
+
+/// Time step and duration of a frame, ms.
+const STEP_MS: u64 = 10;
+
+pub(crate) const KEY: [u8; 32] = [7; 32];
+
+pub(crate) fn auth(key: [u8; 32], epoch: u32) -> Option<Auth> {
+    let key = Key::new(key);
+    Some(Auth { key, epoch })
+}
+
+pub(crate) struct Air {
+    pub(crate) relays: Vec<Relay>,
+    /// True for relays that are switched off.
+    pub(crate) off: Vec<bool>,
+    pub(crate) ground: Option<Ground>,
+    /// Share of frames that each receiver loses.
+    pub(crate) loss: f64,
+    pub(crate) now: Instant,
+    /// Events, with the index (from 0) of the relay that raised them.
+    pub(crate) told: Vec<(usize, Event)>,
+    /// Withheld frames of the ground; `withheld` selects them.
+    pub(crate) recorded: Vec<Vec<u8>>,
+    pub(crate) withheld: fn(&[u8]) -> bool,
+    /// Frames on the air with the sender's index, `usize::MAX` for other senders.
+    flying: Vec<(usize, Vec<u8>)>,
+    rng: ChaCha8Rng,
+}
+
+impl Air {
+    pub(crate) fn new(relays: Vec<Relay>, loss: f64, seed: u64) -> Self {
+        Self {
+            off: vec![false; relays.len()],
+            relays,
+            ground: None,
+            loss,
+            now: Instant::ZERO,
+            told: Vec::new(),
+            recorded: Vec::new(),
+            withheld: |_| false,
+            flying: Vec::new(),
+            rng: ChaCha8Rng::seed_from_u64(seed),
+        }
+    }
+
+    /// Returns a chain with keys and epochs from `auth`, by index from 1.
+    pub(crate) fn of(mission: &Mission, auth: impl Fn(u16) -> Option<Auth>, loss: f64) -> Self {
+        let relays = (1..=mission.relays())
+            .map(|index| relay(mission, index, auth(index), Instant::ZERO))
+            .collect();
+        Self::new(relays, loss, 1)
+    }
+
+    pub(crate) fn join(&mut self, relay: Relay) -> usize {
+        self.relays.push(relay);
+        self.off.push(false);
+        self.relays.len() - 1
+    }
+
+    pub(crate) fn run(&mut self, seconds: u64) {
+        for _ in 0..seconds * 1_000 / STEP_MS {
+            self.now = Instant::from_micros(self.now.as_micros() + 1_000 * STEP_MS);
+            self.step();
+        }
+    }
+
+    fn step(&mut self) {
+        let now = self.now;
+        let count = self.relays.len();
+        for (from, bytes) in std::mem::take(&mut self.flying) {
+            for (at, relay) in self.relays.iter_mut().enumerate() {
+                if at != from && !self.off[at] && !self.rng.random_bool(self.loss) {
+                    relay.handle_bytes(now, Port::Shared, &bytes);
+                }
+            }
+            if from != usize::MAX
+                && let Some(ground) = &mut self.ground
+                && !self.rng.random_bool(self.loss)
+            {
+                ground.handle_bytes(&bytes);
+            }
+        }
+        for at in 0..count {
+            if self.off[at] {
+                continue;
+            }
+            let relay = &mut self.relays[at];
+            if relay.poll_timeout().is_some_and(|due| due <= now) {
+                relay.handle_timeout(now);
+            }
+            let mut frame = [0; MAX_FRAME];
+            relay.persist(|_| true);
+            while let Some(transmit) = relay.poll_transmit(now, &mut frame) {
+                self.flying.push((at, frame[..transmit.len].to_vec()));
+            }
+            while let Some(event) = relay.poll_event() {
+                self.told.push((at, event));
+            }
+            assert!(relay.poll_timeout().is_none_or(|due| due > now), "it spins");
+        }
+        if let Some(ground) = &mut self.ground {
+            ground.handle_timeout(now);
+            let mut frame = [0; MAX_FRAME];
+            while let Some(len) = ground.poll_transmit(&mut frame) {
+                let bytes = frame[..len].to_vec();
+                if (self.withheld)(&bytes) {
+                    self.recorded.push(bytes);
+                } else {
+                    self.flying.push((usize::MAX, bytes));
+                }
+            }
+        }
+    }
+
+    /// Sends `bytes` as an unknown sender.
+    pub(crate) fn play(&mut self, bytes: &[u8]) {
+        self.flying.push((usize::MAX, bytes.to_vec()));
+    }
+
+    /// Returns the relay index of each occurrence of `event`.
+    pub(crate) fn told(&self, event: Event) -> Vec<usize> {
+        let told = self.told.iter().filter(|(_, told)| *told == event);
+        told.map(|(by, _)| *by).collect()
+    }
+}
+
+pub(crate) fn settings(auth: Option<Auth>) -> Settings {
+    Settings {
+        wiring: Wiring::Shared,
+        auth,
+        ..Settings::default()
+    }
+}
+
+pub(crate) fn relay(mission: &Mission, index: u16, auth: Option<Auth>, now: Instant) -> Relay {
+    let identity = Identity { network: 7, index };
+    let seed = u32::from(index) + u32::try_from(now.as_micros() / 1_000).unwrap();
+    Relay::new(*mission, identity, settings(auth), seed, now).unwrap()
+}
+
+pub(crate) fn mission(relays: u16) -> Mission {
+    of_scenario(&Scenario::default(), relays, 1e-4).unwrap().0
+}
+
+const TAKEN: Event = Event::DuplicateIndex { node: 3 };
+
+/// Returns a flying chain of five with a second relay 3 that has just been switched on, and its index.
+fn joined(loss: f64, seed: u64) -> (Air, usize) {
+    let mission = mission(5);
+    let begun = Instant::ZERO;
+    let relays = (1..=5).map(|index| relay(&mission, index, None, begun));
+    let mut air = Air::new(relays.collect(), loss, seed);
+    // The second relay appears at a varying time between two passes.
+    air.run(90 + seed % 7);
+    assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
+    assert!(air.told(TAKEN).is_empty());
+    let other = air.join(relay(&mission, 3, None, air.now));
+    (air, other)
+}
+
+fn count() -> u64 {
+    std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
+}
+
+/// Runs `COUNT` chains for each loss rate.
+#[test]
+fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() {
+    for loss in [0.0, 0.3, 0.5] {
+        for seed in 0..count() {
+            let (mut air, other) = joined(loss, seed);
+            let places: Vec<_> = air.relays.iter().map(Relay::setpoint).collect();
+            for _ in 0..120 {
+                air.run(1);
+                let given = air.relays[other].setpoint();
+                assert_eq!(given, None, "loss {loss}, seed {seed}, {:?}", air.now);
+            }
+            assert!(air.relays[other].is_passive() && !air.relays[2].is_passive());
+            let mut told = air.told(TAKEN);
+            told.sort_unstable();
+            told.dedup();
+            assert_eq!(told, [2, other], "loss {loss}");
+            if loss == 0.0 {
+                let after: Vec<_> = air.relays.iter().map(Relay::setpoint).collect();
+                assert_eq!(after[..5], places[..5]);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_later_one_takes_part_once_the_other_is_gone() {
+    for by_hand in [false, true] {
+        let (mut air, other) = joined(0.0, 1);
+        air.run(10);
+        assert!(air.relays[other].is_passive());
+        air.off[2] = true;
+        if by_hand {
+            let now = air.now;
+            air.relays[other].clear_duplicate_index(now);
+            assert!(!air.relays[other].is_passive());
+        }
+        air.run(20);
+        assert_eq!(air.relays[other].is_passive(), !by_hand);
+        air.run(100);
+        assert!(!air.relays[other].is_passive());
+        assert!(air.relays[other].setpoint().is_some(), "it is relay 3 now");
+    }
+}
+
+/// Two relays with the same number start together: in the end one flies and the other is passive.
+#[test]
+fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
+    for seed in 0..6 {
+        let mission = mission(4);
+        let mut air = Air::of(&mission, |_| None, 0.1 * (seed % 3) as f64);
+        let mut other = relay(&mission, 3, None, Instant::from_millis(77 + seed));
+        other.handle_timeout(air.now);
+        let other = air.join(other);
+        air.run(400);
+        let down = [2, other].map(|at| air.relays[at].is_passive());
+        assert_eq!(down[0], !down[1], "seed {seed}");
+        let flies = if down[0] { other } else { 2 };
+        assert!(air.relays[flies].setpoint().is_some());
+        assert!(air.told(TAKEN).contains(&2) && air.told(TAKEN).contains(&other));
+    }
+}
+
+/// Signed duplicates: the larger epoch wins; the other relay becomes passive and reports the duplicate.
+#[test]
+fn with_a_key_the_one_with_the_larger_epoch_stays() {
+    for (epoch, first_stays) in [(1, true), (9, false)] {
+        let mission = mission(5);
+        let mut air = Air::of(&mission, |_| auth(KEY, 5), 0.0);
+        air.run(90);
+        let other = air.join(relay(&mission, 3, auth(KEY, epoch), air.now));
+        air.run(240);
+        let silent = if first_stays { other } else { 2 };
+        assert!(air.told(TAKEN).contains(&silent), "{epoch}");
+        assert_eq!(air.relays[2].setpoint().is_some(), first_stays, "{epoch}");
+        assert_eq!(air.relays[2].is_passive(), !first_stays, "{epoch}");
+        assert_eq!(
+            air.relays[other].setpoint().is_some(),
+            !first_stays,
+            "{epoch}"
+        );
+    }
+}
+
+/// An attacker without the key can cause a report, but no relay becomes passive.
+#[test]
+fn forged_frames_have_nobody_stand_down() {
+    let mission = mission(3);
+    let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
+    air.run(60);
+    let mut liar = relay(&mission, 2, auth([1; 32], 99), air.now);
+    let mut frame = [0; MAX_FRAME];
+    for _ in 0..60 {
+        liar.persist(|_| true);
+        while let Some(transmit) = liar.poll_transmit(air.now, &mut frame) {
+            air.play(&frame[..transmit.len]);
+        }
+        air.run(1);
+        liar.handle_timeout(air.now);
+    }
+    assert_eq!(air.told(Event::DuplicateIndex { node: 2 }), [1]);
+    assert!(
+        air.relays
+            .iter()
+            .all(|relay| relay.setpoint().is_some() && !relay.is_passive())
+    );
+}
+
+/// Relay 2 of three has another key: it and its neighbours report this once.
+#[test]
+fn another_key_is_told_with_the_node() {
+    for loss in [0.0, 0.3] {
+        let key = |index| if index == 2 { [1; 32] } else { KEY };
+        let mut air = Air::of(&mission(3), |index| auth(key(index), 1), loss);
+        air.run(60);
+        let mut told = air.told(Event::KeyMismatch { node: 2 });
+        told.sort_unstable();
+        assert_eq!(told, [0, 2]);
+        for node in [1, 3] {
+            assert_eq!(air.told(Event::KeyMismatch { node }), [1]);
+        }
+    }
+}
+
+/// Two handshakes with a wrong key cause no report.
+#[test]
+fn two_forged_handshakes_are_noise() {
+    let mission = mission(3);
+    let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
+    let mut stranger = relay(&mission, 2, auth([1; 32], 9), air.now);
+    let mut frame = [0; MAX_FRAME];
+    air.run(30);
+    for _ in 0..2 {
+        let transmit = stranger.poll_transmit(air.now, &mut frame).unwrap();
+        air.play(&frame[..transmit.len]);
+        air.run(30);
+    }
+    assert!(air.relays[0].stats().forged > 0);
+    assert!(air.told(Event::KeyMismatch { node: 2 }).is_empty());
+}
+
+/// Relay 2 restarts with an older epoch: its neighbours reject it, and all three relays report it.
+#[test]
+fn an_epoch_that_went_back_is_told_with_the_node() {
+    for (loss, again, back) in [(0.0, 1, true), (0.3, 1, true), (0.3, 6, false)] {
+        let mission = mission(3);
+        let epoch = |index| if index == 2 { 5 } else { 1 };
+        let mut air = Air::of(&mission, |index| auth(KEY, epoch(index)), loss);
+        air.run(60);
+        assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
+        air.relays[1] = relay(&mission, 2, auth(KEY, again), air.now);
+        air.run(90);
+        let mut told = air.told(Event::EpochWentBack { node: 2 });
+        told.sort_unstable();
+        let expected: &[usize] = if back { &[0, 1, 2] } else { &[] };
+        assert_eq!(told, expected, "epoch {again}, loss {loss}");
+        assert_eq!(air.relays[1].setpoint().is_none(), back);
+    }
+}
+
+/// Relay 2 restarts with the epoch that it had, so its neighbours take it for a duplicate of itself. With the larger claim it takes part.
+/// With the smaller one it reports that its number is taken, and has no setpoint until they have received nothing of the larger one for
+/// `dead_after`.
+#[test]
+fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() {
+    let mut waited = 0;
+    for seed in 1..=12 {
+        let mission = mission(3);
+        let mut air = Air::of(&mission, |_| auth(KEY, 5), 0.0);
+        air.run(60);
+        let identity = Identity {
+            network: 7,
+            index: 2,
+        };
+        let settings = settings(auth(KEY, 5));
+        air.relays[1] = Relay::new(mission, identity, settings, 1_000 * seed, air.now).unwrap();
+        let restarted = air.now;
+        let reports = |air: &Air| air.told(Event::DuplicateIndex { node: 2 }).contains(&1);
+        while air.relays[1].setpoint().is_none() {
+            air.run(1);
+            let seconds = air.now.since(restarted).as_micros() / 1_000_000;
+            assert!(seconds < 90, "seed {seed}");
+        }
+        let waits = air.now.since(restarted) > settings.dead_after;
+        assert_eq!(reports(&air), waits, "seed {seed}");
+        waited += u32::from(waits);
+    }
+    assert!((1..12).contains(&waited), "{waited} of 12");
+}
+
+/// Two wires lead to relays with the same number.
+#[test]
+fn a_neighbour_that_is_heard_at_both_ports_is_told() {
+    let mission = mission(3);
+    let of = |index| {
+        let identity = Identity { network: 7, index };
+        Relay::new(mission, identity, Settings::default(), 1, Instant::ZERO).unwrap()
+    };
+    let (mut middle, mut head) = (of(2), of(1));
+    let mut frame = [0; MAX_FRAME];
+    let now = Instant::from_millis(6_000);
+    while let Some(at) = head.poll_timeout().filter(|at| *at <= now) {
+        head.handle_timeout(at);
+    }
+    let mut told = Vec::new();
+    head.persist(|_| true);
+    while let Some(transmit) = head.poll_transmit(now, &mut frame) {
+        for port in [Port::Upstream, Port::Downstream] {
+            middle.handle_bytes(now, port, &frame[..transmit.len]);
+        }
+        told.extend(std::iter::from_fn(|| middle.poll_event()));
+    }
+    assert_eq!(told, [Event::DuplicateIndex { node: 1 }]);
+    assert!(!middle.is_passive());
+}
+
+fn moved(base: &Mission, version: u16) -> Upload {
+    let interference = Interference::Source(Interferer {
+        power_w: 80.0,
+        x_m: 700.0,
+        y_m: 100.0 * f32::from(version),
+    });
+    let config = MissionConfig {
+        interference,
+        ..*base.config()
+    };
+    Upload::new(base, version, config).unwrap()
+}
+
+/// Offers are by far the longest frames of the ground.
+const fn is_offer(bytes: &[u8]) -> bool {
+    bytes.len() > MAX_FRAME - 24
+}
+
+fn station(base: &Mission, epoch: u32) -> Ground {
+    Ground::new(
+        base,
+        Side::Upstream,
+        7,
+        Wiring::Shared,
+        auth(KEY, epoch).unwrap(),
+    )
+}
+
+/// Returns four relays, and the withheld offers of version 1.
+fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
+    let mut air = Air::of(base, |_| auth(KEY, 1), loss);
+    air.run(60);
+    air.withheld = is_offer;
+    begin_upload(&mut air, base, 1);
+    while air.recorded.is_empty() {
+        air.run(1);
+    }
+    air.ground = None;
+    let offers = std::mem::take(&mut air.recorded);
+    (air, offers)
+}
+
+fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
+    let mut ground = station(base, epoch);
+    ground.upload(air.now, moved(base, 1)).unwrap();
+    air.ground = Some(ground);
+}
+
+/// An attacker withholds the ground's offers and replays them after the upload was given up.
+#[test]
+fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same() {
+    let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;
+    for (wait, loss) in [(after + 2, 0.0), (3_600, 0.0), (after + 2, 0.3)] {
+        let base = mission(4);
+        let (mut air, mut offers) = caught(&base, loss);
+        air.run(wait);
+        offers.append(&mut air.recorded);
+        let stale = |air: &Air| {
+            air.relays
+                .iter()
+                .map(|relay| relay.stats().stale)
+                .sum::<u32>()
+        };
+        let before = stale(&air);
+        for _ in 0..5 {
+            for offer in &offers {
+                air.play(offer);
+            }
+            air.run(1);
+        }
+        assert!(
+            air.relays.iter().all(|relay| relay.upload().is_none()),
+            "wait {wait}"
+        );
+        assert!(stale(&air) > before, "it is counted");
+        // A new session of the ground station uploads the same mission.
+        air.withheld = |_| false;
+        begin_upload(&mut air, &base, 2);
+        let mut seconds = 0;
+        while air.relays.iter().any(|relay| relay.version() != 1) {
+            air.run(1);
+            seconds += 1;
+            assert!(seconds < 300, "loss {loss}");
+        }
+        println!("flown by all {seconds} s after the upload began, loss {loss}");
+        air.run(10);
+        let progress = air.ground.as_ref().unwrap().progress();
+        assert!(matches!(progress, Progress::Flown { .. }), "{progress:?}");
+    }
+}
+
+/// The same offer is accepted within the time limit: only the delay matters.
+#[test]
+fn an_offer_that_comes_at_once_is_taken() {
+    let base = mission(4);
+    let (mut air, offers) = caught(&base, 0.0);
+    air.run(10);
+    air.play(&offers[0]);
+    air.run(1);
+    assert!(air.relays[0].upload().is_some());
+}

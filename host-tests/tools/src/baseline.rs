@@ -1,0 +1,138 @@
+//! Baseline placements that ignore the interferer, for comparison with the crate's methods.
+//!
+//! | function | positions of the relays |
+//! | --- | --- |
+//! | [`mean`] | uniformly random, in order; mean over many draws |
+//! | [`blind_places`] | maximise the weakest received signal, without interference |
+//! | [`equal_places`] | equal spacing |
+//!
+//! Each is scored in f64 by [`Scene`](uav_relay_scenario::scene::Scene): the SIR of the worst hop.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use uav_relay_scenario::scene::{Relay, Scene};
+
+/// Number of draws used in the paper.
+pub const DRAWS: u32 = 1000;
+
+/// Statistics over many random chains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// Mean SIR of the worst hop, linear.
+    pub sir: f64,
+    /// Standard error of the mean SIR, linear.
+    pub error: f64,
+    /// Mean over the draws of the worst hop's SIR in dB.
+    pub db: f64,
+    /// Mean of log2(1 + SIR) of the worst hop, bit/s/Hz.
+    pub rate: f64,
+}
+
+/// Returns the statistics of `draws` (at least 2) random chains from `seed`. Work: `draws` sorted chains, N + 1 SIRs each.
+pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut places = vec![0.0; scene.relays.len()];
+    let (mut sum, mut squares, mut db, mut rate) = (0.0, 0.0, 0.0, 0.0);
+    for _ in 0..draws {
+        for place in &mut places {
+            *place = rng.random_range(0.0..scene.distance_m);
+        }
+        places.sort_by(f64::total_cmp);
+        let sir = scene.sir_along(&places);
+        sum += sir;
+        squares += sir * sir;
+        db += 10.0 * sir.log10();
+        rate += sir.ln_1p() / std::f64::consts::LN_2;
+    }
+    let count = f64::from(draws);
+    let sir = sum / count;
+    let variance = (squares / count - sir * sir).max(0.0) * count / (count - 1.0);
+    Mean {
+        sir,
+        error: (variance / count).sqrt(),
+        db: db / count,
+        rate: rate / count,
+    }
+}
+
+// Interference-blind baseline: the chain that maximises the weakest received signal.
+//
+// The received power of a hop is p_t / (eta (d^2 + h^2)) from Tx, p_u / (mu_LoS d^2) between relays and p_u / (eta (d^2 + h^2))
+// to Rx. It falls with the hop length, so the best chain has the hop lengths at which all received powers are equal and the hops
+// just span the distance. With one relay this maximises min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}.
+//
+// The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
+// equally good; the one that shortens every hop in the same proportion is used.
+
+/// Bisection steps on the common received power: enough for any f64 bracket to close.
+const HALVINGS: u32 = 200;
+
+/// Returns the positions of the relays in order, m from Tx.
+///
+/// The altitude and power of the first relay are used for all. Empty without relays. Work: 200 chain lengths and N positions.
+pub fn blind_places(scene: &Scene) -> Vec<f64> {
+    let Some(relay) = scene.relays.first() else {
+        return Vec::new();
+    };
+    let hops = Hops { scene, relay };
+    let strongest = hops.strongest();
+    let mut signal = strongest;
+    if hops.span(strongest) < scene.distance_m {
+        let (mut covers, mut falls_short) = (0.0, strongest);
+        for _ in 0..HALVINGS {
+            signal = f64::midpoint(covers, falls_short);
+            if hops.span(signal) >= scene.distance_m {
+                covers = signal;
+            } else {
+                falls_short = signal;
+            }
+        }
+    }
+    let share = (scene.distance_m / hops.span(signal)).min(1.0);
+    let (first, between) = (share * hops.first(signal), share * hops.between(signal));
+    (0..scene.relays.len())
+        .map(|before| (first + before as f64 * between).min(scene.distance_m))
+        .collect()
+}
+
+/// Hop lengths as a function of the received power, W.
+struct Hops<'a> {
+    scene: &'a Scene,
+    relay: &'a Relay,
+}
+
+impl Hops<'_> {
+    /// Returns the strongest signal possible on the weaker outer hop, W. Its relay straight above the ground station.
+    fn strongest(&self) -> f64 {
+        let height = self.relay.altitude_m;
+        self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
+    }
+
+    /// Returns the horizontal length of a hop between the ground and the relays' altitude, m.
+    fn outer(&self, power_w: f64, signal_w: f64) -> f64 {
+        let height = self.relay.altitude_m;
+        let squared = power_w / (self.scene.eta * signal_w) - height * height;
+        squared.max(0.0).sqrt()
+    }
+
+    fn first(&self, signal_w: f64) -> f64 {
+        self.outer(self.scene.tx_w, signal_w)
+    }
+
+    fn between(&self, signal_w: f64) -> f64 {
+        (self.relay.power_w / (self.scene.mu_los * signal_w)).sqrt()
+    }
+
+    fn span(&self, signal_w: f64) -> f64 {
+        let between = (self.scene.relays.len() - 1) as f64 * self.between(signal_w);
+        self.first(signal_w) + between + self.outer(self.relay.power_w, signal_w)
+    }
+}
+
+/// Returns the positions k D / (N + 1), m from Tx. Work: one division per relay.
+pub fn equal_places(scene: &Scene) -> Vec<f64> {
+    let hops = (scene.relays.len() + 1) as f64;
+    (1..=scene.relays.len())
+        .map(|k| scene.distance_m * k as f64 / hops)
+        .collect()
+}

@@ -1,0 +1,474 @@
+//! `cargo plan`: number, positions and expected SIRs of relays, before flight.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, ValueEnum};
+use uav_relay_scenario::deployment::{Companion, Deployment, agree};
+use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
+use uav_relay_sim::command::{Failure, number, whole};
+use uav_relay_sim::svg::{Picture, room};
+use uav_relay_sim::{command, svg};
+use uav_relay_tools::plan;
+use uav_relay_tools::plan::flown::{flown, planned, with_plan};
+use uav_relay_tools::plan::map::{Map, geojson, kml};
+use uav_relay_tools::plan::rate::Rates;
+use uav_relay_tools::plan::report::{PlanReport, RateReport};
+use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why, rate};
+use uav_relay_tools::provision::block::probe_after_ms;
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => command::ended(run(&options)),
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let scenario = match &options.scenario {
+        Some(file) => Scenario::load(file).map_err(|error| Failure::input(error.to_string()))?,
+        None => Scenario::default(),
+    };
+    if !scenario.knows_interference() {
+        let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
+        return Err(Failure::input(line.to_owned()));
+    }
+    let number = options.number();
+    check_out(options, &scenario)?;
+    check_map(options, &scenario)?;
+    let ask = PlanRequest {
+        number,
+        free_altitude: options.altitude == Altitude::Free,
+        x_m: options.x_m,
+        tolerance: options.tolerance,
+    };
+    let planned = match options.target_rate() {
+        Some(target) => by_rate(&scenario, &ask, target),
+        None => plain(&scenario, &ask, options.bandwidth_hz),
+    };
+    match planned {
+        Ok(Planned {
+            plan: Some(plan),
+            number,
+            rates,
+        }) => {
+            let uavs = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+            if let Some(line) = mission::left_out(&scenario, uavs) {
+                return Err(Failure::input(format!("{}: {line}", options.file())));
+            }
+            if let Some(file) = &options.svg {
+                command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
+            }
+            write_map(options, &scenario, &plan)?;
+            let next = write_out(options, &scenario, &plan, number)?;
+            let asked = match options.target_rate() {
+                // The SIR that a rate needs was not itself requested.
+                Some(_) => Number::Of(uavs),
+                None => number,
+            };
+            show(
+                options,
+                &PlanReport::new(&plan, asked, options.unit())
+                    .with_rates(rates)
+                    .in_noise(&scenario.noise),
+            )?;
+            if !options.json {
+                command::print(&next);
+            }
+            Ok(())
+        }
+        Ok(Planned {
+            plan: None, rates, ..
+        }) => {
+            let error = rates.as_ref().map(too_fast).unwrap_or_default();
+            let why = Why::Plain(error);
+            let report = PlanReport::unmet(&why, None, Number::Of(0), options.unit());
+            let report = PlanReport {
+                uavs: None,
+                ..report
+            };
+            show(options, &report.with_rates(rates).in_noise(&scenario.noise))
+        }
+        Err(NoPlan::Wrong(line)) => {
+            let file = options.file();
+            let about_an_option = line.starts_with("--");
+            Err(Failure::input(if about_an_option {
+                line
+            } else {
+                format!("{file}: {line}")
+            }))
+        }
+        Err(NoPlan::Unmet(why, best_sir)) => show(
+            options,
+            &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
+        ),
+    }
+}
+
+/// Plan, requested number or SIR, and data rates.
+struct Planned {
+    /// `None` if no number of relays carries the target rate.
+    plan: Option<Plan>,
+    number: Number,
+    rates: Option<RateReport>,
+}
+
+/// Plans for a number of relays or an SIR, with data rates if a bandwidth is given.
+fn plain(
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    bandwidth_hz: Option<f64>,
+) -> Result<Planned, NoPlan> {
+    let plan = plan::plan(scenario, ask)?;
+    let rates = match bandwidth_hz {
+        Some(bandwidth_hz) => {
+            let Rates { best, .. } = Rates::new(scenario, ask, bandwidth_hz, None)?;
+            Some(RateReport::new(Some(&plan), bandwidth_hz, None, best))
+        }
+        None => None,
+    };
+    Ok(Planned {
+        plan: Some(plan),
+        number: ask.number,
+        rates,
+    })
+}
+
+fn by_rate(
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    (target_bps, bandwidth_hz): (f64, f64),
+) -> Result<Planned, NoPlan> {
+    let Rates { best, meeting } = Rates::new(scenario, ask, bandwidth_hz, Some(target_bps))?;
+    let rates = RateReport::new(meeting.as_ref(), bandwidth_hz, Some(target_bps), best);
+    let relays = meeting.as_ref().map_or(0, |plan| plan.places.len());
+    let slots = rate::slots(u16::try_from(relays).unwrap_or(u16::MAX));
+    let needed = rate::sir_for_hop(bandwidth_hz, target_bps * f64::from(slots));
+    Ok(Planned {
+        plan: meeting,
+        number: Number::Meeting(needed),
+        rates: Some(rates),
+    })
+}
+
+fn too_fast(rates: &RateReport) -> String {
+    let target_bps = rates.target_rate_bps.unwrap_or_default();
+    let tried = rates.best.tried_uavs;
+    let among = if rates.best.best_is_proven {
+        "no number of relays".to_owned()
+    } else {
+        format!("no number of relays from 1 to {tried}")
+    };
+    format!(
+        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. PlanRequest for less, or for more \
+         with a larger --bandwidth-hz",
+        rates.best
+    )
+}
+
+fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
+    Picture {
+        title_method: plan.how.to_owned(),
+        distance_m: f64::from(plan.mission.config().distance_m),
+        interferers: scenario.sources(),
+        nodes: plan
+            .places
+            .iter()
+            .map(|(place, _)| (f64::from(place.x_m), f64::from(place.altitude_m)))
+            .collect(),
+        room: room(
+            &plan.mission,
+            plan.places.iter().map(|(place, _)| f64::from(place.y_m)),
+            &scenario.sources(),
+        ),
+        hop_sir: plan.sirs.clone(),
+        ..Picture::default()
+    }
+}
+
+/// Prints the report, and fails with its error message, if any.
+fn show(options: &Options, report: &PlanReport) -> Result<(), Failure> {
+    command::print(&if options.json {
+        command::json(report)?
+    } else {
+        report.table()
+    });
+    match &report.error {
+        None => Ok(()),
+        Some(error) => Err(Failure::unmet(error.clone())),
+    }
+}
+
+/// Computes how many relays a target SIR needs, or the best places for a given number. No messages are simulated.
+#[derive(Parser, Debug)]
+#[command(name = "plan", bin_name = "cargo plan", disable_version_flag = true)]
+struct Options {
+    /// Scenario file (TOML); without it the paper's multi-hop scenario
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    #[command(flatten)]
+    wanted: Wanted,
+    /// Altitudes of the relays: fixed, or free in the scenario's band. A fixed relay stays above the line at its altitude of the
+    /// scenario. A free one may choose an altitude (geometry.altitude_min_m to altitude_max_m) and a place beside the line
+    /// (geometry.lateral_min_m to lateral_max_m)
+    #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
+    altitude: Altitude,
+    /// Required place of the only relay, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
+    #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
+    x_m: Option<f64>,
+    /// Bandwidth of the one frequency that all hops share, hertz, 1 to 1e12. Adds the data rate: log2(1 + SIR) bit/s per hertz of
+    /// the worst hop, divided by the N + 1 time slots; and the number of relays with the largest data rate
+    #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
+    bandwidth_hz: Option<f64>,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
+    #[arg(long, value_name = "T", default_value_t = 1e-4, value_parser = |text: &str| number(text, 1e-6, 0.1))]
+    tolerance: f64,
+    /// Print one JSON object on standard output and nothing else there
+    #[arg(long)]
+    json: bool,
+    /// Draw the chain from the side, with each hop's SIR. A view from above is added where there is room or an interferer beside
+    /// the line
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Write sites, relays, hops and interferers with geographic coordinates for a map (GeoJSON). Needs a scenario with a site
+    #[arg(long, value_name = "FILE")]
+    geojson: Option<PathBuf>,
+    /// Write the same for a globe (KML), with altitudes above the sea
+    #[arg(long, value_name = "FILE")]
+    kml: Option<PathBuf>,
+    /// Write the scenario with its plan, for cargo provision --scenario FILE --all
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Overwrite the file of --out
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// Request: exactly one of these.
+#[derive(Args, Debug)]
+#[group(required = true, multiple = false)]
+struct Wanted {
+    /// The best places for this number of relays, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
+    uavs: Option<u16>,
+    /// Find the fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-9, 1e9))]
+    target_sir: Option<f64>,
+    /// --target-sir in dB, -90 to 90
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, -90.0, 90.0))]
+    target_sir_db: Option<f64>,
+    /// Find the fewest relays that carry this data rate, bit/s, 1e-9 to 1e15. All hops share one frequency. Needs --bandwidth-hz
+    #[arg(long, value_name = "R", requires = "bandwidth_hz", value_parser = |text: &str| number(text, 1e-9, 1e15))]
+    target_rate_bps: Option<f64>,
+}
+
+/// Parses a position along the line; its range depends on the scenario.
+fn along(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| "must be a number, metres from Tx".to_owned())
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Altitude {
+    /// Altitudes of the scenario
+    Given,
+    /// Free within the scenario's band, and beside the line within its limits
+    Free,
+}
+
+impl Options {
+    fn file(&self) -> String {
+        self.scenario.as_ref().map_or_else(
+            || "default scenario".into(),
+            |file| file.display().to_string(),
+        )
+    }
+
+    const fn unit(&self) -> Unit {
+        match self.wanted.target_sir_db {
+            Some(_) => Unit::Decibels,
+            None => Unit::Linear,
+        }
+    }
+
+    /// Returns the requested data rate, bit/s, and the bandwidth, hertz.
+    fn target_rate(&self) -> Option<(f64, f64)> {
+        self.wanted.target_rate_bps.zip(self.bandwidth_hz)
+    }
+
+    /// Returns the requested number of relays; for a data rate see [`target_rate`](Self::target_rate).
+    fn number(&self) -> Number {
+        let wanted = &self.wanted;
+        match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {
+            (Some(uavs), ..) => Number::Of(uavs),
+            (_, Some(target), _) => Number::Meeting(target),
+            (_, _, Some(db)) => Number::Meeting(10_f64.powf(db / 10.0)),
+            (None, None, None) => Number::Of(1),
+        }
+    }
+}
+
+/// Checks, before planning, that relays can fly the request by themselves.
+fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
+    let Some(file) = &options.out else {
+        return Ok(());
+    };
+    let refuse = |line: String| Err(Failure::input(line));
+    if let Some(x_m) = options.x_m {
+        return refuse(format!(
+            "--x-m {x_m:?} is not for --out: a relay chooses its place along the line by itself"
+        ));
+    }
+    let is_field = matches!(scenario.interference, Interference::Field(_));
+    if is_field && options.altitude == Altitude::Free {
+        return refuse(
+            "--altitude free is not for --out with a [field]: relays hold geometry.altitude_m there, and best at geometry.altitude_min_m"
+                .to_owned(),
+        );
+    }
+    if options.target_rate().is_none()
+        && let Number::Of(relays) = options.number()
+    {
+        sections(options, relays)?;
+    }
+    if file.exists() && !options.force {
+        return refuse(format!(
+            "--out {}: exists already; --force overwrites it",
+            file.display()
+        ));
+    }
+    Ok(())
+}
+
+/// Writes the scenario with the plan that its relays will fly, and returns the next command.
+fn write_out(
+    options: &Options,
+    scenario: &Scenario,
+    plan: &Plan,
+    number: Number,
+) -> Result<String, Failure> {
+    let Some(file) = &options.out else {
+        return Ok(String::new());
+    };
+    let method = match options.altitude {
+        Altitude::Given => PlannedMethod::Align,
+        Altitude::Free => PlannedMethod::Joint,
+    };
+    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    let flown = flown(scenario, relays, method, options.tolerance).map_err(|none| match none {
+        NoPlan::Wrong(why) => Failure::input(why),
+        NoPlan::Unmet(why, _) => Failure::unmet(why.say(options.unit())),
+    })?;
+    let sections = sections(options, relays)?;
+    let sir = db(flown.plan.sir());
+    if flown.is_poor() {
+        return Err(Failure::unmet(format!(
+            "--out {}: not written: {}",
+            file.display(),
+            flown.describe()
+        )));
+    }
+    if let Number::Meeting(target) = number
+        && flown.plan.sir() < target * (1.0 - options.tolerance)
+    {
+        return Err(Failure::unmet(format!(
+            "--out {}: not written: {relays} relays by themselves reach {sir:.2} dB, and the target is {:.2} dB; ask for more by --uavs",
+            file.display(),
+            db(target)
+        )));
+    }
+    let text = match &options.scenario {
+        Some(scenario) => std::fs::read_to_string(scenario)
+            .map_err(|error| Failure::input(format!("{}: {error}", scenario.display())))?,
+        None => DEFAULT.to_owned(),
+    };
+    let text = with_plan(&text, &planned(&flown, method, options.tolerance))
+        .map_err(|why| Failure::input(format!("--out {}: {why}", file.display())))?;
+    save(file, "--out", &text)?;
+    let file = file.display().to_string();
+    Ok(format!(
+        "{file}: the scenario with its plan, {relays} relays that reach {sir:.3} dB by themselves; {}",
+        next(&file, &sections)
+    ))
+}
+
+/// Loads the other sections of the scenario file; its number of relays must be that of the plan.
+fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
+    let Some(path) = &options.scenario else {
+        return Ok(Deployment::default());
+    };
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Failure::input(format!("{name}: {error}")))?;
+    let sections =
+        Deployment::parse(&name, &text).map_err(|error| Failure::input(error.to_string()))?;
+    agree(&name, sections.network.relays, Some(relays))
+        .map_err(|error| Failure::input(error.to_string()))?;
+    Ok(sections)
+}
+
+fn next(file: &str, sections: &Deployment) -> String {
+    let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR\n");
+    let companions = format!("  cargo companion --config {file} --index INDEX\n");
+    let is_for_companions = sections.companion != Companion::default();
+    match (
+        probe_after_ms(&sections.network, None, file),
+        is_for_companions,
+    ) {
+        (Ok(_), false) => format!("next:\n{firmware}"),
+        (Ok(_), true) => {
+            format!(
+                "next, on the Linux computer of every drone:\n{companions}or, for drones with the firmware:\n{firmware}"
+            )
+        }
+        (Err(why), _) => format!(
+            "next, on the Linux computer of every drone (cargo provision refuses the file for the firmware: {why}):\n{companions}"
+        ),
+    }
+}
+
+fn db(sir: f64) -> f64 {
+    10.0 * sir.log10()
+}
+
+fn save(file: &Path, option: &str, text: &str) -> Result<(), Failure> {
+    std::fs::write(file, text)
+        .map_err(|error| Failure::input(format!("{option} {}: {error}", file.display())))
+}
+
+fn check_map(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
+    let option = match (&options.geojson, &options.kml) {
+        (Some(_), _) => "--geojson",
+        (None, Some(_)) => "--kml",
+        (None, None) => return Ok(()),
+    };
+    if scenario.line.is_some() {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{}: site: is missing, which {option} needs; allowed: [site] with tx and rx, each {{ lat_deg, lon_deg, amsl_m }}",
+        options.file()
+    )))
+}
+
+fn write_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
+    if options.geojson.is_none() && options.kml.is_none() {
+        return Ok(());
+    }
+    let map = Map::new(scenario, plan)
+        .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
+    for number in &map.left_out {
+        command::complain(&format!(
+            "note: interferer {number} is more than 5 km from the line, and not on the map"
+        ));
+    }
+    if let Some(file) = &options.geojson {
+        save(file, "--geojson", &geojson(&map))?;
+    }
+    if let Some(file) = &options.kml {
+        let text = kml(&map, &options.file())
+            .map_err(|error| Failure::input(format!("--kml {}: {error}", file.display())))?;
+        save(file, "--kml", &text)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,509 @@
+//! `cargo provision`: writes the configuration block of one drone, or of all, from a scenario.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use clap::{Args, Parser, ValueEnum};
+use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
+use uav_relay_scenario::deployment::{Deployment, NETWORK, Network};
+use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
+use uav_relay_sim::command;
+use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
+use uav_relay_tools::plan::flown::{Flown, flown, is_current};
+use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::config::{ADDRESS, LEN, MOST_PROBE_AFTER_MS, Secret};
+use uav_relay_tools::provision::folder::{Heading, summary};
+use uav_relay_tools::provision::{block, folder};
+
+/// Options, completed with values of the scenario and its plan.
+struct Asked<'a> {
+    options: &'a Options,
+    scenario: Scenario,
+    name: String,
+    network: u16,
+    key_file: Option<PathBuf>,
+    uavs: u16,
+    method: Method,
+    tolerance: f64,
+    /// Silence before a neighbour is probed, ms; 0 for the default.
+    probe_after_ms: u32,
+}
+
+fn main() -> ExitCode {
+    match Options::try_parse() {
+        Ok(options) => {
+            let line = run(&options).map(|line| command::print(&line));
+            command::ended(line.map_err(Failure::input))
+        }
+        Err(error) => command::usage(&error),
+    }
+}
+
+fn run(options: &Options) -> Result<String, String> {
+    let asked = Asked::new(options)?;
+    let Asked {
+        scenario,
+        name,
+        uavs,
+        ..
+    } = &asked;
+    if let Some(index) = options.index
+        && index > *uavs
+    {
+        return Err(format!("--index {index}: must be within 1 to {uavs}"));
+    }
+    if let Some(line) = mission::left_out(scenario, *uavs) {
+        return Err(format!("{name}: {line}"));
+    }
+    let secret = asked.secret()?;
+    let flight = asked.flight(secret)?;
+    let flown = asked.flown()?;
+    let said = match (&options.out, options.index, &options.folder.out_dir) {
+        (Some(file), Some(index), _) => {
+            let block = flight
+                .block(index)
+                .map_err(|error| format!("{name}: {error}"))?;
+            std::fs::write(file, block)
+                .map_err(|error| format!("{}: --out cannot be written: {error}", file.display()))?;
+            format!(
+                "{}: relay {index} of {uavs}, network {}; {LEN} bytes for {ADDRESS:#010x}\n",
+                file.display(),
+                asked.network
+            )
+        }
+        (_, _, Some(dir)) => asked.folder(&flight, flown.as_ref(), dir)?,
+        _ => {
+            return Err(
+                "--index and --out, or --all and --out-dir: one of both is needed".to_owned(),
+            );
+        }
+    };
+    if secret.is_none() {
+        command::complain(
+            "no --key-file: frames are not signed, and anybody in range can send frames",
+        );
+    }
+    Ok(said)
+}
+
+impl<'a> Asked<'a> {
+    fn new(options: &'a Options) -> Result<Self, String> {
+        let (
+            scenario,
+            Deployment {
+                network: section, ..
+            },
+        ) = match &options.scenario {
+            Some(file) => Deployment::load(file).map_err(|error| error.to_string())?,
+            None => Default::default(),
+        };
+        // A path in the file is relative to its folder.
+        let folder = options.scenario.as_deref().and_then(Path::parent);
+        let of_file = section
+            .key_file
+            .as_ref()
+            .map(|file| folder.unwrap_or(Path::new("")).join(file));
+        let name = options.scenario.as_ref().map_or_else(
+            || "default scenario".to_owned(),
+            |file| file.display().to_string(),
+        );
+        let plan = scenario.plan.as_ref();
+        let other = |option: &str, has: &str| {
+            format!("{option}: {name} has a [plan] with {has}; leave the option out, or plan again")
+        };
+        let uavs = match (options.uavs, plan) {
+            (Some(uavs), Some(plan)) if uavs != plan.uavs => {
+                return Err(other(
+                    &format!("--uavs {uavs}"),
+                    &format!("uavs = {}", plan.uavs),
+                ));
+            }
+            (_, Some(plan)) => plan.uavs,
+            (uavs, None) => uavs.or(section.relays).ok_or_else(|| {
+                format!(
+                    "--uavs: is missing, and so are [plan] and network.relays in {name}; allowed: 1 to 1000"
+                )
+            })?,
+        };
+        let planned = plan.map(|plan| match plan.method {
+            PlannedMethod::Align => Method::Align,
+            PlannedMethod::Joint => Method::Joint,
+        });
+        overridden(options, &section, of_file.as_deref(), &name);
+        let of_section = section.method.as_deref();
+        let method = match (options.method, planned) {
+            (Some(method), Some(planned)) if method != planned => {
+                return Err(other(
+                    "--method",
+                    &format!("another method, {planned:?}").to_lowercase(),
+                ));
+            }
+            (method, planned) => method.or(planned),
+        };
+        let method = chosen_method(method, of_section, &name, planned.is_some())?;
+        let probe_after_ms = block::probe_after_ms(&section, options.probe_after_ms, &name)?;
+        let tolerance = match (options.tolerance, plan) {
+            (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
+                return Err(other(
+                    &format!("--tolerance {tolerance:?}"),
+                    &format!("tolerance = {:?}", plan.tolerance),
+                ));
+            }
+            (tolerance, plan) => tolerance
+                .or(plan.map(|plan| plan.tolerance))
+                .unwrap_or(1e-4),
+        };
+        for (option, given) in [
+            ("--rounds", options.rounds.is_some()),
+            ("--explore", options.explore_m.is_some()),
+        ] {
+            if given && method != Method::Adjust {
+                return Err(format!("{option}: is for --method adjust"));
+            }
+        }
+        Ok(Self {
+            options,
+            scenario,
+            name,
+            network: options.network.or(section.id).unwrap_or(NETWORK),
+            key_file: options.key_file.clone().or(of_file),
+            uavs,
+            method,
+            tolerance,
+            probe_after_ms,
+        })
+    }
+
+    fn flight(&self, secret: Option<Secret>) -> Result<Flight, String> {
+        let options = self.options;
+        let method = match self.method {
+            Method::Align => uav_relay::Method::Align,
+            Method::Joint => uav_relay::Method::Joint,
+            Method::Adjust => uav_relay::Method::Adjust(Adjust {
+                rounds: options.rounds.unwrap_or(500),
+                explore_m: options.explore_m.unwrap_or(10.0),
+                local: Local::Fine,
+            }),
+        };
+        let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
+            .map_err(|error| format!("{}: {error}", self.name))?;
+        let [probe_after, _] = block::silence(self.probe_after_ms);
+        carried(options, self.uavs, probe_after)?;
+        let flight = match options.speed {
+            Some(_) if !flight.has_sites() => {
+                return Err("--speed: is for a scenario with a [site]".to_owned());
+            }
+            Some(speed) => flight.no_faster_than(speed),
+            None => flight,
+        };
+        let autopilot_key = match &options.autopilot_key_file {
+            Some(_) if !flight.has_sites() => {
+                return Err("--autopilot-key-file: is for a scenario with a [site]".to_owned());
+            }
+            Some(file) => Some(key::load("--autopilot-key-file", file)?),
+            None => None,
+        };
+        Ok(flight
+            .by(method)
+            .signed(secret)
+            .signed_to_autopilots(autopilot_key)
+            .measuring(measure(options, &self.scenario)?)
+            .asking_after(self.probe_after_ms))
+    }
+
+    /// Returns the positions that the relays settle on, if needed. Rejects a hypothetical interferer that loses too much.
+    fn flown(&self) -> Result<Option<Flown>, String> {
+        let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
+        let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
+        if self.options.stand_in && !is_several {
+            return Err("--stand-in: is for a scenario with several [[interferer]]".to_owned());
+        }
+        if !self.scenario.knows_interference()
+            || is_plain && !self.options.folder.all && self.scenario.plan.is_none()
+        {
+            return Ok(None);
+        }
+        let method = match self.method {
+            Method::Joint => PlannedMethod::Joint,
+            // `adjust` starts from these.
+            Method::Align | Method::Adjust => PlannedMethod::Align,
+        };
+        // Relays report by themselves that they settle on nothing.
+        let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
+            return match self.scenario.plan {
+                Some(_) => Err(format!(
+                    "{}: [plan] is of another scenario: relays in this one reach no agreement",
+                    self.name
+                )),
+                None => Ok(None),
+            };
+        };
+        if let Some(plan) = &self.scenario.plan {
+            is_current(plan, &flown).map_err(|why| format!("{}: {why}", self.name))?;
+        }
+        if flown.is_poor() {
+            let line = format!("{}: {}", self.name, flown.describe());
+            if flown.stand_in && !self.options.stand_in {
+                return Err(format!("{line}; --stand-in writes it all the same"));
+            }
+            command::complain(&line);
+        }
+        Ok(Some(flown))
+    }
+
+    fn secret(&self) -> Result<Option<Secret>, String> {
+        let Some(file) = &self.key_file else {
+            return match self.options.epoch {
+                Some(epoch) => Err(format!(
+                    "--epoch {epoch}: is for frames that are signed, with --key-file"
+                )),
+                None => Ok(None),
+            };
+        };
+        let seconds = || {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+            u32::try_from(since.as_secs()).ok()
+        };
+        let epoch = self.options.epoch.or_else(seconds);
+        Ok(Some(Secret {
+            key: key::load("--key-file", file)?,
+            epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
+        }))
+    }
+
+    fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
+        let heading = Heading {
+            scenario: self.name.clone(),
+            uavs: self.uavs,
+            network: self.network,
+            method: format!("{:?}", self.method).to_lowercase(),
+            signed: self.key_file.is_some(),
+        };
+        let places = match flown {
+            Some(flown) if self.method != Method::Adjust => flown.plan.places.as_slice(),
+            _ => &[],
+        };
+        let mut files = Vec::new();
+        for index in 1..=self.uavs {
+            let block = flight
+                .block(index)
+                .map_err(|error| format!("{}: relay {index}: {error}", self.name))?;
+            files.push((folder::name(index), block.to_vec()));
+        }
+        let text = summary(&heading, places, self.scenario.line.as_ref());
+        files.push(("summary.txt".to_owned(), text.clone().into_bytes()));
+        folder::write(dir, &files, self.options.folder.force)?;
+        Ok(format!(
+            "{}: {} blocks of {LEN} bytes, and summary.txt:\n{}\n",
+            dir.display(),
+            self.uavs,
+            text.trim_end()
+        ))
+    }
+}
+
+/// Rejects a channel too slow for the relays when a silent neighbour is probed after `probe_after`.
+fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
+    if options.wires {
+        return Ok(());
+    }
+    let in_range = options.in_range.unwrap_or(uavs).min(uavs);
+    command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after)
+        .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
+}
+
+fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {
+    let Some(samples) = options.samples else {
+        return Ok(None);
+    };
+    let Interference::Field(field) = &scenario.interference else {
+        return Err(format!(
+            "--samples {samples}: is for a scenario with a [field]"
+        ));
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "1e-30 to 1e6 by the scenario"
+    )]
+    let i_max_w = field.i_max_w as f32;
+    Ok(Some(Measure { i_max_w, samples }))
+}
+
+/// Writes the configuration block of one relay, or of all: its index and its mission.
+#[derive(Parser, Debug)]
+#[command(
+    name = "provision",
+    bin_name = "cargo provision",
+    disable_version_flag = true
+)]
+struct Options {
+    /// Scenario file (TOML); by default the paper's multi-hop scenario
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Number of relays, 1 to 1000; by default that of the scenario's plan or section `network`
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
+    uavs: Option<u16>,
+    /// Index of this drone's relay, 1 (next to the transmitter) to N
+    #[arg(long, value_name = "I", required_unless_present = "all", value_parser = whole::<u16>(1, 1000))]
+    index: Option<u16>,
+    /// Network number, 0 to 65535; frames of other networks are ignored. By default that of the scenario's section `network`, or
+    /// 1
+    #[arg(long, value_name = "W", value_parser = whole(0, u16::MAX))]
+    network: Option<u16>,
+    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1; by default that of the scenario's plan, or 1e-4
+    #[arg(long, value_name = "T", value_parser = |text: &str| number(text, 1e-6, 0.1))]
+    tolerance: Option<f64>,
+    /// Method that finds the places; in a field, only `align`. By default that of the scenario's plan or section `network`, or
+    /// `align`
+    #[arg(long, value_name = "M", value_enum)]
+    method: Option<Method>,
+    /// Largest number of rounds of `adjust`, 1 to 65535; 500 by default
+    #[arg(long, value_name = "K", value_parser = whole::<u16>(1, u16::MAX))]
+    rounds: Option<u16>,
+    /// Largest change of altitude in one round of `adjust`, metres, 0 to 1e5; 10 by default
+    #[arg(long = "explore", value_name = "M", value_parser = explore)]
+    explore_m: Option<f32>,
+    /// Measure the field on board, and trust this many samples at a place, 100 to 1000000
+    #[arg(long, value_name = "S", value_parser = whole::<u32>(100, 1_000_000))]
+    samples: Option<u32>,
+    /// File with the network's key, 64 hexadecimal digits. Without one here or in the scenario's section `network`, frames are not
+    /// signed
+    #[arg(long, value_name = "FILE")]
+    key_file: Option<PathBuf>,
+    /// Least epoch to sign with, 1 to 4294967294. It must exceed every epoch that a relay of this index has used with this key. It
+    /// rises by itself from there. By default the seconds of this machine's clock
+    #[arg(long, value_name = "E", value_parser = whole::<u32>(1, 0xFFFF_FFFE))]
+    epoch: Option<u32>,
+    /// Bits per second of the radio channel that the relays share, 300 to 10000000. Refused if too slow for them
+    #[arg(long, value_name = "B", default_value_t = 115_200, value_parser = whole(300, MOST_BAUD))]
+    baud: u32,
+    /// Milliseconds of silence after which a relay probes a neighbour, 1 to 1200000. After three times as many the neighbour counts
+    /// as lost. By default those of the scenario's section `network`, or 5000. Larger values let a slow channel carry more relays
+    #[arg(long, value_name = "MS", value_parser = whole(1, MOST_PROBE_AFTER_MS))]
+    probe_after_ms: Option<u32>,
+    /// Number of relays within range of each other on the channel, 1 to 1000; by default all of them
+    #[arg(long, value_name = "K", value_parser = whole::<u16>(1, 1000))]
+    in_range: Option<u16>,
+    /// Neighbours are connected by wires, without a shared channel
+    #[arg(long, conflicts_with_all = ["baud", "in_range"])]
+    wires: bool,
+    /// Greatest speed of the drone, m/s, 0.1 to 20, if the scenario has sites; 5 by default
+    #[arg(long, value_name = "M/S", value_parser = speed)]
+    speed: Option<f32>,
+    /// File with the signing key of the drone's autopilot, 64 hexadecimal digits. It applies if the scenario has sites. Without a
+    /// key the messages between the two are not signed
+    #[arg(long, value_name = "FILE")]
+    autopilot_key_file: Option<PathBuf>,
+    /// Accept a hypothetical interferer in place of several. Without it a loss of more than 1 % of the best SIR is refused
+    #[arg(long)]
+    stand_in: bool,
+    /// File to write the block to
+    #[arg(long, value_name = "FILE", required_unless_present = "all")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    folder: FolderOptions,
+}
+
+/// Options for the blocks of all relays.
+#[derive(Args, Debug)]
+struct FolderOptions {
+    /// Write the blocks of all relays, relay1.bin and so on, and summary.txt: all of them, or none
+    #[arg(long, conflicts_with_all = ["index", "out"], requires = "out_dir")]
+    all: bool,
+    /// Output folder for the blocks of all relays; created if necessary
+    #[arg(long, value_name = "DIR", requires = "all")]
+    out_dir: Option<PathBuf>,
+    /// Overwrite blocks that are in that folder
+    #[arg(long, requires = "all")]
+    force: bool,
+}
+
+/// Method that finds the places.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Method {
+    /// Algorithm 1, in a field Algorithm 4
+    Align,
+    /// Places, sides and altitudes together
+    #[value(alias = "altitude")]
+    Joint,
+    /// Algorithm 1, then Algorithm 2
+    Adjust,
+}
+
+fn explore(text: &str) -> Result<f32, String> {
+    within(text, 0.0, 1e5)
+}
+
+fn speed(text: &str) -> Result<f32, String> {
+    within(text, 0.1, 20.0)
+}
+
+fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
+    let value: Option<f32> = text.parse().ok();
+    value
+        .filter(|value| (least..=most).contains(value))
+        .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
+}
+
+/// Reports options that override the section. Nobody then relies on a value in the file that is not used.
+fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
+    let say = |option: &str, key: &str| {
+        command::complain(&format!("{option} replaces network.{key} of {name}"));
+    };
+    if let (Some(given), Some(own)) = (options.probe_after_ms, section.probe_after_ms)
+        && given != own
+    {
+        say(
+            &format!("--probe-after-ms {given}"),
+            &format!("probe_after_ms = {own}"),
+        );
+    }
+    if let (Some(own), Some(id)) = (options.network, section.id)
+        && own != id
+    {
+        say(&format!("--network {own}"), &format!("id = {id}"));
+    }
+    if let (Some(own), Some(relays)) = (options.uavs, section.relays)
+        && own != relays
+    {
+        say(&format!("--uavs {own}"), &format!("relays = {relays}"));
+    }
+    if let (Some(own), Some(file)) = (&options.key_file, key_file)
+        && own != file
+    {
+        let key = format!("key_file = \"{}\"", file.display());
+        say(&format!("--key-file {}", own.display()), &key);
+    }
+}
+
+/// Returns the method of the command line or plan, else of section `network`, else `align`.
+///
+/// Rejects a plan made with a method other than the section's; reports an option that overrides the section.
+fn chosen_method(
+    method: Option<Method>,
+    of_file: Option<&str>,
+    name: &str,
+    is_planned: bool,
+) -> Result<Method, String> {
+    let Some(text) = of_file else {
+        return Ok(method.unwrap_or(Method::Align));
+    };
+    // The scenario has already been checked.
+    let own = Method::from_str(text, false).unwrap_or(Method::Align);
+    match method {
+        Some(method) if method != own => {
+            let said = format!("{method:?}").to_lowercase();
+            if is_planned {
+                return Err(format!(
+                    "{name}: network.method = \"{text}\": must be \"{said}\", as its [plan] has it, or plan again"
+                ));
+            }
+            command::complain(&format!(
+                "--method {said} replaces network.method = \"{text}\" of {name}"
+            ));
+            Ok(method)
+        }
+        _ => Ok(own),
+    }
+}

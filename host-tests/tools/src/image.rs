@@ -1,0 +1,300 @@
+//! Flash images: from the ELF that cargo links to the files that flash a board.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use ihex::Record;
+use object::LittleEndian;
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader as _, ProgramHeader as _};
+use uav_relay_block::ADDRESS;
+
+/// A supported board.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Board {
+    /// Name, as accepted by `--board`.
+    pub name: &'static str,
+    /// Rust target triple.
+    pub target: &'static str,
+    manifest: &'static str,
+    package: &'static str,
+    /// True if the images are examples of the package, false if they are binaries.
+    examples: bool,
+    /// Image names: with a UART to each neighbour, and with a shared radio.
+    images: [&'static str; 2],
+    /// Flash address of the configuration block.
+    pub block: u32,
+    /// UF2 family that the boot ROM accepts, if any.
+    pub uf2: Option<Family>,
+}
+
+/// The supported boards.
+pub const BOARDS: [Board; 4] = [
+    Board {
+        name: "stm32f405",
+        target: "thumbv7em-none-eabihf",
+        manifest: "Cargo.toml",
+        package: "uav-relay",
+        examples: true,
+        images: ["stm32f405", "stm32f405_radio"],
+        block: ADDRESS,
+        uf2: None,
+    },
+    Board {
+        name: "stm32f405-embassy",
+        target: "thumbv7em-none-eabihf",
+        manifest: "examples/embassy/Cargo.toml",
+        package: "relay-stm32f405",
+        examples: false,
+        images: ["wires", "radio"],
+        block: ADDRESS,
+        uf2: None,
+    },
+    Board {
+        name: "nucleo-f446re",
+        target: "thumbv7em-none-eabihf",
+        manifest: "examples/embassy/Cargo.toml",
+        package: "relay-nucleo-f446re",
+        examples: false,
+        images: ["wires", "radio"],
+        block: 0x0806_0000,
+        uf2: None,
+    },
+    Board {
+        name: "pico2",
+        target: "thumbv8m.main-none-eabihf",
+        manifest: "examples/embassy/Cargo.toml",
+        package: "relay-pico2",
+        examples: false,
+        images: ["wires", "radio"],
+        block: 0x103F_F000,
+        uf2: Some(Family::RP2350),
+    },
+];
+
+impl Board {
+    /// Returns the board with that name.
+    pub fn named(name: &str) -> Option<Self> {
+        BOARDS.into_iter().find(|board| board.name == name)
+    }
+
+    /// Returns cargo's arguments and the path of the resulting ELF, both relative to the checkout's root.
+    pub fn build(&self, radio: bool) -> (Vec<String>, PathBuf) {
+        let [wires, radios] = self.images;
+        let image = if radio { radios } else { wires };
+        let kind = if self.examples { "--example" } else { "--bin" };
+        let folder = if self.examples {
+            "target"
+        } else {
+            "target/embassy"
+        };
+        let words = [
+            "build",
+            "--locked",
+            "--manifest-path",
+            self.manifest,
+            "--package",
+            self.package,
+            "--profile",
+            "firmware",
+            "--target",
+            self.target,
+            "--target-dir",
+            folder,
+            kind,
+            image,
+        ];
+        let mut elf = Path::new(folder).join(self.target).join("firmware");
+        if self.examples {
+            elf.push("examples");
+        }
+        (words.map(str::to_owned).into(), elf.join(image))
+    }
+
+    /// Returns the file name of an image, without extension.
+    pub fn stem(&self, radio: bool) -> String {
+        format!("{}-{}", self.name, if radio { "radio" } else { "wires" })
+    }
+}
+
+/// Largest span from the first byte of an image to the last: no supported flash is larger.
+pub const LARGEST: u32 = 16 * 1024 * 1024;
+
+/// Value of an erased flash byte.
+pub const BLANK: u8 = 0xFF;
+
+/// Contiguous bytes at an address.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Piece {
+    /// Address of the first byte.
+    pub address: u32,
+    /// Content.
+    pub bytes: Vec<u8>,
+}
+
+/// Returns the loadable segments of an ELF, by physical (load) address.
+///
+/// # Errors
+/// A line that says why the file is not a loadable ELF.
+pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
+    let wrong = |error: object::Error| format!("not an ELF of 32 bits: {error}");
+    let header = FileHeader32::<LittleEndian>::parse(elf).map_err(wrong)?;
+    let endian: LittleEndian = header.endian().map_err(wrong)?;
+    let mut pieces = Vec::new();
+    for segment in header.program_headers(endian, elf).map_err(wrong)? {
+        let bytes = segment
+            .data(endian, elf)
+            .map_err(|()| "an ELF that is cut short")?;
+        if segment.p_type(endian) == PT_LOAD && !bytes.is_empty() {
+            pieces.push(Piece {
+                address: segment.p_paddr(endian),
+                bytes: bytes.to_vec(),
+            });
+        }
+    }
+    pieces.sort_by_key(|piece| piece.address);
+    if pieces.is_empty() {
+        return Err("an ELF with nothing to load".into());
+    }
+    Ok(pieces)
+}
+
+/// Joins pieces into one contiguous image, with erased bytes in the gaps.
+///
+/// # Errors
+/// If pieces overlap, or lie more than [`LARGEST`] bytes apart.
+pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
+    let first = pieces.first().ok_or("nothing to load")?.address;
+    let mut bytes = Vec::new();
+    for piece in pieces {
+        let at = piece.address.checked_sub(first).filter(|at| *at <= LARGEST);
+        let at = at.ok_or_else(|| {
+            format!(
+                "{:#010x} lies more than {LARGEST} bytes behind {first:#010x}",
+                piece.address
+            )
+        })?;
+        let at = at as usize;
+        if at < bytes.len() {
+            return Err(format!(
+                "two parts of the image are at {:#010x}",
+                piece.address
+            ));
+        }
+        bytes.resize(at, BLANK);
+        bytes.extend(&piece.bytes);
+    }
+    Ok(Piece {
+        address: first,
+        bytes,
+    })
+}
+
+const RECORD: u8 = 16;
+
+/// Returns the HEX hex_file, with 32-bit addresses.
+pub fn hex(pieces: &[Piece]) -> Result<String, String> {
+    let mut records = Vec::new();
+    let mut above = None;
+    for piece in pieces {
+        let mut rest = piece.bytes.as_slice();
+        let mut address = piece.address;
+        while !rest.is_empty() {
+            let [a, b, c, d] = address.to_be_bytes();
+            let (high, offset) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+            if above != Some(high) {
+                above = Some(high);
+                records.push(Record::ExtendedLinearAddress(high));
+            }
+            // A record must not cross a 64 KiB boundary.
+            let room = 0x1_0000 - usize::from(offset);
+            let len = usize::from(RECORD).min(room).min(rest.len());
+            let (value, behind) = rest.split_at(len);
+            records.push(Record::Data {
+                offset,
+                value: value.to_vec(),
+            });
+            address = address.wrapping_add(u32::try_from(len).unwrap_or_default());
+            rest = behind;
+        }
+    }
+    records.push(Record::EndOfFile);
+    ihex::create_object_file_representation(&records)
+        .map(|hex_file| hex_file + "\n")
+        .map_err(|error| error.to_string())
+}
+
+// UF2: the file format of USB mass-storage boot loaders. Each block of 512 bytes carries its own flash address.
+//
+// | byte of a block | type | content |
+// | --- | --- | --- |
+// | 0 | 2 u32 | [`MAGIC`] |
+// | 8 | u32 | flags: 0x2000, a family ID is present |
+// | 12 | u32 | address of the first byte, a multiple of [`PAGE`] |
+// | 16 | u32 | payload size: [`PAGE`] |
+// | 20 | u32 | block number, from 0 |
+// | 24 | u32 | number of blocks |
+// | 28 | u32 | [`Family`] |
+// | 32 | 476 bytes | a page, and zeros |
+// | 508 | u32 | [`END`] |
+//
+// All numbers are little-endian.
+
+/// Magic numbers at the start of a block.
+pub const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
+
+/// Magic number at the end of a block.
+pub const END: u32 = 0x0AB1_6F30;
+
+/// Payload bytes per block.
+pub const PAGE: u32 = 256;
+
+const FAMILY_STATED: u32 = 0x2000;
+
+/// Chip family that accepts a block; other chips ignore it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Family(pub u32);
+
+impl Family {
+    /// RP2350, Arm cores, secure state.
+    pub const RP2350: Self = Self(0xE48B_FF59);
+}
+
+/// Returns the UF2 file. Bytes of a page that no piece covers are erased-flash bytes.
+///
+/// # Errors
+/// If there are more blocks than the format can count.
+pub fn uf2(pieces: &[Piece], family: Family) -> Result<Vec<u8>, String> {
+    let mut pages = BTreeMap::new();
+    for piece in pieces {
+        for (address, byte) in (piece.address..).zip(&piece.bytes) {
+            let page: &mut Vec<u8> = pages
+                .entry(address - address % PAGE)
+                .or_insert_with(|| vec![BLANK; PAGE as usize]);
+            if let Some(place) = page.get_mut((address % PAGE) as usize) {
+                *place = *byte;
+            }
+        }
+    }
+    let count = u32::try_from(pages.len()).map_err(|_| "more pages than a UF2 file has")?;
+    let mut file = Vec::new();
+    for (number, (address, page)) in (0..).zip(&pages) {
+        let [first, second] = MAGIC;
+        for word in [
+            first,
+            second,
+            FAMILY_STATED,
+            *address,
+            PAGE,
+            number,
+            count,
+            family.0,
+        ] {
+            file.extend(word.to_le_bytes());
+        }
+        file.extend(page);
+        file.extend([0; 476 - PAGE as usize]);
+        file.extend(END.to_le_bytes());
+    }
+    Ok(file)
+}

@@ -1,0 +1,284 @@
+//! Chains that must locate their interferer, compared with chains that know it, in random scenes.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use uav_relay::{Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement};
+use uav_relay_scenario::mission::mission;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference as Known, Scenario, Source};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::drones::FlightSpec;
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::true_interference::{Stand, TrueInterference};
+
+use super::figures::sheet::FigureError;
+use super::multi_interferer::optimum;
+
+const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
+
+/// A random scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.
+#[derive(Clone, Debug)]
+pub struct RandomScene {
+    /// Geometry, powers and the true interferers.
+    pub scenario: Scenario,
+    /// Number of relays.
+    pub relays: u16,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+impl RandomScene {
+    /// Draws a scene with that many relays and sources.
+    pub fn new(seed: u64, relays: u16, sources: usize) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut scenario = Scenario::default();
+        let d = scenario.distance_m;
+        let sources = (0..sources)
+            .map(|_| {
+                let side = if rng.random() { 1.0 } else { -1.0 };
+                Source {
+                    power_w: 10_f64.powf(rng.random_range(0.0..2.0)),
+                    x_m: rng.random_range(-0.2..1.2) * d,
+                    y_m: side * rng.random_range(0.05..0.8) * d,
+                }
+            })
+            .collect();
+        scenario.interference = Known::Sources(sources);
+        Self {
+            scenario,
+            relays,
+            seed,
+        }
+    }
+
+    /// Moves the first source to (`x_m`, `y_m`), m.
+    pub fn place(&mut self, x_m: f64, y_m: f64) {
+        if let Known::Sources(sources) = &mut self.scenario.interference
+            && let Some(source) = sources.first_mut()
+        {
+            (source.x_m, source.y_m) = (x_m, y_m);
+        }
+    }
+
+    /// Returns a copy with the sources of `scene`.
+    pub fn with(&self, scene: &Scene) -> Self {
+        let mut wild = self.clone();
+        wild.scenario.interference = Known::Sources(scene.sources.clone());
+        wild
+    }
+
+    /// Returns the true scene.
+    pub fn scene(&self) -> Result<Scene, FigureError> {
+        Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
+    }
+
+    /// Returns the mission of the relays, with `guess` as its interference.
+    pub fn mission(&self, guess: Interference) -> Result<Mission, FigureError> {
+        let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
+        let config = MissionConfig {
+            interference: guess,
+            ..*told.config()
+        };
+        Mission::try_new(config).map_err(|_| NO_SCENE)
+    }
+
+    /// Returns the best SIR with the interferers known, linear.
+    ///
+    /// For one source it is the SIR of the chain that knows it, for several the exact optimum.
+    pub fn optimum(&self) -> Result<f64, FigureError> {
+        let scene = self.scene()?;
+        if scene.sources.len() > 1 {
+            return Ok(optimum(&scene).ok_or(NO_SCENE)?.sir);
+        }
+        Ok(scene.chain_sir(&self.told()?))
+    }
+
+    /// Returns the positions of a chain that knows the interferer. For several sources, the paper's hypothetical one.
+    pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
+        let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
+        let outcome = run(Setup::new(told))?;
+        let places: Option<_> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
+        places.ok_or(FigureError::Unsettled("a chain that was told"))
+    }
+
+    /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.
+    pub fn setup(&self, guess: Interference) -> Result<Setup, FigureError> {
+        let mut setup = Setup::new(self.mission(guess)?);
+        setup.seed = self.seed;
+        setup.settings.listen = Some(Listen::default());
+        let mut sky = TrueInterference::of(self.scene()?);
+        sky.seed = self.seed;
+        sky.period = Duration::from_millis(5_000);
+        sky.until = Instant::from_millis(120_000);
+        setup.deadline = Instant::from_millis(200_000);
+        setup.sky = Some(sky);
+        Ok(setup)
+    }
+
+    /// Returns a simulation with drones of 10 m/s. They start beside the transmitter and measure every second in flight.
+    pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
+        let mut setup = self.setup(guess)?;
+        let start = (1..=self.relays)
+            .map(|index| [5.0 * f64::from(index), 0.0, 20.0])
+            .collect();
+        setup.flight = Some(FlightSpec::multicopters(start, 0.0, 0.0));
+        if let Some(sky) = &mut setup.sky {
+            sky.period = Duration::from_millis(1_000);
+        }
+        Ok(setup)
+    }
+}
+
+/// Returns the SIR after each agreement, linear; the first element is the SIR before any measurement.
+pub fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
+    let mut sirs = Vec::new();
+    for stand in stands {
+        if stand.agreements as usize > sirs.len()
+            && let Some(goals) = &stand.goals
+        {
+            sirs.push(scene.chain_sir(goals));
+        }
+    }
+    sirs
+}
+
+/// Last agreement that is reported.
+pub const LAST: usize = 8;
+
+/// Shares of the optimum after 0 to [`LAST`] agreements based on measurements, one per scene.
+pub type Shares = [Vec<f64>; LAST + 1];
+
+/// Returns the shares in `scenes` random scenes, each run with `setup`.
+pub fn shares(
+    scenes: u64,
+    relays: u16,
+    sources: usize,
+    setup: impl Fn(&RandomScene) -> Result<Setup, FigureError> + Sync,
+) -> Result<Shares, FigureError> {
+    let one = |seed| {
+        let wild = RandomScene::new(seed, relays, sources);
+        let outcome = run(setup(&wild)?)?;
+        let best = wild.optimum()?;
+        let sirs = by_agreement(&wild.scene()?, &outcome.stands);
+        let last = *sirs
+            .last()
+            .ok_or(FigureError::Unsettled("a chain that listens"))?;
+        let share = |at: usize| sirs.get(at).unwrap_or(&last) / best;
+        Ok((0..=LAST).map(share).collect())
+    };
+    let each: Result<Vec<Vec<f64>>, FigureError> = (0..scenes).into_par_iter().map(one).collect();
+    let each = each?;
+    Ok(std::array::from_fn(|at| {
+        each.iter().filter_map(|one| one.get(at).copied()).collect()
+    }))
+}
+
+/// Setup without prior knowledge of the interference.
+pub fn unknown(wild: &RandomScene) -> Result<Setup, FigureError> {
+    wild.setup(Interference::Unknown)
+}
+
+/// The setup of [`unknown`] with 1 dB of shadowing, independent at each position.
+pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
+    let mut setup = unknown(wild)?;
+    if let Some(sky) = &mut setup.sky {
+        sky.shadow_db = 1.0;
+    }
+    Ok(setup)
+}
+
+/// Setup without measurements. The relays know the interferer, or the paper's hypothetical one for several sources.
+pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
+    let mut setup = unknown(wild)?;
+    (setup.mission, _) = mission(&wild.scenario, wild.relays, 1e-4)?;
+    setup.settings.listen = None;
+    Ok(setup)
+}
+
+/// Returns the `part`-quantile of `numbers`; NaN if empty.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "an index"
+)]
+pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let at = (numbers.len().saturating_sub(1) as f64 * part).round() as usize;
+    numbers.get(at).copied().unwrap_or(f64::NAN)
+}
+
+/// Start of the evaluation, s after the start of the run.
+const BEGUN_S: u32 = 60;
+
+/// Mean ratios of a chain's SIR to the optimum at the same moment, per scene, after the first minute.
+#[derive(Clone, Debug, Default)]
+pub struct MovingShares {
+    /// Ratios of the chain that tracks the interferer.
+    pub followed: Vec<f64>,
+    /// Ratios of the chain that keeps its first optimal positions.
+    pub stayed: Vec<f64>,
+}
+
+/// Returns the ratios in `scenes` scenes while a single interferer passes at a distance of 300 m.
+pub fn moving_shares(
+    scenes: u64,
+    relays: u16,
+    speed_mps: f64,
+) -> Result<MovingShares, FigureError> {
+    let each: Result<Vec<(f64, f64)>, FigureError> = (0..scenes)
+        .into_par_iter()
+        .map(|seed| one(seed, relays, speed_mps))
+        .collect();
+    let (followed, stayed) = each?.into_iter().unzip();
+    Ok(MovingShares { followed, stayed })
+}
+
+fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError> {
+    let mut wild = RandomScene::new(seed, relays, 1);
+    // Half-way through, the interferer is beside the middle of the line.
+    let span_s = 600.0 / speed_mps.max(3.0) + f64::from(BEGUN_S);
+    let half_s = 0.5 * (span_s + f64::from(BEGUN_S));
+    wild.place(500.0 - speed_mps * half_s, 300.0);
+    let mut setup = wild.flown(Interference::Unknown)?;
+    setup.settings.listen = Some(Listen::following(relays));
+    let none = FigureError::Unsettled("an interferer that moves");
+    let Some(sky) = &mut setup.sky else {
+        return Err(none);
+    };
+    sky.velocity_mps = [speed_mps, 0.0];
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "some minutes"
+    )]
+    let span_ms = (span_s * 1e3) as u64;
+    sky.until = Instant::from_millis(span_ms);
+    let sky = sky.clone();
+    let outcome = run(setup)?;
+    let begun = Instant::from_millis(u64::from(BEGUN_S) * 1_000);
+    let (mut followed, mut stayed, mut moments) = (0.0, 0.0, 0.0);
+    let mut first = None;
+    for stand in outcome.stands.iter().filter(|stand| stand.at >= begun) {
+        let scene = sky.scene_at(stand.at);
+        let places = wild.with(&scene).told()?;
+        let best = scene.chain_sir(&places);
+        let first = first.get_or_insert(places);
+        followed += scene.chain_sir(&stand.places) / best;
+        stayed += scene.chain_sir(first) / best;
+        moments += 1.0;
+    }
+    // At least a minute of samples, one per second.
+    if moments > 50.0 {
+        Ok((followed / moments, stayed / moments))
+    } else {
+        Err(none)
+    }
+}
+
+/// Returns the arithmetic mean; NaN if empty.
+#[expect(clippy::cast_precision_loss, reason = "a few")]
+pub fn mean(shares: &[f64]) -> f64 {
+    shares.iter().sum::<f64>() / shares.len() as f64
+}

@@ -1,0 +1,319 @@
+//! Geographic output of a plan: sites, relays, hops and interferers for a map or globe.
+
+use std::{fmt, io};
+
+use geojson::{FeatureCollection, Geometry, GeometryValue, JsonObject};
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesText, Event};
+use uav_relay::{Geodetic, Placement};
+use uav_relay_scenario::{Line, Scenario};
+
+use super::Plan;
+
+/// A feature of the map.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Feature {
+    /// Label.
+    pub name: String,
+    /// `tx`, `rx`, `relay`, `interferer` or `hop`.
+    pub kind: &'static str,
+    /// Coordinates: one point, or the two ends of a hop.
+    pub at: Vec<Geodetic>,
+    /// Numbers of the feature, by names that end in the unit.
+    pub numbers: Vec<(&'static str, Number)>,
+}
+
+/// A number, rounded for display.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Number {
+    /// A count.
+    Whole(u16),
+    /// A measure, rounded to three decimals: a millimetre, or a thousandth of a decibel.
+    Rounded(f64),
+    /// A ratio, rounded to six decimals.
+    Ratio(f64),
+}
+
+impl Number {
+    /// Returns the rounded value; counts are exact.
+    fn rounded(self) -> f64 {
+        let (value, decimals) = match self {
+            Self::Whole(count) => return f64::from(count),
+            Self::Rounded(value) => (value, 1e3),
+            Self::Ratio(value) => (value, 1e6),
+        };
+        // Adding 0 turns -0 into 0.
+        (value * decimals).round() / decimals + 0.0
+    }
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Whole(count) => count.fmt(f),
+            other => other.rounded().fmt(f),
+        }
+    }
+}
+
+/// A plan as map features.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Map {
+    /// Sites, relays, interferers, then the hops from Tx on.
+    pub features: Vec<Feature>,
+    /// Height of the mean sea level above the ellipsoid, m, if the scenario states it.
+    pub geoid_m: Option<f64>,
+    /// Numbers (from 1) of interferers too far from the line for geographic coordinates.
+    pub left_out: Vec<usize>,
+}
+
+impl Map {
+    /// Creates the map of `plan`.
+    ///
+    /// # Errors
+    /// A line that says what the scenario lacks.
+    pub fn new(scenario: &Scenario, plan: &Plan) -> Result<Self, String> {
+        let line = scenario.line.as_ref().ok_or(
+            "site: is missing; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }, which say where on earth the line is",
+        )?;
+        let [tx, rx] = line.sites;
+        let site = |name: &str, kind, at| Feature {
+            name: name.to_owned(),
+            kind,
+            at: vec![at],
+            numbers: Vec::new(),
+        };
+        let mut features = vec![site("Tx", "tx", tx), site("Rx", "rx", rx)];
+        let mut ends = vec![tx];
+        for (index, (place, profile)) in (1..).zip(&plan.places) {
+            let at = point(line, *place)
+                .ok_or_else(|| format!("relay {index} is too far from the line"))?;
+            ends.push(at);
+            features.push(Feature {
+                name: format!("relay {index}"),
+                kind: "relay",
+                at: vec![at],
+                numbers: vec![
+                    ("index", Number::Whole(index)),
+                    ("x_m", Number::Rounded(place.x_m.into())),
+                    ("y_m", Number::Rounded(place.y_m.into())),
+                    ("h_m", Number::Rounded(place.altitude_m.into())),
+                    ("eirp_dbm", Number::Rounded(dbm(profile.power_w.into()))),
+                ],
+            });
+        }
+        ends.push(rx);
+        let mut left_out = Vec::new();
+        for (number, (power_w, x_m, y_m)) in (1..).zip(scenario.sources()) {
+            #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
+            let ground = Placement {
+                x_m: x_m as f32,
+                y_m: y_m as f32,
+                altitude_m: 0.0,
+            };
+            let Some(at) = point(line, ground) else {
+                left_out.push(number);
+                continue;
+            };
+            features.push(Feature {
+                name: format!("interferer {number}"),
+                kind: "interferer",
+                at: vec![at],
+                numbers: vec![
+                    ("x_m", Number::Rounded(x_m)),
+                    ("y_m", Number::Rounded(y_m)),
+                    ("eirp_dbm", Number::Rounded(dbm(power_w))),
+                ],
+            });
+        }
+        let hops = ends.iter().zip(ends.iter().skip(1)).zip(&plan.sirs);
+        for (number, ((from, to), sir)) in (1..).zip(hops) {
+            features.push(Feature {
+                name: format!("hop {number}: {:.2} dB", 10.0 * sir.log10()),
+                kind: "hop",
+                at: vec![*from, *to],
+                numbers: vec![
+                    ("hop", Number::Whole(number)),
+                    ("sir_ratio", Number::Ratio(*sir)),
+                    ("sir_db", Number::Rounded(10.0 * sir.log10())),
+                ],
+            });
+        }
+        Ok(Self {
+            features,
+            geoid_m: line.geoid_m,
+            left_out,
+        })
+    }
+}
+
+fn point(line: &Line, place: Placement) -> Option<Geodetic> {
+    line.axis.point(place)
+}
+
+fn dbm(power_w: f64) -> f64 {
+    10.0 * power_w.log10() + 30.0
+}
+
+/// Returns longitude and latitude, degrees, and the height above mean sea level, m.
+fn position(at: Geodetic) -> [f64; 3] {
+    [
+        f64::from(at.lon_e7) / 1e7,
+        f64::from(at.lat_e7) / 1e7,
+        f64::from(at.amsl_mm) / 1e3,
+    ]
+}
+
+// GeoJSON (RFC 7946) output of a plan.
+//
+// Positions are longitude and latitude, and with `site.geoid_m` the height above the ellipsoid, as the RFC defines the third
+// number. Heights above mean sea level are in the property `amsl_m`. Hops across the antimeridian are split there.
+
+/// Returns the text of the GeoJSON file.
+pub fn geojson(map: &Map) -> String {
+    let features = map.features.iter().map(|one| feature(one, map.geoid_m));
+    let mut text = FeatureCollection::new(features).to_string();
+    text.push('\n');
+    text
+}
+
+fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
+    let shown = |[lon, lat, amsl]: [f64; 3]| match geoid_m {
+        Some(geoid_m) => vec![lon, lat, Number::Rounded(amsl + geoid_m).rounded()],
+        None => vec![lon, lat],
+    };
+    let at: Vec<[f64; 3]> = feature.at.iter().map(|at| position(*at)).collect();
+    let value = match at.as_slice() {
+        [from, to] => match cut(*from, *to) {
+            Some([before, after]) => GeometryValue::new_multi_line_string([
+                [*from, before].map(shown),
+                [after, *to].map(shown),
+            ]),
+            None => GeometryValue::new_line_string([*from, *to].map(shown)),
+        },
+        at => GeometryValue::new_point(shown(at.first().copied().unwrap_or_default())),
+    };
+    let mut properties = JsonObject::new();
+    properties.insert("name".to_owned(), feature.name.clone().into());
+    properties.insert("kind".to_owned(), feature.kind.into());
+    if let [at] = at.as_slice() {
+        properties.insert("amsl_m".to_owned(), at[2].into());
+    }
+    for (name, number) in &feature.numbers {
+        let value = match number {
+            Number::Whole(count) => (*count).into(),
+            other => other.rounded().into(),
+        };
+        properties.insert((*name).to_owned(), value);
+    }
+    geojson::Feature {
+        geometry: Some(Geometry::new(value)),
+        properties: Some(properties),
+        ..geojson::Feature::default()
+    }
+}
+
+/// Returns the points on either side of the antimeridian where the short way crosses it. `None` if it does not.
+fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
+    let [lon, lat, high] = from;
+    let [other_lon, other_lat, other_high] = to;
+    if (other_lon - lon).abs() <= 180.0 {
+        return None;
+    }
+    let edge = if lon > 0.0 { 180.0 } else { -180.0 };
+    // Both longitudes relative to the side of the first point.
+    let share = (edge - lon) / (other_lon + 2.0 * edge - lon);
+    let at = |from: f64, to: f64| from + share * (to - from);
+    let (lat, high) = (at(lat, other_lat), at(high, other_high));
+    Some([[edge, lat, high], [-edge, lat, high]])
+}
+
+const NAMESPACE: &str = "http://www.opengis.net/kml/2.2";
+
+/// Colours by kind of feature, as alpha, blue, green and red.
+const STYLES: [(&str, &str); 5] = [
+    ("tx", "ff00a000"),
+    ("rx", "ffa06000"),
+    ("relay", "ffffffff"),
+    ("interferer", "ff0000e0"),
+    ("hop", "ff00d0ff"),
+];
+
+type Xml = Writer<Vec<u8>>;
+
+/// Returns the text of a KML file with the given title.
+pub fn kml(map: &Map, title: &str) -> io::Result<String> {
+    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 1);
+    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+    xml.create_element("kml")
+        .with_attribute(("xmlns", NAMESPACE))
+        .write_inner_content(|xml| {
+            xml.create_element("Document").write_inner_content(|xml| {
+                leaf(xml, "name", title)?;
+                for (kind, color) in STYLES {
+                    style(xml, kind, color)?;
+                }
+                for feature in &map.features {
+                    placemark(xml, feature)?;
+                }
+                Ok(())
+            })?;
+            Ok(())
+        })?;
+    let mut text = String::from_utf8(xml.into_inner()).map_err(io::Error::other)?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// Writes an element that contains only text.
+fn leaf(xml: &mut Xml, name: &str, text: &str) -> io::Result<()> {
+    xml.create_element(name)
+        .write_text_content(BytesText::new(text))?;
+    Ok(())
+}
+
+fn style(xml: &mut Xml, kind: &str, color: &str) -> io::Result<()> {
+    xml.create_element("Style")
+        .with_attribute(("id", kind))
+        .write_inner_content(|xml| {
+            xml.create_element("IconStyle")
+                .write_inner_content(|xml| leaf(xml, "color", color))?;
+            xml.create_element("LineStyle").write_inner_content(|xml| {
+                leaf(xml, "color", color)?;
+                leaf(xml, "width", "3")
+            })?;
+            Ok(())
+        })?;
+    Ok(())
+}
+
+fn placemark(xml: &mut Xml, feature: &Feature) -> io::Result<()> {
+    let numbers = feature.numbers.iter();
+    let numbers: Vec<String> = numbers.map(|(name, it)| format!("{name} = {it}")).collect();
+    let at: Vec<String> = feature
+        .at
+        .iter()
+        .map(|at| {
+            let [lon, lat, amsl] = position(*at);
+            format!("{lon:.7},{lat:.7},{amsl:.3}")
+        })
+        .collect();
+    xml.create_element("Placemark").write_inner_content(|xml| {
+        leaf(xml, "name", &feature.name)?;
+        if !numbers.is_empty() {
+            leaf(xml, "description", &numbers.join(", "))?;
+        }
+        leaf(xml, "styleUrl", &format!("#{}", feature.kind))?;
+        let shape = if at.len() > 1 { "LineString" } else { "Point" };
+        xml.create_element(shape).write_inner_content(|xml| {
+            if shape == "Point" {
+                // Draws a line down to the ground.
+                leaf(xml, "extrude", "1")?;
+            }
+            leaf(xml, "altitudeMode", "absolute")?;
+            leaf(xml, "coordinates", &at.join(" "))
+        })?;
+        Ok(())
+    })?;
+    Ok(())
+}
