@@ -100,7 +100,7 @@ impl Log {
     }
 
     /// Logs an event at `now`: a short name, fields for programs, and a text for people.
-    pub fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
+    pub fn say(&self, now: Instant, event: &str, fields: Value, text: impl fmt::Display) {
         let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -108,7 +108,7 @@ impl Log {
     }
 
     /// Logs an event without fields.
-    pub fn tell(&self, now: Instant, event: &str, text: fmt::Arguments<'_>) {
+    pub fn tell(&self, now: Instant, event: &str, text: impl fmt::Display) {
         self.say(now, event, Value::Null, text);
     }
 

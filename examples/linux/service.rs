@@ -3,17 +3,20 @@
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant as Clock};
 
 use rustix::event::PollFlags;
 use serde_json::Value;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
+use signal_hook::iterator::backend::SignalDelivery;
+use signal_hook::iterator::exfiltrator::SignalOnly;
 use uav_relay::Instant;
 
 use crate::log::{Log, LogOptions, Source};
 use crate::notify::Notify;
-use crate::requests::Requests;
 use crate::socket::StatusSocket;
-use crate::system::{now, on_stop};
 
 /// Maximum time for the last log lines at exit.
 const LAST_LINES: Duration = Duration::from_millis(500);
@@ -28,9 +31,12 @@ pub struct Service {
     pub log: Log,
     clock: Clock,
     socket: Option<StatusSocket>,
-    requests: Requests,
+    signals: SignalDelivery<UnixStream, SignalOnly>,
+    /// True after SIGHUP, a request to reopen the log, until it is handled.
+    hangup: bool,
+    /// True after SIGUSR1, a request to log the status, until it is handled.
+    asks_status: bool,
     notify: Option<Notify>,
-    stop: UnixStream,
 }
 
 impl Service {
@@ -43,22 +49,24 @@ impl Service {
         source: Source,
         status_socket: Option<&Path>,
     ) -> Result<Self, String> {
-        let (stop, requests) = (on_stop()?, Requests::new()?);
+        let signals = signals().map_err(|error| format!("cannot wait for signals: {error}"))?;
         let socket = status_socket.map(StatusSocket::open).transpose()?;
         Ok(Self {
             log: Log::open(log, source)?,
             clock: Clock::now(),
             socket,
-            requests,
+            signals,
+            hangup: false,
+            asks_status: false,
             notify: Notify::open(),
-            stop,
         })
     }
 
     /// Returns the time since the start.
     #[must_use]
     pub fn now(&self) -> Instant {
-        now(self.clock)
+        let micros = self.clock.elapsed().as_micros();
+        Instant::from_micros(u64::try_from(micros).unwrap_or(u64::MAX))
     }
 
     /// Reports to systemd that the program is ready.
@@ -76,16 +84,16 @@ impl Service {
         who: &str,
         mut answer: impl FnMut(&Log, Option<(&str, &str)>) -> Value,
     ) -> Option<Instant> {
-        let Self { log, requests, .. } = self;
-        if requests.take_hangup() {
+        let log = &self.log;
+        if std::mem::take(&mut self.hangup) {
             log.reopen();
             let what = format_args!("the log file was reopened; the {who} continues");
             log.tell(time, "hang-up", what);
         }
-        if requests.take_status() {
+        if std::mem::take(&mut self.asks_status) {
             let status = answer(log, None);
             let text = status.to_string();
-            log.say(time, "status", status, format_args!("{text}"));
+            log.say(time, "status", status, text);
         }
         let socket = self.socket.as_mut();
         let (questions, again) = socket.map(|it| it.questions(time)).unwrap_or_default();
@@ -102,18 +110,24 @@ impl Service {
 
     /// Returns the file descriptors and events to poll.
     pub fn interests(&self) -> impl Iterator<Item = (BorrowedFd<'_>, PollFlags)> {
-        let [hangup, status] = self.requests.fds();
         let socket = self.socket.iter().flat_map(StatusSocket::fds);
-        [self.stop.as_fd(), hangup, status]
-            .into_iter()
+        std::iter::once(self.signals.get_read().as_fd())
             .chain(socket)
             .map(|fd| (fd, PollFlags::IN))
     }
 
-    /// Returns true if SIGINT or SIGTERM arrived, given the poll results of [`interests`](Self::interests).
+    /// Reads the signals that have arrived; returns true after SIGINT or SIGTERM.
     #[must_use]
-    pub fn is_over(found: &[PollFlags]) -> bool {
-        found.first().is_some_and(|stop| !stop.is_empty())
+    pub fn is_over(&mut self) -> bool {
+        let mut is_over = false;
+        for signal in self.signals.pending() {
+            match signal {
+                SIGHUP => self.hangup = true,
+                SIGUSR1 => self.asks_status = true,
+                _ => is_over = true,
+            }
+        }
+        is_over
     }
 
     /// Returns the time left until `wake`; `None` means for ever.
@@ -137,4 +151,12 @@ impl Service {
     pub fn end(&self) {
         self.log.flush(LAST_LINES);
     }
+}
+
+/// Registers the signals. SIGXFSZ becomes a write error, like a full disk, and does not end the program.
+fn signals() -> std::io::Result<SignalDelivery<UnixStream, SignalOnly>> {
+    signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+    let (ours, theirs) = UnixStream::pair()?;
+    let signals = [SIGINT, SIGTERM, SIGHUP, SIGUSR1];
+    SignalDelivery::with_pipe(ours, theirs, SignalOnly, signals)
 }

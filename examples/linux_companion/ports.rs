@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared};
 use uav_relay::{Instant, Relay, ViewRecord};
 
-use crate::options::Ttys;
+use crate::options::Options;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::{sleep, tap};
@@ -42,27 +42,19 @@ pub(crate) enum Ports {
 
 impl Ports {
     /// Opens the ttys.
-    pub(crate) fn open(ttys: &Ttys, baud: u32) -> Result<Self, String> {
-        let link = |option, path: Option<&_>| {
-            let tty = path
-                .map(|path| Replug::open(option, path, baud))
-                .transpose()?;
-            Ok::<_, String>(SerialLink::new(End(tty), baud))
+    pub(crate) fn open(options: &Options) -> Result<Self, String> {
+        let link = |name, path: &Option<PathBuf>| {
+            let tty = path.as_deref();
+            let tty = tty.map(|path| Replug::open(name, path, options.baud));
+            Ok::<_, String>(SerialLink::new(End(tty.transpose()?), options.baud))
         };
-        Ok(match ttys {
-            Ttys::Pair {
-                upstream,
-                downstream,
-            } => {
-                let upstream = link("--upstream", upstream.as_deref())?;
-                let downstream = link("--downstream", downstream.as_deref())?;
-                Self::Pair(Box::new(Pair::new(upstream, downstream)))
-            }
-            Ttys::Shared(tty) => {
-                let channel = link("--shared", Some(tty.as_path()))?;
-                Self::Shared(Box::new(Shared::new(channel)))
-            }
-        })
+        if options.shared.is_some() {
+            let channel = link("--shared", &options.shared)?;
+            return Ok(Self::Shared(Box::new(Shared::new(channel))));
+        }
+        let upstream = link("--upstream", &options.upstream)?;
+        let downstream = link("--downstream", &options.downstream)?;
+        Ok(Self::Pair(Box::new(Pair::new(upstream, downstream))))
     }
 
     /// Captures all further traffic in a file; returns the file that is written.

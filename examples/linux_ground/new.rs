@@ -8,8 +8,10 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::{
     Band, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Sites, Upload,
 };
+use uav_relay_linux::command::number;
 use uav_relay_linux::mission::{
-    altitude, band, distance, interferer, left, mission, noise, power, right, separation,
+    ALTITUDE_M, DISTANCE_M, LEFT_M, NOISE_W, POWER_W, RIGHT_M, SEPARATION_M, band, interferer,
+    mission,
 };
 use uav_relay_linux::site::site;
 
@@ -26,36 +28,36 @@ pub(crate) struct NewOptions {
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     new_site_rx: Option<Geodetic>,
     /// New distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(DISTANCE_M))]
     new_distance: Option<f32>,
     /// New altitude of every relay, m, 0.1 to 1e4
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(ALTITUDE_M))]
     new_altitude: Option<f32>,
     /// New range of altitudes to choose from, m, 0.1 to 1e4. Default: the present range, or the new altitude alone if the present
     /// range is a single one
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
     /// New left limit of the relays' positions, facing the receiver, as y in m, -1e5 to 0
-    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = left)]
+    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = number(LEFT_M))]
     new_lateral_min: Option<f32>,
     /// New right limit, as y in m, 0 to 1e5
-    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = right)]
+    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     new_tx_power: Option<f32>,
     /// New power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     new_uav_power: Option<f32>,
     /// New interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to
     /// the right of it
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
     /// New noise power at every receiver, W, 0 to 1
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = noise)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(NOISE_W))]
     new_noise: Option<f32>,
     /// New minimum distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
     new_min_separation: Option<f32>,
 }
 

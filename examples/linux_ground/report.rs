@@ -15,9 +15,13 @@ use crate::options::Plan;
 
 /// Logs the end of the chain, the port and the signing epoch.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
-    let (end, relays, network) = (name(plan.end), plan.loaded.mission.relays(), plan.network);
-    let (base, baud) = (plan.loaded.mission.digest(), plan.baud);
-    let tty = plan.tty.display();
+    let (end, relays, network) = (
+        name(plan.end),
+        plan.loaded.mission.relays(),
+        plan.options.network,
+    );
+    let (base, baud) = (plan.loaded.mission.digest(), plan.options.baud);
+    let tty = plan.options.tty.display();
     log.say(
         Instant::ZERO,
         "started",
@@ -208,7 +212,7 @@ impl Outside {
 
 /// Returns the error for an upload that exceeds its time, with the most likely cause.
 pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
-    let seconds = plan.timeout.as_micros() / 1_000_000;
+    let seconds = plan.options.timeout;
     let state = match progress {
         Progress::Held { by } => {
             format!("relay {by} holds version {version}, and the chain does not fly it yet")
@@ -252,7 +256,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             stats.foreign,
             format!(
                 "frames are of another network number than --network {}",
-                plan.network
+                plan.options.network
             ),
         ),
         (
@@ -270,7 +274,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             stats.crc,
             format!(
                 "frames are damaged: is --baud {} that of the relays?",
-                plan.baud
+                plan.options.baud
             ),
         ),
     ];
@@ -284,9 +288,9 @@ fn why(plan: &Plan, stats: &Stats) -> String {
         ),
         None => format!(
             "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
-            plan.tty.display(),
-            plan.network,
-            plan.baud
+            plan.options.tty.display(),
+            plan.options.network,
+            plan.options.baud
         ),
     }
 }
