@@ -9,8 +9,7 @@
 //! | [`replug`] | tty that is reopened when it disappears; counts and captures its bytes |
 //! | [`tap`] | capture of the ports' traffic |
 //! | [`lines`] | lines from a FIFO, for any sequence of writers |
-//! | [`sleep`] | sleeps until a port or another file descriptor is ready |
-//! | [`service`] | clock, log, signals, status socket and systemd |
+//! | [`service`] | clock, sleep, log, signals, status socket and systemd |
 //! | [`log`] | log lines, written without blocking the program |
 //! | [`socket`] | status socket |
 //! | [`counters`] | frame counters as JSON; reasons of rejected frames, in words |
@@ -29,7 +28,6 @@ pub mod notify;
 pub mod replug;
 pub mod service;
 pub mod site;
-pub mod sleep;
 pub mod socket;
 pub mod stored;
 pub mod tap;

@@ -1,4 +1,4 @@
-//! Services of a long-running program: clock, log, signals, status socket and systemd.
+//! Services of a long-running program: clock, sleep, log, signals, status socket and systemd.
 
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::os::unix::net::UnixStream;
@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant as Clock};
 
-use rustix::event::PollFlags;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 use serde_json::Value;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
 use signal_hook::iterator::backend::SignalDelivery;
@@ -16,6 +17,7 @@ use uav_relay::Instant;
 
 use crate::log::{Log, LogOptions, Source};
 use crate::notify::Notify;
+use crate::replug::Replug;
 use crate::socket::StatusSocket;
 
 /// Maximum time for the last log lines at exit.
@@ -98,27 +100,57 @@ impl Service {
         let socket = self.socket.as_mut();
         let (questions, again) = socket.map(|it| it.questions(time)).unwrap_or_default();
         for question in questions {
-            let said = match &question.command {
-                Some(command) => answer(log, Some((command, &question.user()))),
-                None => answer(log, None),
-            };
+            let user = question.user();
+            let command = question.command.as_deref().map(|it| (it, user.as_str()));
+            let said = answer(log, command);
             question.answer(&said);
         }
         let alive = self.notify.as_mut().and_then(|it| it.tend(time));
         again.into_iter().chain(alive).min()
     }
 
-    /// Returns the file descriptors and events to poll.
-    pub fn interests(&self) -> impl Iterator<Item = (BorrowedFd<'_>, PollFlags)> {
+    /// Sleeps until `wake`, a signal, a status request, or one of `ttys` or `others` is ready; without `wake` for ever. Returns the
+    /// events of each of `others`, and true after SIGINT or SIGTERM.
+    ///
+    /// A tty is ready when it has bytes, or room after it had none.
+    pub fn sleep<'a>(
+        &mut self,
+        wake: Option<Instant>,
+        ttys: impl Iterator<Item = &'a mut Replug>,
+        others: &[(BorrowedFd<'_>, PollFlags)],
+    ) -> (Vec<PollFlags>, bool) {
+        let time = self.now();
+        let span = wake.map(|at| Duration::from_micros(at.since(time).as_micros()));
+        // A span too long for a Timespec means for ever.
+        let timeout = span.and_then(|span| Timespec::try_from(span).ok());
+        let mut ttys: Vec<&mut Replug> = ttys.filter(|tty| tty.is_open()).collect();
+        let on_ttys = ttys.iter().filter_map(|tty| tty.interest());
         let socket = self.socket.iter().flat_map(StatusSocket::fds);
-        std::iter::once(self.signals.get_read().as_fd())
-            .chain(socket)
-            .map(|fd| (fd, PollFlags::IN))
+        let own = std::iter::once(self.signals.get_read().as_fd()).chain(socket);
+        let own = own.map(|fd| (fd, PollFlags::IN));
+        let mut fds: Vec<PollFd<'_>> = others
+            .iter()
+            .copied()
+            .chain(on_ttys)
+            .chain(own)
+            .map(|(fd, interest)| PollFd::from_borrowed_fd(fd, interest))
+            .collect();
+        let result = poll(&mut fds, timeout.as_ref());
+        let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
+        if !matches!(result, Ok(_) | Err(Errno::INTR)) {
+            // For want of memory, for instance: the program goes on.
+            std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
+            found.fill(PollFlags::empty());
+        }
+        let on_ttys = found.split_off(others.len());
+        for (tty, events) in ttys.iter_mut().zip(on_ttys) {
+            tty.noticed(events);
+        }
+        (found, self.is_over())
     }
 
     /// Reads the signals that have arrived; returns true after SIGINT or SIGTERM.
-    #[must_use]
-    pub fn is_over(&mut self) -> bool {
+    fn is_over(&mut self) -> bool {
         let mut is_over = false;
         for signal in self.signals.pending() {
             match signal {
@@ -128,18 +160,6 @@ impl Service {
             }
         }
         is_over
-    }
-
-    /// Returns the time left until `wake`; `None` means for ever.
-    #[must_use]
-    pub fn until(&self, wake: Option<Instant>) -> Option<Duration> {
-        let time = self.now();
-        wake.map(|at| Duration::from_micros(at.since(time).as_micros()))
-    }
-
-    /// Sleeps for at most 10 ms, as a substitute when poll(2) fails, for want of memory for instance.
-    pub fn nap(span: Option<Duration>) {
-        std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
     }
 
     /// Reports to systemd that the program stops on request.

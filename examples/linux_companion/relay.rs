@@ -1,7 +1,6 @@
 //! Main loop: exchange bytes, log events, sleep. In flight only a signal ends it.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::os::fd::BorrowedFd;
 
 use rustix::event::PollFlags;
 use serde_json::json;
@@ -101,7 +100,7 @@ impl Flight {
         let (mut views, stands_by) = views.transpose()?.unzip();
         // Last of the steps that may fail, so that repeated failing starts leave no files.
         if let Some(asked) = &options.capture {
-            tap::tell(&log, asked, &ports.capture(asked)?);
+            tap::attach(&log, env!("CARGO_BIN_NAME"), asked, ports.ttys())?;
         }
         let report = Report::new(
             log.clone(),
@@ -229,28 +228,22 @@ impl Flight {
 
     /// Sleeps until there may be something to do; returns false after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> bool {
-        let span = self.service.until(wake);
-        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let fifo = self.positions.as_ref().map(Positions::fd);
         let files = [&self.views, &self.uploads].into_iter().flatten();
         let files = files.map(StoredFile::fd);
-        others.extend(fifo.into_iter().chain(files).map(|fd| (fd, PollFlags::IN)));
+        let others = fifo.into_iter().chain(files);
+        let mut others: Vec<_> = others.map(|fd| (fd, PollFlags::IN)).collect();
         // The autopilot is the last entry, if there is one.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
-        let found = self.ports.sleep(span, &others);
         let has_autopilot = autopilot.is_some();
-        match found {
-            Ok(found) if has_autopilot => {
-                if let (Some(autopilot), Some(events)) = (&mut self.autopilot, found.last()) {
-                    autopilot.noticed(*events);
-                }
-            }
-            Ok(_) => {}
-            // A relay in flight continues.
-            Err(_) => Service::nap(span),
+        let (found, is_over) = self.service.sleep(wake, self.ports.ttys(), &others);
+        if has_autopilot
+            && let (Some(autopilot), Some(events)) = (&mut self.autopilot, found.last())
+        {
+            autopilot.noticed(*events);
         }
-        !self.service.is_over()
+        !is_over
     }
 
     fn end(&mut self) {

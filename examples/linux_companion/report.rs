@@ -80,18 +80,11 @@ impl Report {
     /// Logs the signing epoch, or that frames are not signed.
     pub(crate) fn signs(&self, epoch: Option<u32>) {
         match epoch {
-            Some(epoch) => self.log.say(
-                Instant::ZERO,
-                "signed",
-                json!({ "epoch": epoch }),
-                format_args!("frames are signed, epoch {epoch}"),
-            ),
+            Some(epoch) => self.log.signed(epoch),
             None => self.log.tell(
                 Instant::ZERO,
                 "unsigned",
-                format_args!(
-                    "no --key-file: frames are not signed, and anybody in range can send frames"
-                ),
+                "no --key-file: frames are not signed, and anybody in range can send frames",
             ),
         }
     }
@@ -112,9 +105,7 @@ impl Report {
         self.log.tell(
             Instant::ZERO,
             "restored",
-            format_args!(
-                "votes of before this start, from --view-file; before another flight remove that file"
-            ),
+            "votes of before this start, from --view-file; before another flight remove that file",
         );
     }
 
@@ -320,7 +311,7 @@ impl Report {
             let text = format_args!("target SIR {:.6}, {db:.3} dB", Exact(target));
             self.log.say(now, "converged", fields, text);
         } else {
-            let text = format_args!("the relays spread along the line to measure the interferer");
+            let text = "the relays spread along the line to measure the interferer";
             self.log.say(now, "converged", fields, text);
         }
     }

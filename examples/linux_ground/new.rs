@@ -13,7 +13,7 @@ use uav_relay_linux::mission::{
     ALTITUDE_M, DISTANCE_M, LEFT_M, NOISE_W, POWER_W, RIGHT_M, SEPARATION_M, band, interferer,
     mission,
 };
-use uav_relay_linux::site::site;
+use uav_relay_linux::site::{site, swapped};
 
 /// Options of a new mission; values that are not given stay as they are flown.
 #[derive(Args, Debug)]
@@ -210,12 +210,7 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     if far_m <= most_m {
         return Ok(());
     }
-    let turned = |site: Geodetic| Geodetic {
-        lat_e7: site.lon_e7,
-        lon_e7: site.lat_e7,
-        ..site
-    };
-    let is_swapped = away_m(turned(sites.tx), turned(sites.rx)) <= most_m;
+    let is_swapped = away_m(swapped(sites.tx), swapped(sites.rx)) <= most_m;
     let hint = if is_swapped {
         ": are latitude and longitude swapped?"
     } else {
@@ -231,7 +226,6 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
 /// Returns the largest turn of the line, degrees, that keeps the relays' order. Position errors are up to 1 m.
 ///
 /// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
-/// For the separation s and the width w of the lateral range it solves s cos t - w sin t = min(2 m, s / 2).
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (
         config.min_separation_m,

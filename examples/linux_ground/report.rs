@@ -33,12 +33,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
             "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
         ),
     );
-    log.say(
-        Instant::ZERO,
-        "signed",
-        json!({ "epoch": epoch }),
-        format_args!("frames are signed, epoch {epoch}"),
-    );
+    log.signed(epoch);
 }
 
 pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progress) {
@@ -46,13 +41,10 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
     match progress {
         Progress::Offering => {
             let digest = upload.id().digest;
-            let what = format!("version {version}, mission 0x{digest:04x}");
-            match upload.sites() {
-                Some(sites) => {
-                    log.tell(now, "offering", format_args!("{what}, {}", Between(sites)));
-                }
-                None => log.tell(now, "offering", format_args!("{what}")),
-            }
+            let sites = upload.sites();
+            let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
+            let what = format_args!("version {version}, mission 0x{digest:04x}{sites}");
+            log.tell(now, "offering", what);
         }
         Progress::Held { by } => log.tell(
             now,
@@ -106,7 +98,7 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
         (_, true) => format!("relay {by} flies version {version}"),
         (_, false) => format!("relay {by} holds version {version}, and does not fly it yet"),
     };
-    log.say(now, "current", fields, format_args!("{what}"));
+    log.say(now, "current", fields, what);
 }
 
 /// Returns the error for an upload refused by a relay, with the value that most likely causes it.
@@ -296,14 +288,13 @@ fn why(plan: &Plan, stats: &Stats) -> String {
 }
 
 pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
-    let fields = json!({ "node": node });
-    if is_heard {
-        let what = format_args!("relay {node} is received, and receives this station");
-        log.say(now, "back", fields, what);
+    let (event, what) = if is_heard {
+        ("back", "is received, and receives this station")
     } else {
-        let what = format_args!("relay {node} does not answer");
-        log.say(now, "lost", fields, what);
-    }
+        ("lost", "does not answer")
+    };
+    let text = format_args!("relay {node} {what}");
+    log.say(now, event, json!({ "node": node }), text);
 }
 
 /// Logs the counters at the end of a station that ran with `--stand`.

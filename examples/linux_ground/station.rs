@@ -1,6 +1,6 @@
 //! Main loop: exchange bytes, forward measurements, log the upload's progress, sleep.
 
-use std::os::fd::{AsFd as _, BorrowedFd};
+use std::os::fd::AsFd as _;
 
 use rustix::event::PollFlags;
 use serde_json::{Value, json};
@@ -11,7 +11,6 @@ use uav_relay_linux::counters::{Refusals, counted};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::service::Service;
-use uav_relay_linux::sleep::sleep;
 use uav_relay_linux::stored::next_epoch;
 use uav_relay_linux::{config, tap};
 
@@ -75,12 +74,8 @@ impl<'a> Station<'a> {
         report::started(&service.log, plan, auth.epoch);
         config::tell(&plan.overrides, &service.log);
         if let Some(asked) = &options.capture {
-            let ports = [tty.to_string()];
-            let (taps, written) = tap::taps(env!("CARGO_BIN_NAME"), asked, &ports)?;
-            for tap in taps {
-                tty.tapped(tap);
-            }
-            tap::tell(&service.log, asked, &written);
+            let tty = std::iter::once(&mut tty);
+            tap::attach(&service.log, env!("CARGO_BIN_NAME"), asked, tty)?;
         }
         let loaded = &plan.loaded.mission;
         let mut ground = Ground::new(loaded, plan.end, options.network, plan.wiring(), auth);
@@ -230,25 +225,17 @@ impl<'a> Station<'a> {
 
     /// Sleeps until there may be something to do; returns the result after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> Over {
-        let span = self.service.until(wake);
-        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
-        others.extend(measured.map(|fd| (fd, PollFlags::IN)));
+        let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
         let stdin = std::io::stdin();
-        let asks = self
-            .uploading
-            .as_ref()
-            .is_some_and(Uploading::is_confirming);
+        let uploading = self.uploading.as_ref();
+        let asks = uploading.is_some_and(Uploading::is_confirming);
         if asks {
             others.push((stdin.as_fd(), PollFlags::IN));
         }
-        match sleep(span, std::iter::once(&mut self.tty), &others) {
-            Ok(found) => {
-                self.is_answered = asks && found.last().is_some_and(|found| !found.is_empty());
-            }
-            Err(_) => Service::nap(span),
-        }
-        let is_over = self.service.is_over();
+        let tty = std::iter::once(&mut self.tty);
+        let (found, is_over) = self.service.sleep(wake, tty, &others);
+        self.is_answered = asks && found.last().is_some_and(|found| !found.is_empty());
         is_over.then(|| self.stop().map_err(Fault::from))
     }
 
@@ -276,18 +263,13 @@ fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
     let Some(upload) = upload else {
         return Value::Null;
     };
-    let progress = match ground.progress() {
-        Progress::Held { .. } => "held",
-        Progress::Adopted { .. } => "adopted",
-        Progress::Refused { .. } => "refused",
-        Progress::Flown { .. } => "flown",
-        Progress::Outdated { .. } => "outdated",
-        _ => "offering",
-    };
-    let flown_by = match ground.progress() {
-        Progress::Adopted { .. } => 1,
-        Progress::Flown { relays, .. } => relays,
-        _ => 0,
+    let (progress, flown_by) = match ground.progress() {
+        Progress::Held { .. } => ("held", 0),
+        Progress::Adopted { .. } => ("adopted", 1),
+        Progress::Refused { .. } => ("refused", 0),
+        Progress::Flown { relays, .. } => ("flown", relays),
+        Progress::Outdated { .. } => ("outdated", 0),
+        _ => ("offering", 0),
     };
     json!({ "version": upload.version(), "progress": progress, "flown_by": flown_by, "relays": upload.config().relays })
 }
