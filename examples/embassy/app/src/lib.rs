@@ -127,9 +127,14 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
         AsyncLink::new(up_rx, up_tx, BAUD),
         AsyncLink::new(down_rx, down_tx, BAUD),
     );
-    fly_over(room, board, Wiring::Pair, autopilot, feed, async |relay, store| {
-        ports.run(relay, &EmbassyClock, store).await
-    })
+    fly_over(
+        room,
+        board,
+        Wiring::Pair,
+        autopilot,
+        feed,
+        async |relay, store| ports.run(relay, &EmbassyClock, store).await,
+    )
     .await
 }
 
@@ -146,9 +151,14 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     feed: &mut dyn FnMut(),
 ) -> Result<Infallible, Refused> {
     let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
-    fly_over(room, board, Wiring::Shared, autopilot, feed, async |relay, store| {
-        ports.run(relay, &EmbassyClock, store).await
-    })
+    fly_over(
+        room,
+        board,
+        Wiring::Shared,
+        autopilot,
+        feed,
+        async |relay, store| ports.run(relay, &EmbassyClock, store).await,
+    )
     .await
 }
 

@@ -14,9 +14,9 @@
 
 use defmt_rtt as _;
 use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::interrupt::typelevel::Binding;
 use embassy_rp::peripherals::{FLASH, TRNG, UART0, UART1, WATCHDOG};
 use embassy_rp::trng::Trng;
-use embassy_rp::interrupt::typelevel::Binding;
 use embassy_rp::uart::{
     BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, Instance,
     RxPin, TxPin,

@@ -6,8 +6,8 @@ use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use relay_app::drone::Room;
 use relay_app::{BURST, Buffers};
-use relay_stm32f405::{Irqs, PLAN, board};
 use relay_stm32::{feed, init, port};
+use relay_stm32f405::{Irqs, PLAN, board};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
