@@ -109,8 +109,9 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until `wake`, a signal, a status request, or one of `ttys` or `others` is ready; without `wake` for ever. Returns the
-    /// events of each of `others`, and true after SIGINT or SIGTERM.
+    /// Sleeps until `wake`, a signal, a status request, or one of `ttys` or `others` is ready. Without `wake` it sleeps for ever.
+    ///
+    /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
     ///
     /// A tty is ready when it has bytes, or room after it had none.
     pub fn sleep<'a>(

@@ -1,4 +1,4 @@
-//! Files that survive a power failure: atomic replacement, the epoch, and records that are written in flight.
+//! Files that survive a power failure: the epoch, and records that are written in flight.
 
 use std::fs::{File, remove_file, rename};
 use std::io::{ErrorKind, Read as _, Write as _};

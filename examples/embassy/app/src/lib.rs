@@ -162,7 +162,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     .await
 }
 
-/// Flies the relay of `board` over the ports that `run` serves; `run` stores a changed record before it sends.
+/// Flies the relay of `board` over the ports that `run` serves. It stores a changed record before it sends.
 async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     room: &'static mut Room,
     board: Board<F>,

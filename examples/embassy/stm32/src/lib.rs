@@ -18,7 +18,7 @@ use uav_relay_chip::registers::Chip;
 use uav_relay_chip::reset::Reset;
 use uav_relay_chip::watchdog;
 
-/// Starts the watchdog and the clocks of `plan`; returns the peripherals and the cause of the last reset.
+/// Starts the watchdog and the clocks of `plan`. Returns the peripherals and the cause of the last reset.
 ///
 /// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
 /// between, the watchdog restarts the chip.
