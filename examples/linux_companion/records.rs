@@ -1,4 +1,4 @@
-//! Records that survive a restart in flight: the relay's votes on views, and the newest uploaded mission.
+//! Records that survive a restart in flight: the relay's votes on views, and its newest upload.
 //!
 //! A vote is on the disk before it is sent, because a relay that forgets a promise could split the chain into two views. While a
 //! separate thread writes it nothing is sent; everything else continues. Remove the file before another flight.

@@ -1,5 +1,7 @@
-//! Board with a serial port to each neighbour: toward the transmitter that of `firmware/pins.rs`, toward the receiver USART3, with TX
-//! at PB10 and RX at PB11.
+//! Board with a serial port to each neighbour.
+//!
+//! The port toward the transmitter is that of `firmware/pins.rs`; the one toward the receiver is USART3, with TX at PB10 and RX at
+//! PB11.
 
 use core::cell::RefCell;
 
