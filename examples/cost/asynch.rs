@@ -8,10 +8,9 @@ use core::task::{Context, Poll, Waker};
 
 use cortex_m_semihosting::hprintln;
 use embedded_io_async::{ErrorType, Read, Write};
-use uav_relay::MAX_FRAME;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort};
-use uav_relay::{Instant, Mission, Phase, Relay, Settings};
+use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Relay, Settings};
 
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;

@@ -2,15 +2,8 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::Instant;
-use uav_relay::MAX_FRAME;
-use uav_relay::Mission;
-use uav_relay::Phase;
-use uav_relay::Port;
-use uav_relay::Relay;
-use uav_relay::Settings;
 use uav_relay::wire::message::MAX_BODY;
-use uav_relay::{Auth, Key};
+use uav_relay::{Auth, Instant, Key, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;

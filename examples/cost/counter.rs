@@ -3,12 +3,7 @@
 use core::hint::black_box;
 use cortex_m::peripheral::SYST;
 use cortex_m_semihosting::debug;
-use uav_relay::Identity;
-use uav_relay::Instant;
-use uav_relay::MAX_FRAME;
-use uav_relay::Mission;
-use uav_relay::Relay;
-use uav_relay::Settings;
+use uav_relay::{Identity, Instant, MAX_FRAME, Mission, Relay, Settings};
 
 pub(crate) const TOP: u32 = 0x00FF_FFFF;
 

@@ -1,15 +1,7 @@
 //! Cost of every call while three relays fly each method.
 
 use cortex_m_semihosting::hprintln;
-use uav_relay::Adjust;
-use uav_relay::Instant;
-use uav_relay::MAX_FRAME;
-use uav_relay::Method;
-use uav_relay::Mission;
-use uav_relay::Phase;
-use uav_relay::Port;
-use uav_relay::Relay;
-use uav_relay::Settings;
+use uav_relay::{Adjust, Instant, MAX_FRAME, Method, Mission, Phase, Port, Relay, Settings};
 
 use super::counter::{instructions, relay};
 use super::missions::{HIGH, UNEVEN};

@@ -1,15 +1,10 @@
 //! Missions of the measured chains.
 
-use uav_relay::Band;
-use uav_relay::Field;
-use uav_relay::FieldPoint;
-use uav_relay::Interference;
-use uav_relay::Interferer;
-use uav_relay::Mission;
-use uav_relay::MissionConfig;
-use uav_relay::Profile;
 use uav_relay::channel::AirGround;
 use uav_relay::channel::Channel;
+use uav_relay::{
+    Band, Field, FieldPoint, Interference, Interferer, Mission, MissionConfig, Profile,
+};
 
 /// 2 GHz, excess losses of 0.1 dB and 21 dB as factors.
 pub(crate) const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {

@@ -2,12 +2,11 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::Local;
-use uav_relay::Placement;
 use uav_relay::field::estimate::Estimator;
 use uav_relay::optimiser::local::HopEnd;
 use uav_relay::optimiser::local::Hops;
 use uav_relay::optimiser::local::LocalSearch;
+use uav_relay::{Local, Placement};
 
 use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};

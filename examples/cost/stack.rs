@@ -2,13 +2,7 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::Instant;
-use uav_relay::MAX_FRAME;
-use uav_relay::Mission;
-use uav_relay::Phase;
-use uav_relay::Port;
-use uav_relay::Relay;
-use uav_relay::Settings;
+use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 
 use super::counter::relay;
 use super::missions::mission;

@@ -2,17 +2,11 @@
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
-use uav_relay::Instant;
-use uav_relay::MAX_FRAME;
-use uav_relay::Mission;
-use uav_relay::MissionConfig;
-use uav_relay::Phase;
-use uav_relay::Port;
-use uav_relay::Settings;
 use uav_relay::optimiser::spacing::Hop;
 use uav_relay::sir::Sender;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;
+use uav_relay::{Instant, MAX_FRAME, Mission, MissionConfig, Phase, Port, Settings};
 
 use super::counter::{instructions, relay, sends};
 use super::missions::{INTERFERER, MISSION, mission};

@@ -1,16 +1,7 @@
 //! Cost of accepting a new mission.
 
 use cortex_m_semihosting::hprintln;
-use uav_relay::Auth;
-use uav_relay::Ground;
-use uav_relay::Instant;
-use uav_relay::MAX_FRAME;
-use uav_relay::Mission;
-use uav_relay::Port;
-use uav_relay::Settings;
-use uav_relay::Side;
-use uav_relay::Upload;
-use uav_relay::Wiring;
+use uav_relay::{Auth, Ground, Instant, MAX_FRAME, Mission, Port, Settings, Side, Upload, Wiring};
 
 use super::auth::KEY;
 use super::counter::{instructions, relay, sends};

@@ -53,33 +53,36 @@ pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Parses a whole number within `least` to `most`.
-///
-/// # Errors
-/// A message with the allowed range.
-pub fn whole<T: TryFrom<u64>>(text: &str, least: u64, most: u64) -> Result<T, String> {
-    let value: Option<u64> = text.trim().parse().ok();
-    value
-        .filter(|value| (least..=most).contains(value))
-        .and_then(|value| T::try_from(value).ok())
-        .ok_or_else(|| format!("must be a whole number within {least} to {most}"))
+/// Parser of an option's value, as clap takes it.
+pub trait Parse<T>: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {}
+
+impl<T, F: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static> Parse<T> for F {}
+
+/// Returns the parser of a whole number within `least` to `most`. Its error is a message with the range.
+pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Parse<T> {
+    move |text: &str| {
+        let value: Option<u64> = text.trim().parse().ok();
+        value
+            .filter(|value| (least..=most).contains(value))
+            .and_then(|value| T::try_from(value).ok())
+            .ok_or_else(|| format!("must be a whole number within {least} to {most}"))
+    }
 }
 
-/// Parses a number within `least` to `most`.
-///
-/// # Errors
-/// A message with the allowed range.
-pub fn number(text: &str, least: f32, most: f32) -> Result<f32, String> {
-    let value = text.trim().parse().ok();
-    value
-        .filter(|value| (least..=most).contains(value))
-        .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
+/// Returns the parser of a number within a range. Its error is a message with the range.
+pub fn number([least, most]: [f32; 2]) -> impl Parse<f32> {
+    move |text: &str| {
+        let value = text.trim().parse().ok();
+        value
+            .filter(|value| (least..=most).contains(value))
+            .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
+    }
 }
 
 /// Parses a number that is one of several in an option's value; errors begin with its `name`.
 ///
 /// # Errors
 /// A message with the name and the allowed range.
-pub fn named(name: &str, text: &str, least: f32, most: f32) -> Result<f32, String> {
-    number(text, least, most).map_err(|error| format!("{name} {error}"))
+pub fn named(name: &str, text: &str, range: [f32; 2]) -> Result<f32, String> {
+    number(range)(text).map_err(|error| format!("{name} {error}"))
 }

@@ -1,7 +1,7 @@
-//! Frame counters as JSON.
+//! Frame counters as JSON, and the reasons of rejected frames in words. Each reason is reported once.
 
 use serde_json::{Value, json};
-use uav_relay::Stats;
+use uav_relay::{Duration, Instant, Stats};
 
 /// Returns every counter of `stats`.
 #[must_use]
@@ -32,4 +32,73 @@ pub fn counted(stats: &Stats) -> Value {
         "stale": stats.stale,
         "samples_rejected": stats.samples_rejected,
     })
+}
+
+/// Interval between two checks of the counters.
+const EVERY: Duration = Duration::from_millis(2_000);
+
+/// Rejected frames between two checks before a reason is reported.
+const MANY: u32 = 3;
+
+/// Damaged frames between two checks, with no intact one, before a wrong baud rate is suspected.
+const DAMAGED: u32 = 10;
+
+/// Counters at the last check, and reasons already reported.
+#[derive(Debug, Default)]
+pub struct Refusals {
+    last: Stats,
+    look_at: Instant,
+    told: [bool; 5],
+}
+
+impl Refusals {
+    /// Returns a reason that was not reported before, if there is one.
+    pub fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
+        if now < self.look_at {
+            return None;
+        }
+        self.look_at = now + EVERY;
+        let last = core::mem::replace(&mut self.last, *stats);
+        let more = |of: fn(&Stats) -> u32| of(stats).saturating_sub(of(&last));
+        let whole = more(|stats| stats.received) + more(|stats| stats.handshakes);
+        let damaged =
+            more(|stats| stats.crc) + more(|stats| stats.truncated) + more(|stats| stats.oversized);
+        let (foreign, forged) = (more(|stats| stats.foreign), more(|stats| stats.forged));
+        let (unsigned, version) = (more(|stats| stats.unsigned), more(|stats| stats.version));
+        let reasons = [
+            (
+                foreign >= MANY,
+                foreign,
+                "are of another network number: is --network the same at all relays?",
+            ),
+            (
+                forged >= MANY && more(|stats| stats.handshakes) == 0,
+                forged,
+                "have a wrong tag: is the key in --key-file the same at all relays?",
+            ),
+            (
+                signs && unsigned >= MANY,
+                unsigned,
+                "are not signed: does the sender have a --key-file?",
+            ),
+            (
+                version >= MANY,
+                version,
+                if signs {
+                    "are of another version of the format: do all relays run the same software version?"
+                } else {
+                    "are signed, and this relay has no --key-file; or they are of another version of the format"
+                },
+            ),
+            (
+                whole == 0 && damaged >= DAMAGED,
+                damaged,
+                "are damaged: is --baud the same at both ends?",
+            ),
+        ];
+        let new = |((is, count, why), told): ((bool, u32, &str), &mut bool)| {
+            (is && !core::mem::replace(told, true)).then(|| format!("{count} frames {why}"))
+        };
+        reasons.into_iter().zip(&mut self.told).find_map(new)
+    }
 }

@@ -9,33 +9,26 @@
 //! | [`replug`] | tty that is reopened when it disappears; counts and captures its bytes |
 //! | [`tap`] | capture of the ports' traffic |
 //! | [`lines`] | lines from a FIFO, for any sequence of writers |
-//! | [`sleep`] | sleeps until a port or another file descriptor is ready |
-//! | [`service`] | clock, log, signals, status socket and systemd |
+//! | [`service`] | clock, sleep, log, signals, status socket and systemd |
 //! | [`log`] | log lines, written without blocking the program |
-//! | [`requests`], [`system`] | SIGHUP and SIGUSR1; SIGINT, SIGTERM and the clock |
-//! | [`socket`], [`counters`] | status socket; frame counters as JSON |
-//! | [`refusals`] | reasons of rejected frames, in words |
+//! | [`socket`] | status socket |
+//! | [`counters`] | frame counters as JSON; reasons of rejected frames, in words |
 //! | [`notify`] | systemd notifications |
-//! | [`epoch`], [`atomic_file`] | epoch file; atomic file replacement |
+//! | [`stored`] | epoch file, and records written in flight |
 #![cfg(unix)]
 #![forbid(unsafe_code)]
 
-pub mod atomic_file;
 pub mod command;
 pub mod config;
 pub mod counters;
-pub mod epoch;
 pub mod lines;
 pub mod log;
 pub mod mission;
 pub mod notify;
-pub mod refusals;
 pub mod replug;
-pub mod requests;
 pub mod service;
 pub mod site;
-pub mod sleep;
 pub mod socket;
-pub mod system;
+pub mod stored;
 pub mod tap;
 pub mod tty;

@@ -6,7 +6,10 @@ use std::path::Path;
 
 use rustix::fs::{FileType, Mode, OFlags, fstat, open};
 use rustix::io::{Errno, read};
+use uav_relay::Instant;
 use uav_relay_scenario::number::{narrow, watts};
+
+use crate::log::Log;
 
 /// Longest accepted line, bytes.
 pub const LONGEST: usize = 200;
@@ -29,6 +32,35 @@ pub fn power_w(words: &[&str]) -> Option<f32> {
     };
     let power_w = narrow(power_w);
     (1e-30..=1e6).contains(&power_w).then_some(power_w)
+}
+
+/// Splits a line into words; `None` for one that is too long or no UTF-8.
+#[must_use]
+pub fn words(line: &[u8]) -> Option<Vec<&str>> {
+    let text = std::str::from_utf8(line).ok()?;
+    (text.len() <= LONGEST).then(|| text.split_whitespace().collect())
+}
+
+/// Counter of invalid lines. The first one is logged.
+#[derive(Debug, Default)]
+pub struct InvalidLines(u64);
+
+impl InvalidLines {
+    /// Counts an invalid line; the first one is logged as `event`, with the `expected` content.
+    pub fn refuse(&mut self, now: Instant, log: &Log, event: &str, line: &[u8], expected: &str) {
+        self.0 += 1;
+        if self.0 == 1 {
+            let text = String::from_utf8_lossy(line);
+            let what = format_args!("{text:?} is not {expected}; further ones are only counted");
+            log.tell(now, event, what);
+        }
+    }
+
+    /// Returns the number of invalid lines.
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.0
+    }
 }
 
 const READS: usize = 16;

@@ -74,7 +74,18 @@ impl Log {
     /// # Errors
     /// One line that names the file that can not be opened.
     pub fn open(options: &LogOptions, source: Source) -> Result<Self, String> {
-        let out = Out::open(options.log_file.as_deref())?;
+        let path = options.log_file.clone();
+        let file = match &path {
+            Some(path) => {
+                appended(path).map_err(|error| format!("--log-file {}: {error}", path.display()))?
+            }
+            // Not `Stdout`, because flushing its buffer at exit could block for ever.
+            None => std::io::stdout()
+                .as_fd()
+                .try_clone_to_owned()
+                .map_err(|error| format!("standard output: {error}"))?
+                .into(),
+        };
         let (orders, taken) = sync_channel(QUEUE);
         let shared = Arc::new(Shared::default());
         let format = Arc::new(Format {
@@ -82,7 +93,8 @@ impl Log {
             source,
         });
         let mut writer = Writer {
-            out,
+            file,
+            path,
             torn: false,
             told: 0,
             format: Arc::clone(&format),
@@ -100,7 +112,7 @@ impl Log {
     }
 
     /// Logs an event at `now`: a short name, fields for programs, and a text for people.
-    pub fn say(&self, now: Instant, event: &str, fields: Value, text: fmt::Arguments<'_>) {
+    pub fn say(&self, now: Instant, event: &str, fields: Value, text: impl fmt::Display) {
         let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -108,8 +120,14 @@ impl Log {
     }
 
     /// Logs an event without fields.
-    pub fn tell(&self, now: Instant, event: &str, text: fmt::Arguments<'_>) {
+    pub fn tell(&self, now: Instant, event: &str, text: impl fmt::Display) {
         self.say(now, event, Value::Null, text);
+    }
+
+    /// Logs that frames are signed.
+    pub fn signed(&self, epoch: u32) {
+        let what = format_args!("frames are signed, epoch {epoch}");
+        self.say(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 
     /// Reopens the file before the next line, for log rotation.
@@ -138,37 +156,13 @@ impl Log {
     }
 }
 
-struct Out {
-    file: File,
-    path: Option<PathBuf>,
-}
-
-impl Out {
-    fn open(path: Option<&Path>) -> Result<Self, String> {
-        let file = match path {
-            Some(path) => {
-                appended(path).map_err(|error| format!("--log-file {}: {error}", path.display()))?
-            }
-            // Not `Stdout`, because flushing its buffer at exit could block for ever.
-            None => std::io::stdout()
-                .as_fd()
-                .try_clone_to_owned()
-                .map_err(|error| format!("standard output: {error}"))?
-                .into(),
-        };
-        Ok(Self {
-            file,
-            path: path.map(Path::to_owned),
-        })
-    }
-}
-
 fn appended(path: &Path) -> std::io::Result<File> {
     File::options().append(true).create(true).open(path)
 }
 
 struct Writer {
-    out: Out,
+    file: File,
+    path: Option<PathBuf>,
     /// True if the last line was written only in part.
     torn: bool,
     /// Number of dropped lines reported so far.
@@ -189,10 +183,10 @@ impl Writer {
 
     fn line(&mut self, now: Instant, line: &str) {
         if self.shared.reopen.swap(false, Ordering::Relaxed)
-            && let Some(path) = &self.out.path
+            && let Some(path) = &self.path
             && let Ok(file) = appended(path)
         {
-            self.out.file = file;
+            self.file = file;
             self.torn = false;
         }
         let dropped = self.shared.dropped.load(Ordering::Relaxed);
@@ -216,7 +210,7 @@ impl Writer {
 
     fn put(&mut self, mut bytes: &[u8]) -> bool {
         while !bytes.is_empty() {
-            match self.out.file.write(bytes) {
+            match self.file.write(bytes) {
                 Ok(count @ 1..) => {
                     bytes = bytes.get(count..).unwrap_or_default();
                     self.torn = !bytes.is_empty();

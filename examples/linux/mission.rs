@@ -1,11 +1,32 @@
 //! Options of the mission.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use uav_relay::channel::AirGround;
 use uav_relay::mission::MissionError;
-use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+use uav_relay::{Adjust, Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
 
 use crate::command::{named, number};
+
+/// Range of a distance from transmitter to receiver, m.
+pub const DISTANCE_M: [f32; 2] = [1.0, 1e6];
+
+/// Range of an altitude, m.
+pub const ALTITUDE_M: [f32; 2] = [0.1, 1e4];
+
+/// Range of the left limit of the lateral positions, y in m.
+pub const LEFT_M: [f32; 2] = [-1e5, 0.0];
+
+/// Range of the right limit of the lateral positions, y in m.
+pub const RIGHT_M: [f32; 2] = [0.0, 1e5];
+
+/// Range of a transmit power, W.
+pub const POWER_W: [f32; 2] = [1e-6, 1e6];
+
+/// Range of a noise power, W.
+pub const NOISE_W: [f32; 2] = [0.0, 1.0];
+
+/// Range of a minimum separation, m.
+pub const SEPARATION_M: [f32; 2] = [0.0, 1e5];
 
 const PAPERS: Interference = Interference::Source(Interferer {
     power_w: 80.0,
@@ -13,39 +34,61 @@ const PAPERS: Interference = Interference::Source(Interferer {
     y_m: 400.0,
 });
 
+/// Method of finding positions.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum Method {
+    /// Algorithm 1; in a field Algorithm 4
+    Align,
+    /// Joint optimisation of positions, sides and altitudes
+    #[value(alias = "altitude")]
+    Joint,
+    /// Algorithm 1, then Algorithm 2
+    Adjust,
+}
+
+impl From<Method> for uav_relay::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Align => Self::Align,
+            Method::Joint => Self::Joint,
+            Method::Adjust => Self::Adjust(Adjust::default()),
+        }
+    }
+}
+
 /// Options of a mission, except the number of relays.
 #[derive(Args, Debug)]
 pub struct MissionOptions {
     /// Distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = distance)]
+    #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = number(DISTANCE_M))]
     pub distance: f32,
     /// Altitude of every relay, m, 0.1 to 1e4
-    #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = altitude)]
+    #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = number(ALTITUDE_M))]
     pub altitude: f32,
     /// Range of altitudes to choose from, m, 0.1 to 1e4, including --altitude; default: --altitude alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     pub band: Option<Band>,
     /// Left limit of the places that `joint` chooses, facing the receiver, as y in m, -1e5 to 0
-    #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = left)]
+    #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(LEFT_M))]
     pub lateral_min: f32,
     /// Right limit of these places, as y in m, 0 to 1e5
-    #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = right)]
+    #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     pub lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = power)]
+    #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub tx_power: f32,
     /// Power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = power)]
+    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub uav_power: f32,
     /// Interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to the
     /// right of it. `unknown` for relays that listen; default 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
     pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
-    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = noise)]
+    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
     pub noise: f32,
     /// Minimum distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = separation)]
+    #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
     pub min_separation: f32,
 }
 
@@ -118,62 +161,6 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     })
 }
 
-/// Parses a distance, m, 1 to 1e6.
-///
-/// # Errors
-/// The allowed range.
-pub fn distance(text: &str) -> Result<f32, String> {
-    number(text, 1.0, 1e6)
-}
-
-/// Parses an altitude, m, 0.1 to 1e4.
-///
-/// # Errors
-/// The allowed range.
-pub fn altitude(text: &str) -> Result<f32, String> {
-    number(text, 0.1, 1e4)
-}
-
-/// Parses the left limit, y in m, -1e5 to 0.
-///
-/// # Errors
-/// The allowed range.
-pub fn left(text: &str) -> Result<f32, String> {
-    number(text, -1e5, 0.0)
-}
-
-/// Parses the right limit, y in m, 0 to 1e5.
-///
-/// # Errors
-/// The allowed range.
-pub fn right(text: &str) -> Result<f32, String> {
-    number(text, 0.0, 1e5)
-}
-
-/// Parses a transmit power, W, 1e-6 to 1e6.
-///
-/// # Errors
-/// The allowed range.
-pub fn power(text: &str) -> Result<f32, String> {
-    number(text, 1e-6, 1e6)
-}
-
-/// Parses a noise power, W, 0 to 1.
-///
-/// # Errors
-/// The allowed range.
-pub fn noise(text: &str) -> Result<f32, String> {
-    number(text, 0.0, 1.0)
-}
-
-/// Parses a separation, m, 0 to 1e5.
-///
-/// # Errors
-/// The allowed range.
-pub fn separation(text: &str) -> Result<f32, String> {
-    number(text, 0.0, 1e5)
-}
-
 /// Parses `unknown`, or an interferer's power, W, and position, m.
 ///
 /// # Errors
@@ -194,9 +181,9 @@ pub fn interferer(text: &str) -> Result<Interferer, String> {
         return Err("must be three numbers: P,X,Y".to_owned());
     };
     Ok(Interferer {
-        power_w: named("P", power, 1e-6, 1e9)?,
-        x_m: named("X", x, -1e7, 1e7)?,
-        y_m: named("Y", y, -1e7, 1e7)?,
+        power_w: named("P", power, [1e-6, 1e9])?,
+        x_m: named("X", x, [-1e7, 1e7])?,
+        y_m: named("Y", y, [-1e7, 1e7])?,
     })
 }
 
@@ -209,7 +196,7 @@ pub fn band(text: &str) -> Result<Band, String> {
         .split_once(',')
         .ok_or("must be two numbers: LEAST,MOST")?;
     Ok(Band {
-        least_m: named("LEAST", least, 0.1, 1e4)?,
-        most_m: named("MOST", most, 0.1, 1e4)?,
+        least_m: named("LEAST", least, ALTITUDE_M)?,
+        most_m: named("MOST", most, ALTITUDE_M)?,
     })
 }

@@ -69,13 +69,8 @@ impl Replug {
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
-            let fields = json!({ "option": self.option, "port": self.path.display().to_string() });
-            log.say(
-                now,
-                "port lost",
-                fields,
-                format_args!("{failure}; retried until it is back"),
-            );
+            let what = format_args!("{failure}; retried until it is back");
+            log.say(now, "port lost", self.fields(), what);
             self.tty = None;
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
             self.again_at = now + self.pause;
@@ -94,11 +89,18 @@ impl Replug {
             self.again_at = now + self.pause;
             if let Ok(tty) = Tty::open(self.option, &self.path, self.baud) {
                 self.tty = Some(tty);
-                let fields =
-                    json!({ "option": self.option, "port": self.path.display().to_string() });
-                log.say(now, "port back", fields, format_args!("{self} is back"));
+                log.say(
+                    now,
+                    "port back",
+                    self.fields(),
+                    format_args!("{self} is back"),
+                );
             }
         }
+    }
+
+    fn fields(&self) -> Value {
+        json!({ "option": self.option, "port": self.path.display().to_string() })
     }
 
     /// Returns the time of the next retry.

@@ -1,19 +1,24 @@
-//! Services of a long-running program: clock, log, signals, status socket and systemd.
+//! Services of a long-running program: clock, sleep, log, signals, status socket and systemd.
 
 use std::os::fd::{AsFd as _, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant as Clock};
 
-use rustix::event::PollFlags;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 use serde_json::Value;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
+use signal_hook::iterator::backend::SignalDelivery;
+use signal_hook::iterator::exfiltrator::SignalOnly;
 use uav_relay::Instant;
 
 use crate::log::{Log, LogOptions, Source};
 use crate::notify::Notify;
-use crate::requests::Requests;
+use crate::replug::Replug;
 use crate::socket::StatusSocket;
-use crate::system::{now, on_stop};
 
 /// Maximum time for the last log lines at exit.
 const LAST_LINES: Duration = Duration::from_millis(500);
@@ -28,9 +33,12 @@ pub struct Service {
     pub log: Log,
     clock: Clock,
     socket: Option<StatusSocket>,
-    requests: Requests,
+    signals: SignalDelivery<UnixStream, SignalOnly>,
+    /// True after SIGHUP, a request to reopen the log, until it is handled.
+    hangup: bool,
+    /// True after SIGUSR1, a request to log the status, until it is handled.
+    asks_status: bool,
     notify: Option<Notify>,
-    stop: UnixStream,
 }
 
 impl Service {
@@ -43,22 +51,24 @@ impl Service {
         source: Source,
         status_socket: Option<&Path>,
     ) -> Result<Self, String> {
-        let (stop, requests) = (on_stop()?, Requests::new()?);
+        let signals = signals().map_err(|error| format!("cannot wait for signals: {error}"))?;
         let socket = status_socket.map(StatusSocket::open).transpose()?;
         Ok(Self {
             log: Log::open(log, source)?,
             clock: Clock::now(),
             socket,
-            requests,
+            signals,
+            hangup: false,
+            asks_status: false,
             notify: Notify::open(),
-            stop,
         })
     }
 
     /// Returns the time since the start.
     #[must_use]
     pub fn now(&self) -> Instant {
-        now(self.clock)
+        let micros = self.clock.elapsed().as_micros();
+        Instant::from_micros(u64::try_from(micros).unwrap_or(u64::MAX))
     }
 
     /// Reports to systemd that the program is ready.
@@ -76,56 +86,81 @@ impl Service {
         who: &str,
         mut answer: impl FnMut(&Log, Option<(&str, &str)>) -> Value,
     ) -> Option<Instant> {
-        let Self { log, requests, .. } = self;
-        if requests.take_hangup() {
+        let log = &self.log;
+        if std::mem::take(&mut self.hangup) {
             log.reopen();
             let what = format_args!("the log file was reopened; the {who} continues");
             log.tell(time, "hang-up", what);
         }
-        if requests.take_status() {
+        if std::mem::take(&mut self.asks_status) {
             let status = answer(log, None);
             let text = status.to_string();
-            log.say(time, "status", status, format_args!("{text}"));
+            log.say(time, "status", status, text);
         }
         let socket = self.socket.as_mut();
         let (questions, again) = socket.map(|it| it.questions(time)).unwrap_or_default();
         for question in questions {
-            let said = match &question.command {
-                Some(command) => answer(log, Some((command, &question.user()))),
-                None => answer(log, None),
-            };
+            let user = question.user();
+            let command = question.command.as_deref().map(|it| (it, user.as_str()));
+            let said = answer(log, command);
             question.answer(&said);
         }
         let alive = self.notify.as_mut().and_then(|it| it.tend(time));
         again.into_iter().chain(alive).min()
     }
 
-    /// Returns the file descriptors and events to poll.
-    pub fn interests(&self) -> impl Iterator<Item = (BorrowedFd<'_>, PollFlags)> {
-        let [hangup, status] = self.requests.fds();
-        let socket = self.socket.iter().flat_map(StatusSocket::fds);
-        [self.stop.as_fd(), hangup, status]
-            .into_iter()
-            .chain(socket)
-            .map(|fd| (fd, PollFlags::IN))
-    }
-
-    /// Returns true if SIGINT or SIGTERM arrived, given the poll results of [`interests`](Self::interests).
-    #[must_use]
-    pub fn is_over(found: &[PollFlags]) -> bool {
-        found.first().is_some_and(|stop| !stop.is_empty())
-    }
-
-    /// Returns the time left until `wake`; `None` means for ever.
-    #[must_use]
-    pub fn until(&self, wake: Option<Instant>) -> Option<Duration> {
+    /// Sleeps until `wake`, a signal, a status request, or one of `ttys` or `others` is ready. Without `wake` it sleeps for ever.
+    ///
+    /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
+    ///
+    /// A tty is ready when it has bytes, or room after it had none.
+    pub fn sleep<'a>(
+        &mut self,
+        wake: Option<Instant>,
+        ttys: impl Iterator<Item = &'a mut Replug>,
+        others: &[(BorrowedFd<'_>, PollFlags)],
+    ) -> (Vec<PollFlags>, bool) {
         let time = self.now();
-        wake.map(|at| Duration::from_micros(at.since(time).as_micros()))
+        let span = wake.map(|at| Duration::from_micros(at.since(time).as_micros()));
+        // A span too long for a Timespec means for ever.
+        let timeout = span.and_then(|span| Timespec::try_from(span).ok());
+        let mut ttys: Vec<&mut Replug> = ttys.filter(|tty| tty.is_open()).collect();
+        let on_ttys = ttys.iter().filter_map(|tty| tty.interest());
+        let socket = self.socket.iter().flat_map(StatusSocket::fds);
+        let own = std::iter::once(self.signals.get_read().as_fd()).chain(socket);
+        let own = own.map(|fd| (fd, PollFlags::IN));
+        let mut fds: Vec<PollFd<'_>> = others
+            .iter()
+            .copied()
+            .chain(on_ttys)
+            .chain(own)
+            .map(|(fd, interest)| PollFd::from_borrowed_fd(fd, interest))
+            .collect();
+        let result = poll(&mut fds, timeout.as_ref());
+        let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
+        if !matches!(result, Ok(_) | Err(Errno::INTR)) {
+            // For want of memory, for instance: the program goes on.
+            std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
+            found.fill(PollFlags::empty());
+        }
+        let on_ttys = found.split_off(others.len());
+        for (tty, events) in ttys.iter_mut().zip(on_ttys) {
+            tty.noticed(events);
+        }
+        (found, self.is_over())
     }
 
-    /// Sleeps for at most 10 ms, as a substitute when poll(2) fails, for want of memory for instance.
-    pub fn nap(span: Option<Duration>) {
-        std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
+    /// Reads the signals that have arrived; returns true after SIGINT or SIGTERM.
+    fn is_over(&mut self) -> bool {
+        let mut is_over = false;
+        for signal in self.signals.pending() {
+            match signal {
+                SIGHUP => self.hangup = true,
+                SIGUSR1 => self.asks_status = true,
+                _ => is_over = true,
+            }
+        }
+        is_over
     }
 
     /// Reports to systemd that the program stops on request.
@@ -137,4 +172,12 @@ impl Service {
     pub fn end(&self) {
         self.log.flush(LAST_LINES);
     }
+}
+
+/// Registers the signals. SIGXFSZ becomes a write error, like a full disk, and does not end the program.
+fn signals() -> std::io::Result<SignalDelivery<UnixStream, SignalOnly>> {
+    signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+    let (ours, theirs) = UnixStream::pair()?;
+    let signals = [SIGINT, SIGTERM, SIGHUP, SIGUSR1];
+    SignalDelivery::with_pipe(ours, theirs, SignalOnly, signals)
 }

@@ -56,6 +56,16 @@ impl fmt::Display for Between {
     }
 }
 
+/// Returns a site with latitude and longitude swapped, a frequent mistake.
+#[must_use]
+pub fn swapped(site: Geodetic) -> Geodetic {
+    Geodetic {
+        lat_e7: site.lon_e7,
+        lon_e7: site.lat_e7,
+        ..site
+    }
+}
+
 /// Formats a site in the format of the options.
 pub fn degrees(at: Geodetic) -> String {
     let part = |number: i32, unit: f64| f64::from(number) / unit;

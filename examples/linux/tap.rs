@@ -10,9 +10,11 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde_json::json;
+use uav_relay::Instant;
 use uav_relay_capture::{Capture, Cut, Direction, Frame, Interface};
 
 use crate::log::Log;
+use crate::replug::Replug;
 
 /// Maximum number of pieces waiting to be written.
 const WAITING: usize = 1_024;
@@ -90,58 +92,49 @@ impl Tap {
     }
 }
 
-/// Starts a capture of `program`; returns one tap for each port, and the file that is written.
+/// Captures all further traffic of `ttys`. Logs the name of the written file if it differs from `asked`.
 ///
-/// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if `path` exists, the
+/// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if `asked` exists, the
 /// file is `numbered`.
 ///
 /// # Errors
 /// One line that names the file.
-pub fn taps(program: &str, path: &Path, ports: &[String]) -> Result<(Vec<Tap>, PathBuf), String> {
-    let (file, path) = create(path)?;
+pub fn attach<'a>(
+    log: &Log,
+    program: &str,
+    asked: &Path,
+    ttys: impl Iterator<Item = &'a mut Replug>,
+) -> Result<(), String> {
+    let (file, path) = create(asked)?;
     let wrong = |error: io::Error| format!("--capture {}: {error}", path.display());
-    let out = BufWriter::new(file);
-    let mut capture = Capture::new(out, program, "").map_err(wrong)?;
-    let interfaces: Vec<Interface> = ports
-        .iter()
-        .map(|name| capture.interface(name, "").map_err(wrong))
-        .collect::<Result<_, _>>()?;
-    capture.flush().map_err(wrong)?;
+    let mut capture = Capture::new(BufWriter::new(file), program, "").map_err(wrong)?;
     let (sender, receiver) = sync_channel(WAITING);
     let fate = Arc::new(Fate::default());
-    let ended = Arc::clone(&fate);
+    let mut interfaces = Vec::new();
+    for (port, tty) in ttys.enumerate() {
+        let interface = capture.interface(&tty.to_string(), "").map_err(wrong)?;
+        interfaces.push(interface);
+        tty.tapped(Tap {
+            port,
+            fate: Arc::clone(&fate),
+            sender: sender.clone(),
+            left_out: 0,
+            is_over: false,
+        });
+    }
+    capture.flush().map_err(wrong)?;
     std::thread::spawn(move || {
         // The closed channel informs the taps.
         if let Err(error) = write(&mut capture, &interfaces, &receiver) {
-            _ = ended.fault.set(error.to_string());
+            _ = fate.fault.set(error.to_string());
         }
     });
-    let taps = (0..ports.len()).map(|port| Tap {
-        port,
-        fate: Arc::clone(&fate),
-        sender: sender.clone(),
-        left_out: 0,
-        is_over: false,
-    });
-    Ok((taps.collect(), path))
-}
-
-/// Logs the name of the written file if it differs from the requested one.
-pub fn tell(log: &Log, asked: &Path, written: &Path) {
-    if asked == written {
-        return;
+    if path != asked {
+        let (name, asked) = (path.display().to_string(), asked.display());
+        let what = format_args!("written to {name}, because {asked} holds an earlier capture");
+        log.say(Instant::ZERO, "capture", json!({ "file": name }), what);
     }
-    let name = written.display().to_string();
-    let fields = json!({ "file": name });
-    log.say(
-        uav_relay::Instant::ZERO,
-        "capture",
-        fields,
-        format_args!(
-            "written to {name}, because {} holds an earlier capture",
-            asked.display()
-        ),
-    );
+    Ok(())
 }
 
 /// Creates the file under the first free name; opens a device or a FIFO directly.

@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
-use uav_relay::flight::autopilot::{Address, RelayNumbers, Signing, Stamp};
 use uav_relay::flight::autopilot::{
-    Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, WaitReason,
+    Address, Autopilot, AutopilotEvent, FlightMode, Kind, RelayNumbers, ReleaseCause, Signing,
+    Stamp, WaitReason,
 };
 use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
@@ -125,18 +125,15 @@ impl Companion {
         );
         if self.plan.key.is_some() {
             let what = "frames are signed, and frames that are not signed with its key are ignored";
-            log.tell(Instant::ZERO, EVENT, format_args!("{what}"));
+            log.tell(Instant::ZERO, EVENT, what);
         }
     }
 
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         let refused = self.link.refused();
         if refused > 0 {
-            log.tell(
-                now,
-                EVENT,
-                format_args!("{refused} frames rejected because of their signatures"),
-            );
+            let what = format_args!("{refused} frames rejected because of their signatures");
+            log.tell(now, EVENT, what);
         }
     }
 
@@ -215,7 +212,7 @@ impl Companion {
     }
 
     fn tell_off(&mut self, now: Instant, log: &Log, off: Off) {
-        log.say(now, EVENT, off.fields(), format_args!("{off}"));
+        log.say(now, EVENT, off.fields(), off);
         if let Some(text) = off.for_operator() {
             self.link.say(&text);
         }
@@ -227,8 +224,7 @@ impl Companion {
         if let Some(missing) = self.answers.look(now, heard) {
             self.state = Some(word(State::Silent));
             let fields = json!({ "state": self.state });
-            let text = self.unanswered(missing);
-            log.say(now, EVENT, fields, format_args!("{text}"));
+            log.say(now, EVENT, fields, self.unanswered(missing));
         }
     }
 
@@ -334,18 +330,14 @@ impl Companion {
 }
 
 fn said(now: Instant, log: &Log, event: AutopilotEvent) {
-    match event {
-        AutopilotEvent::Found(kind) => {
-            log.tell(now, EVENT, format_args!("found {}", called(kind)));
+    let text = match event {
+        AutopilotEvent::Found(Kind::Px4) => "found a PX4".to_owned(),
+        AutopilotEvent::Found(Kind::ArduCopter) => "found an ArduCopter".to_owned(),
+        AutopilotEvent::Restarted => "restarted".to_owned(),
+        AutopilotEvent::Refused => {
+            "flies to another target than it was sent; is the setpoint outside its fence?"
+                .to_owned()
         }
-        AutopilotEvent::Restarted => log.tell(now, EVENT, format_args!("restarted")),
-        AutopilotEvent::Refused => log.tell(
-            now,
-            EVENT,
-            format_args!(
-                "flies to another target than it was sent; is the setpoint outside its fence?"
-            ),
-        ),
         AutopilotEvent::State(state) => {
             let what = match state {
                 State::Silent => {
@@ -356,47 +348,27 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
                 State::Engaged => "setpoint control engaged",
                 State::Blind => "no position; keeps the last target",
             };
-            let fields = json!({ "state": word(state) });
-            log.say(now, EVENT, fields, format_args!("{what}"));
+            return log.say(now, EVENT, json!({ "state": word(state) }), what);
         }
         AutopilotEvent::Released(release) => {
             let (cause, mode) = (cause(release.cause), mode(release.mode));
-            log.tell(
-                now,
-                EVENT,
-                format_args!("released: {cause}; the mode is {mode}"),
-            );
+            format!("released: {cause}; the mode is {mode}")
         }
-        AutopilotEvent::Waits(reason) => {
-            log.tell(
-                now,
-                EVENT,
-                format_args!("cannot be engaged: {}", waits(reason)),
-            );
-        }
-        AutopilotEvent::Ready => {
-            log.tell(
-                now,
-                EVENT,
-                format_args!("ready: its pilot may choose OFFBOARD or GUIDED"),
-            );
-        }
+        AutopilotEvent::Waits(reason) => format!("cannot be engaged: {}", waits(reason)),
+        AutopilotEvent::Ready => "ready: its pilot may choose OFFBOARD or GUIDED".to_owned(),
         AutopilotEvent::LostCleared { side, relays, from } => {
             let text = lost::cleared(numbers(relays), side);
-            commanded(now, log, "cleared", &text, relays, from);
+            return commanded(now, log, Ok(text), relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
             let text = "the command has to name all lost relays of one side, and no others";
-            commanded(now, log, "command refused", text, relays, from);
+            return commanded(now, log, Err(text.to_owned()), relays, from);
         }
-        AutopilotEvent::FenceBreached => {
-            log.tell(now, EVENT, format_args!("fence breached"));
-        }
-        AutopilotEvent::Mistrusted(why) => {
-            log.tell(now, EVENT, format_args!("{}", mistrusted(why)));
-        }
-        other => log.tell(now, EVENT, format_args!("{other:?}")),
-    }
+        AutopilotEvent::FenceBreached => "fence breached".to_owned(),
+        AutopilotEvent::Mistrusted(why) => mistrusted(why).to_owned(),
+        other => format!("{other:?}"),
+    };
+    log.tell(now, EVENT, text);
 }
 
 fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
@@ -407,23 +379,15 @@ fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
 fn commanded(
     now: Instant,
     log: &Log,
-    event: &str,
-    text: &str,
+    done: Result<String, String>,
     relays: RelayNumbers,
     from: Address,
 ) {
     let named: Vec<String> = numbers(relays).map(|node| node.to_string()).collect();
     let command = format!("MAV_CMD_USER_1 {}", named.join(" "));
-    let command = command.trim();
     let Address { system, component } = from;
     let by = format!("MAVLink system {system}, component {component}");
-    let fields = json!({ "command": command, "by": by });
-    log.say(
-        now,
-        event,
-        fields,
-        format_args!("{text} (`{command}` by {by})"),
-    );
+    lost::log_command(now, log, done, command.trim(), &by);
 }
 
 const fn cause(cause: ReleaseCause) -> &'static str {
@@ -496,13 +460,6 @@ fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());
     Stamp::of_unix_micros(u64::try_from(micros).unwrap_or(u64::MAX))
-}
-
-const fn called(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Px4 => "a PX4",
-        Kind::ArduCopter => "an ArduCopter",
-    }
 }
 
 fn port(place: &Where) -> Result<Port, String> {

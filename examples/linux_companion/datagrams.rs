@@ -56,37 +56,30 @@ impl Datagrams {
 
     /// Reads one datagram; returns its length, 0 if there is none.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> usize {
-        for _ in 0..ATTEMPTS {
-            match self.socket.recv(into) {
-                // An empty datagram is skipped.
-                Ok(0) => {}
-                Ok(count) => {
-                    self.read += count as u64;
-                    return count;
-                }
-                // The refusal of an earlier datagram hides datagrams received since.
-                Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(_) => return 0,
-            }
-        }
-        0
+        let count = self.call(|socket| socket.recv(into));
+        self.read += count as u64;
+        count
     }
 
     /// Sends a frame. A frame that does not fit is dropped, because the next one is newer.
     pub(crate) fn send(&mut self, frame: &[u8]) {
+        let count = self.call(|socket| socket.send(frame));
+        self.written += count as u64;
+    }
+
+    fn call(&mut self, mut call: impl FnMut(&UdpSocket) -> std::io::Result<usize>) -> usize {
         for _ in 0..ATTEMPTS {
-            match self.socket.send(frame) {
-                Ok(count) => {
-                    self.written += count as u64;
-                    return;
-                }
-                // The refusal of an earlier datagram: this one has not been sent yet.
+            match call(&self.socket) {
+                // An empty datagram is skipped.
+                Ok(0) => {}
+                Ok(count) => return count,
+                // The refusal of an earlier datagram hides datagrams received since, and this one has not been sent yet.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(_) => return,
+                Err(_) => break,
             }
         }
+        0
     }
 
     pub(crate) const fn bytes_in(&self) -> u64 {

@@ -56,7 +56,7 @@ impl HoldReasonLog {
                 Some(reason) => format!("holds its position: {}", said(reason, &whom)),
                 None => format!("no longer waits for {whom}"),
             };
-            log.say(now, "waits", fields, format_args!("{text}"));
+            log.say(now, "waits", fields, text);
         }
         self.logged = reasons;
         None

@@ -56,21 +56,7 @@ impl Lost {
         user: &str,
     ) -> Value {
         let done = self.clear(now, relay, command);
-        let is_done = done.is_ok();
-        let (Ok(text) | Err(text)) = done;
-        let event = if is_done {
-            "cleared"
-        } else {
-            "command refused"
-        };
-        let fields = json!({ "command": command, "by": user });
-        log.say(
-            now,
-            event,
-            fields,
-            format_args!("{text} (`{command}` by {user})"),
-        );
-        json!({ "done": is_done, "text": text })
+        log_command(now, log, done, command, user)
     }
 
     fn clear(&mut self, now: Instant, relay: &mut Relay, command: &str) -> Result<String, String> {
@@ -131,6 +117,25 @@ impl Lost {
         }
         Ok(number)
     }
+}
+
+/// Logs a command of an operator, and its result; returns the answer for the socket.
+pub(crate) fn log_command(
+    now: Instant,
+    log: &Log,
+    done: Result<String, String>,
+    command: &str,
+    by: &str,
+) -> Value {
+    let (event, is_done) = match done {
+        Ok(_) => ("cleared", true),
+        Err(_) => ("command refused", false),
+    };
+    let (Ok(text) | Err(text)) = done;
+    let fields = json!({ "command": command, "by": by });
+    let line = format_args!("{text} (`{command}` by {by})");
+    log.say(now, event, fields, line);
+    json!({ "done": is_done, "text": text })
 }
 
 /// Returns the log line for cleared relays of one side.

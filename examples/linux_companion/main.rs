@@ -26,8 +26,6 @@
 //! | file | content |
 //! | --- | --- |
 //! | `options.rs` | command line, checked |
-//! | `section.rs` | `[companion]` section of the file, as options |
-//! | `listen.rs` | options of sensing |
 //! | `ports.rs` | ttys of either wiring |
 //! | `autopilot.rs` | link to the autopilot |
 //! | `datagrams.rs` | UDP port of the autopilot |
@@ -38,11 +36,9 @@
 //! | `report.rs` | log lines |
 //! | `movement.rs` | log lines for setpoints and the arrival |
 //! | `status.rs` | state of the relay as JSON |
-//! | `uploads.rs` | file of the newest uploaded mission |
-//! | `views.rs` | file of the relay's votes on views |
+//! | `records.rs` | files of the newest uploaded mission, and of the relay's votes on views |
 //! | `hold_reasons.rs` | log lines for the reasons of a hold |
 //! | `lost.rs` | lost relays, and the operator's command to clear them |
-//! | `stored.rs` | file written in flight by a separate thread |
 //!
 //! It shares a library with the ground station, `examples/linux`. It runs on other kinds of Unix, too; on a Mac the ttys are
 //! called `/dev/cu.*`.
@@ -53,10 +49,7 @@ mod autopilot;
 #[cfg(unix)]
 mod datagrams;
 #[cfg(unix)]
-#[cfg(unix)]
 mod hold_reasons;
-#[cfg(unix)]
-mod listen;
 #[cfg(unix)]
 mod lost;
 #[cfg(unix)]
@@ -70,21 +63,15 @@ mod ports;
 #[cfg(unix)]
 mod positions;
 #[cfg(unix)]
+mod records;
+#[cfg(unix)]
 mod relay;
 #[cfg(unix)]
 mod report;
 #[cfg(unix)]
-mod section;
-#[cfg(unix)]
 mod status;
 #[cfg(unix)]
-mod stored;
-#[cfg(unix)]
 mod unanswered;
-#[cfg(unix)]
-mod uploads;
-#[cfg(unix)]
-mod views;
 
 #[cfg(unix)]
 fn main() -> std::process::ExitCode {

@@ -10,7 +10,8 @@ use std::fmt;
 use serde_json::{Value, json};
 use uav_relay::flight::autopilot::OffLine;
 use uav_relay::flight::axis::Axis;
-use uav_relay::{Band, Duration, Geodetic, Instant, Placement, Sites};
+use uav_relay::{Band, Duration, Instant, Placement, Sites};
+use uav_relay_linux::site::swapped;
 
 const AGAIN: Duration = Duration::from_millis(10_000);
 
@@ -126,15 +127,10 @@ struct Lines {
 
 impl Lines {
     fn between(sites: Sites) -> Option<Self> {
-        let turned = |site: Geodetic| Geodetic {
-            lat_e7: site.lon_e7,
-            lon_e7: site.lat_e7,
-            ..site
-        };
         Some(Self {
             sites,
             is: Axis::between(sites).ok()?,
-            swapped: Axis::try_new(turned(sites.tx), turned(sites.rx)).ok(),
+            swapped: Axis::try_new(swapped(sites.tx), swapped(sites.rx)).ok(),
         })
     }
 

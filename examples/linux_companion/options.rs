@@ -3,25 +3,22 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
-use uav_relay::GuardConfig;
+use clap::{Args, Parser, ValueEnum as _};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::{
-    Adjust, ChannelLoad, Duration, Field, FieldPoint, Identity, Interference, Mission, Settings,
-    Wiring,
+    ChannelLoad, Duration, Field, FieldPoint, GuardConfig, Identity, Interference, Listen, Mission,
+    Settings, Wiring,
 };
-use uav_relay_scenario::deployment::NETWORK;
-
-use crate::autopilot::{AutopilotPlan, SigningKey, Where};
-use crate::listen::ListenOptions;
-use crate::section;
-use uav_relay_linux::command::{self, named};
-use uav_relay_linux::config::{Beyond, Override};
-use uav_relay_linux::log::LogOptions;
-use uav_relay_linux::mission::{self, MissionOptions};
-use uav_relay_linux::site::SiteOptions;
+use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::endpoint::{Endpoint, FORM};
 use uav_relay_scenario::key;
+
+use crate::autopilot::{AutopilotPlan, SigningKey, Where};
+use uav_relay_linux::command::{self, named, number, whole};
+use uav_relay_linux::config::{self, Beyond, Given, Override};
+use uav_relay_linux::log::LogOptions;
+use uav_relay_linux::mission::{self, Method, MissionOptions};
+use uav_relay_linux::site::SiteOptions;
 
 /// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
 const LATENCY: Duration = Duration::from_millis(40);
@@ -29,54 +26,54 @@ const LATENCY: Duration = Duration::from_millis(40);
 /// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
 #[derive(Parser, Debug)]
 #[command(name = "linux_companion", version)]
-struct Options {
+pub(crate) struct Options {
     /// TOML file with the scenario, and the sections `network` and `companion`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Number of this relay; 1 is next to the transmitter
-    #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
+    #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     index: u16,
     /// Number of relays, 1 to 1000
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     of: u16,
     /// Tty toward the transmitter; relay 1 needs it only for uploads from there
     #[arg(long, value_name = "TTY")]
-    upstream: Option<PathBuf>,
+    pub(crate) upstream: Option<PathBuf>,
     /// Tty toward the receiver; relay N needs it only for uploads from there
     #[arg(long, value_name = "TTY")]
-    downstream: Option<PathBuf>,
+    pub(crate) downstream: Option<PathBuf>,
     /// Tty of one radio channel shared by all relays, instead of the other two
     #[arg(long, value_name = "TTY")]
-    shared: Option<PathBuf>,
+    pub(crate) shared: Option<PathBuf>,
     /// Bit rate of every tty, bit/s, 1200 to 4000000
-    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
-    baud: u32,
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
+    pub(crate) baud: u32,
     /// Network number; frames of other networks are ignored
-    #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
+    #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = whole::<u16>(0, 65_535))]
     network: u16,
     /// File with the network's key, 64 hexadecimal digits. Frames are signed, and unsigned ones are rejected
     #[arg(long, value_name = "FILE", requires = "epoch_file")]
     key_file: Option<PathBuf>,
     /// File with the epoch, a number increased at every start; created if missing; it must never go back
     #[arg(long, value_name = "FILE", requires = "key_file")]
-    epoch_file: Option<PathBuf>,
+    pub(crate) epoch_file: Option<PathBuf>,
     /// File for the newest mission uploaded in flight; without it an uploaded mission is lost at a restart
     #[arg(long, value_name = "FILE", requires = "key_file")]
-    upload_file: Option<PathBuf>,
+    pub(crate) upload_file: Option<PathBuf>,
     /// File for this relay's votes on the membership of the chain, created if missing. Needed for a restart in flight. Remove it
     /// before another flight
     #[arg(long, value_name = "FILE")]
-    view_file: Option<PathBuf>,
+    pub(crate) view_file: Option<PathBuf>,
     /// Milliseconds of silence before a neighbour is probed
-    #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
+    #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     probe_after_ms: u64,
     /// Milliseconds of silence before a neighbour counts as lost, more than --probe-after-ms
-    #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 3_600_000))]
+    #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep drones apart.
     /// With --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
-    positions: Option<PathBuf>,
+    pub(crate) positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
     /// sends positions. LOCAL is the local port, the same at every start: 14540 to 14549 for PORT 14580 to 14589, as in PX4's
     /// simulation, and else PORT + 1000
@@ -88,19 +85,19 @@ struct Options {
     )]
     autopilot: Option<String>,
     /// Bit rate of its tty, bit/s, 1200 to 4000000
-    #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
+    #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
     autopilot_baud: u32,
     /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits. Frames to it are signed, and unsigned ones from it are
     /// rejected
     #[arg(long, value_name = "FILE", requires = "autopilot")]
     autopilot_key_file: Option<PathBuf>,
     /// Maximum speed of the drone, m/s, 0.1 to 20
-    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.1, 20.0))]
+    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
     speed: f32,
     #[command(flatten)]
     sites: SiteOptions,
     /// Maximum position error of a hovering drone, m, 0 to 1000. Drones may come closer to each other by as much
-    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| command::number(text, 0.0, 1_000.0))]
+    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number([0.0, 1_000.0]))]
     position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
@@ -116,73 +113,102 @@ struct Options {
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The command `clear-lost N`
     /// reports that the lost relay N has landed, so that this relay need not keep clear of it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
-    status_socket: Option<PathBuf>,
+    pub(crate) status_socket: Option<PathBuf>,
     /// Write every frame of the neighbour ports to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2,
     /// FILE-3 and so on is written instead. It grows throughout the flight
     #[arg(long, value_name = "FILE", help_heading = "Log")]
-    capture: Option<PathBuf>,
+    pub(crate) capture: Option<PathBuf>,
     #[command(flatten)]
-    log: LogOptions,
+    pub(crate) log: LogOptions,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-enum Method {
-    /// Algorithm 1; in a field Algorithm 4
-    Align,
-    /// Joint optimisation of positions, sides and altitudes
-    #[value(alias = "altitude")]
-    Joint,
-    /// Algorithm 1, then Algorithm 2
-    Adjust,
+/// Options of sensing: how the chain locates its interferer.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Listening")]
+struct ListenOptions {
+    /// Locate the interferer from measurements of the relays. RADIO_STATUS of a SiK radio on the link of --autopilot, or lines with
+    /// a power in the FIFO of --positions. --interferer is then an initial guess, or `unknown`. Give it to all relays or to none
+    #[arg(long, conflicts_with = "field")]
+    listen: bool,
+    /// Track a moving interferer: estimate its velocity, too, and forget measurements sooner
+    #[arg(long, requires = "listen")]
+    following: bool,
+    /// Time from an agreement to the next collection of measurements by the first relay, s, 0.01 to 1e5. Default 5, with
+    /// --following 1
+    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e5]))]
+    listen_every: Option<f32>,
+    /// Half-life of the weight of a measurement, s, 0.01 to 1e12. Default 60, with --following 16 over the number of relays
+    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e12]))]
+    listen_half_life: Option<f32>,
+    /// Relative error of one measurement, 0.001 to 1; default 0.03, for a SiK radio rather 0.1
+    #[arg(long, value_name = "E", requires = "listen", allow_negative_numbers = true, value_parser = number([1e-3, 1.0]))]
+    listen_error: Option<f32>,
 }
 
-/// Ttys of either wiring; `None` at an end of the chain.
-#[derive(Debug)]
-pub(crate) enum Ttys {
-    Pair {
-        upstream: Option<PathBuf>,
-        downstream: Option<PathBuf>,
-    },
-    Shared(PathBuf),
+impl ListenOptions {
+    /// Returns the sensing settings for `relays` relays; `None` if they do not listen.
+    fn listen(&self, relays: u16) -> Option<Listen> {
+        let default = if self.following {
+            Listen::following(relays)
+        } else {
+            Listen::default()
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "1e4 to 1e18"
+        )]
+        let micros = |seconds: f32| Duration::from_micros((f64::from(seconds) * 1e6) as u64);
+        self.listen.then(|| Listen {
+            every: self.listen_every.map_or(default.every, micros),
+            half_life: self.listen_half_life.map_or(default.half_life, micros),
+            relative_error: self.listen_error.unwrap_or(default.relative_error),
+        })
+    }
 }
 
 #[derive(Debug)]
 pub(crate) struct Plan {
+    pub(crate) options: Options,
     pub(crate) mission: Mission,
     pub(crate) identity: Identity,
     pub(crate) settings: Settings,
-    pub(crate) secret: Option<Secret>,
-    pub(crate) view_file: Option<PathBuf>,
-    pub(crate) ttys: Ttys,
-    pub(crate) baud: u32,
-    pub(crate) positions: Option<PathBuf>,
+    pub(crate) key: Option<SigningKey>,
     pub(crate) autopilot: Option<AutopilotPlan>,
-    pub(crate) status_socket: Option<PathBuf>,
-    pub(crate) capture: Option<PathBuf>,
-    pub(crate) log: LogOptions,
     pub(crate) overrides: Vec<Override>,
-}
-
-pub(crate) struct Secret {
-    pub(crate) key: [u8; 32],
-    pub(crate) epoch_file: PathBuf,
-    pub(crate) upload_file: Option<PathBuf>,
-}
-
-impl std::fmt::Debug for Secret {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Secret(..)")
-    }
 }
 
 /// Reads the command line; otherwise returns the exit status after help or a mistake has been printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
-    let (options, beyond) = command::read(section::companion)?;
-    plan(&options, &beyond).map_err(|line| command::refuse(&line))
+    let (options, beyond) = command::read(section)?;
+    plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
-fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
-    let Options { index, of, .. } = *options;
+/// Adds the `[network]` and `[companion]` sections of the file.
+fn section(deployment: &Deployment, given: &mut Given) {
+    config::network(deployment, given);
+    let own = &deployment.companion;
+    given.value("--index", own.index);
+    given.path("--upstream", own.upstream.as_ref());
+    given.path("--downstream", own.downstream.as_ref());
+    given.path("--shared", own.shared.as_ref());
+    given.path("--epoch-file", own.epoch_file.as_ref());
+    given.path("--upload-file", own.upload_file.as_ref());
+    given.path("--view-file", own.view_file.as_ref());
+    given.path_or_udp("--autopilot", own.autopilot.as_ref());
+    given.value("--autopilot-baud", own.autopilot_baud);
+    given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
+    given.value("--speed", own.speed_m_s);
+    given.path("--positions", own.positions.as_ref());
+    given.value("--position-error", own.position_error_m);
+    given.flag("--json", own.json);
+    given.path("--log-file", own.log_file.as_ref());
+    given.path("--status-socket", own.status_socket.as_ref());
+    given.path("--capture", own.capture.as_ref());
+}
+
+fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
+    let Options { index, of, .. } = options;
     if index > of {
         return Err(format!(
             "--index {index}: must be within 1 to {of}, the number given by --of"
@@ -195,16 +221,12 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
             options.probe_after_ms + 1
         ));
     }
-    let ttys = ttys(options)?;
-    let wiring = match ttys {
-        Ttys::Pair { .. } => Wiring::Pair,
-        Ttys::Shared(_) => Wiring::Shared,
-    };
+    let wiring = wiring(&options)?;
     let load = match wiring {
         Wiring::Pair => ChannelLoad::of_radios(1),
-        Wiring::Shared => carried(options)?,
+        Wiring::Shared => carried(&options)?,
     };
-    let mission = mission(options, beyond)?;
+    let mission = mission(&options, &beyond)?;
     let mut profiles = beyond.profiles.iter();
     let own = profiles.find(|(of, _)| *of == index);
     let profile = own.map_or(mission.config().common, |(_, profile)| *profile);
@@ -218,11 +240,7 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
     };
     let settings = Settings {
         guard: (options.positions.is_some() || options.autopilot.is_some()).then_some(guard),
-        method: match options.method {
-            Method::Align => uav_relay::Method::Align,
-            Method::Joint => uav_relay::Method::Joint,
-            Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
-        },
+        method: options.method.into(),
         listen: options.listen.listen(options.of),
         wiring,
         sited: options.autopilot.is_some(),
@@ -232,6 +250,8 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
         dead_after: Duration::from_millis(options.dead_after_ms),
         ..Settings::default()
     };
+    let key = options.key_file.as_deref();
+    let key = key.map(|file| key::load("--key-file", file));
     Ok(Plan {
         mission,
         identity: Identity {
@@ -239,16 +259,10 @@ fn plan(options: &Options, beyond: &Beyond) -> Result<Plan, String> {
             index,
         },
         settings,
-        secret: secret(options)?,
-        view_file: options.view_file.clone(),
-        ttys,
-        baud: options.baud,
-        positions: options.positions.clone(),
-        autopilot: autopilot(options)?,
-        status_socket: options.status_socket.clone(),
-        capture: options.capture.clone(),
-        log: options.log.clone(),
-        overrides: beyond.overrides.clone(),
+        key: key.transpose()?.map(SigningKey),
+        autopilot: autopilot(&options)?,
+        overrides: beyond.overrides,
+        options,
     })
 }
 
@@ -262,16 +276,13 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
         Some(Err(error)) => return Err(format!("--autopilot {name}: {error}; must be {FORM}")),
         None => Where::Tty(PathBuf::from(name), options.autopilot_baud),
     };
+    let key = options.autopilot_key_file.as_deref();
+    let key = key.map(|file| key::load("--autopilot-key-file", file));
     Ok(Some(AutopilotPlan {
         place,
         sites,
         pace: Pace::of_speed(options.speed),
-        key: options
-            .autopilot_key_file
-            .as_deref()
-            .map(|file| key::load("--autopilot-key-file", file))
-            .transpose()?
-            .map(SigningKey),
+        key: key.transpose()?.map(SigningKey),
     }))
 }
 
@@ -286,54 +297,37 @@ fn carried(options: &Options) -> Result<ChannelLoad, String> {
     Ok(load)
 }
 
-fn secret(options: &Options) -> Result<Option<Secret>, String> {
-    let (Some(key_file), Some(epoch_file)) = (&options.key_file, &options.epoch_file) else {
-        return Ok(None);
-    };
-    Ok(Some(Secret {
-        key: key::load("--key-file", key_file)?,
-        epoch_file: epoch_file.clone(),
-        upload_file: options.upload_file.clone(),
-    }))
-}
-
-fn ttys(options: &Options) -> Result<Ttys, String> {
+fn wiring(options: &Options) -> Result<Wiring, String> {
     let Options { index, of, .. } = *options;
-    let (upstream, downstream) = (options.upstream.clone(), options.downstream.clone());
-    let neither = upstream.is_none() && downstream.is_none();
-    match &options.shared {
-        Some(tty) if neither => return Ok(Ttys::Shared(tty.clone())),
-        Some(tty) => {
-            return Err(format!(
-                "--shared {}: cannot be combined with --upstream and --downstream",
-                tty.display()
-            ));
+    let (upstream, downstream) = (&options.upstream, &options.downstream);
+    if let Some(tty) = &options.shared {
+        if upstream.is_none() && downstream.is_none() {
+            return Ok(Wiring::Shared);
         }
-        None => {}
-    }
-    if index > 1 && upstream.is_none() {
         return Err(format!(
-            "--upstream: is missing, a tty toward relay {} (or give --shared)",
-            index - 1
+            "--shared {}: cannot be combined with --upstream and --downstream",
+            tty.display()
         ));
+    }
+    let missing = |name: &str, neighbour: u16| {
+        Err(format!(
+            "--{name}: is missing, a tty toward relay {neighbour} (or give --shared)"
+        ))
+    };
+    if index > 1 && upstream.is_none() {
+        return missing("upstream", index - 1);
     }
     if index < of && downstream.is_none() {
-        return Err(format!(
-            "--downstream: is missing, a tty toward relay {} (or give --shared)",
-            index + 1
-        ));
+        return missing("downstream", index + 1);
     }
-    Ok(Ttys::Pair {
-        upstream,
-        downstream,
-    })
+    Ok(Wiring::Pair)
 }
 
 fn mission(options: &Options, beyond: &Beyond) -> Result<Mission, String> {
     let given = &options.mission;
     let field = options.field.map(Interference::Field).or(beyond.field);
     let interference = given.interference(field);
-    if interference == Interference::Unknown && !options.listen.is_on() {
+    if interference == Interference::Unknown && !options.listen.listen {
         return Err("--interferer unknown: must be P,X,Y without --listen".to_owned());
     }
     if matches!(interference, Interference::Field(_)) && options.method != Method::Align {
@@ -354,8 +348,8 @@ fn field(text: &str) -> Result<Field, String> {
             .split_once(':')
             .ok_or("must be points: X:UPSILON,X:UPSILON,..")?;
         Ok(FieldPoint {
-            x_m: named("X", x, -1e7, 1e7)?,
-            upsilon_per_w: named("UPSILON", upsilon, 1e-9, 1e32)?,
+            x_m: named("X", x, [-1e7, 1e7])?,
+            upsilon_per_w: named("UPSILON", upsilon, [1e-9, 1e32])?,
         })
     };
     let points: Result<Vec<FieldPoint>, String> = text.split(',').map(point).collect();

@@ -1,19 +1,14 @@
 //! Ttys of either wiring.
 
-use std::os::fd::BorrowedFd;
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::path::PathBuf;
 
-use rustix::event::PollFlags;
-use rustix::io::Errno;
 use serde_json::{Value, json};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort, SerialStats, Shared};
 use uav_relay::{Instant, Relay, ViewRecord};
 
-use crate::options::Ttys;
+use crate::options::Options;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
-use uav_relay_linux::{sleep, tap};
 
 /// Tty, or `None` at an end of the chain.
 #[derive(Debug)]
@@ -42,36 +37,19 @@ pub(crate) enum Ports {
 
 impl Ports {
     /// Opens the ttys.
-    pub(crate) fn open(ttys: &Ttys, baud: u32) -> Result<Self, String> {
-        let link = |option, path: Option<&_>| {
-            let tty = path
-                .map(|path| Replug::open(option, path, baud))
-                .transpose()?;
-            Ok::<_, String>(SerialLink::new(End(tty), baud))
+    pub(crate) fn open(options: &Options) -> Result<Self, String> {
+        let link = |name, path: &Option<PathBuf>| {
+            let tty = path.as_deref();
+            let tty = tty.map(|path| Replug::open(name, path, options.baud));
+            Ok::<_, String>(SerialLink::new(End(tty.transpose()?), options.baud))
         };
-        Ok(match ttys {
-            Ttys::Pair {
-                upstream,
-                downstream,
-            } => {
-                let upstream = link("--upstream", upstream.as_deref())?;
-                let downstream = link("--downstream", downstream.as_deref())?;
-                Self::Pair(Box::new(Pair::new(upstream, downstream)))
-            }
-            Ttys::Shared(tty) => {
-                let channel = link("--shared", Some(tty.as_path()))?;
-                Self::Shared(Box::new(Shared::new(channel)))
-            }
-        })
-    }
-
-    /// Captures all further traffic in a file; returns the file that is written.
-    pub(crate) fn capture(&mut self, file: &Path) -> Result<PathBuf, String> {
-        let (taps, file) = tap::taps(env!("CARGO_BIN_NAME"), file, &self.names())?;
-        for (tty, tap) in self.ttys().zip(taps) {
-            tty.tapped(tap);
+        if options.shared.is_some() {
+            let channel = link("--shared", &options.shared)?;
+            return Ok(Self::Shared(Box::new(Shared::new(channel))));
         }
-        Ok(file)
+        let upstream = link("--upstream", &options.upstream)?;
+        let downstream = link("--downstream", &options.downstream)?;
+        Ok(Self::Pair(Box::new(Pair::new(upstream, downstream))))
     }
 
     /// Exchanges bytes with the relay, and passes a changed record to `store` before it sends. Returns the time of the next call.
@@ -116,7 +94,7 @@ impl Ports {
         })
     }
 
-    fn ttys(&mut self) -> impl Iterator<Item = &mut Replug> {
+    pub(crate) fn ttys(&mut self) -> impl Iterator<Item = &mut Replug> {
         let (first, second) = match self {
             Self::Pair(pair) => (pair.upstream.port_mut(), Some(pair.downstream.port_mut())),
             Self::Shared(shared) => (shared.channel.port_mut(), None),
@@ -125,14 +103,5 @@ impl Ports {
             .into_iter()
             .flatten()
             .filter_map(|end| end.0.as_mut())
-    }
-
-    /// Sleeps until a tty or one of `others` is ready, at most `at_most`, else for ever. Returns the events of each of `others`.
-    pub(crate) fn sleep(
-        &mut self,
-        at_most: Option<Duration>,
-        others: &[(BorrowedFd<'_>, PollFlags)],
-    ) -> Result<Vec<PollFlags>, Errno> {
-        sleep::sleep(at_most, self.ttys(), others)
     }
 }

@@ -5,7 +5,7 @@ use std::os::fd::BorrowedFd;
 use std::path::Path;
 
 use uav_relay::{Duration, Instant, Placement, Sample};
-use uav_relay_linux::lines::{self, Fifo, LONGEST, POWER};
+use uav_relay_linux::lines::{self, Fifo, InvalidLines, POWER};
 use uav_relay_linux::log::Log;
 
 const STALE: Duration = Duration::from_millis(3_000);
@@ -14,8 +14,7 @@ const STALE: Duration = Duration::from_millis(3_000);
 pub(crate) struct Positions {
     fifo: Fifo,
     listens: bool,
-    /// Number of invalid lines.
-    bad: u64,
+    bad: InvalidLines,
     newest: Option<(Instant, Placement)>,
 }
 
@@ -25,7 +24,7 @@ impl Positions {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
             listens,
-            bad: 0,
+            bad: InvalidLines::default(),
             newest: None,
         })
     }
@@ -51,7 +50,12 @@ impl Positions {
                 newest = place.or(newest);
                 sample.into_iter().for_each(&mut *heard);
             }
-            _ => refuse(now, log, *listens, bad, line),
+            _ => {
+                let power = format!(" [POWER] or receiver POWER, {POWER}");
+                let power = if *listens { &power } else { "" };
+                let expected = format!("x_m y_m altitude_m{power}");
+                bad.refuse(now, log, "position", line, &expected);
+            }
         });
         self.newest = newest.map(|place| (now, place)).or(self.newest);
         newest
@@ -64,62 +68,32 @@ impl Positions {
     }
 
     pub(crate) const fn bad(&self) -> u64 {
-        self.bad
+        self.bad.count()
     }
 
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
-        if self.bad > 0 {
-            log.tell(now, "position", format_args!("{} invalid lines", self.bad));
+        let bad = self.bad();
+        if bad > 0 {
+            log.tell(now, "position", format_args!("{bad} invalid lines"));
         }
     }
 }
 
-/// Counts an invalid line, and logs the first one.
-fn refuse(now: Instant, log: &Log, listens: bool, bad: &mut u64, line: &[u8]) {
-    *bad += 1;
-    if *bad > 1 {
-        return;
-    }
-    let text = String::from_utf8_lossy(line);
-    log.tell(
-        now,
-        "position",
-        format_args!(
-            "{text:?} is not x_m y_m altitude_m{}; further ones are only counted",
-            if listens {
-                format!(" [POWER] or receiver POWER, {POWER}")
-            } else {
-                String::new()
-            }
-        ),
-    );
-}
-
 /// Logs whether drones are kept apart.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
-    match positions {
-        Some(positions) => log.tell(
-            Instant::ZERO,
-            "guarded",
-            format_args!(
-                "setpoints keep drones apart while they move, by {}",
-                positions.fifo
-            ),
-        ),
-        None => log.tell(
-            Instant::ZERO,
-            "unguarded",
-            format_args!("no --positions: drones are not kept apart while they move"),
-        ),
+    let now = Instant::ZERO;
+    if let Some(Positions { fifo, .. }) = positions {
+        let what = format_args!("setpoints keep drones apart while they move, by {fifo}");
+        log.tell(now, "guarded", what);
+    } else {
+        let what = "no --positions: drones are not kept apart while they move";
+        log.tell(now, "unguarded", what);
     }
 }
 
 /// Parses a position, with a measured power or without, or the word `receiver` and a power.
 fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
-    let text = std::str::from_utf8(text)
-        .ok()
-        .filter(|_| text.len() <= LONGEST)?;
-    let words: Vec<&str> = text.split_whitespace().collect();
+    let words = lines::words(text)?;
     let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());
     if let ["receiver", power @ ..] = words.as_slice() {
         let power_w = lines::power_w(power)?;

@@ -1,27 +1,24 @@
 //! Main loop: exchange bytes, log events, sleep. In flight only a signal ends it.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::os::fd::BorrowedFd;
 
 use rustix::event::PollFlags;
 use serde_json::json;
-use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, Upload, ViewRecord};
+use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, ViewRecord};
 
-use crate::autopilot::Companion;
+use crate::autopilot::{Companion, SigningKey};
 use crate::hold_reasons::HoldReasonLog;
 use crate::lost::Lost;
 use crate::options::Plan;
 use crate::ports::Ports;
 use crate::positions::Positions;
 use crate::report::Report;
-use crate::stored::StoredFile;
-use crate::uploads::Uploads;
-use crate::views::Views;
-use crate::{positions, status, uploads, views};
-use uav_relay_linux::log::{Log, Source};
-use uav_relay_linux::refusals::Refusals;
+use crate::{positions, records, status};
+use uav_relay_linux::counters::Refusals;
+use uav_relay_linux::log::Source;
 use uav_relay_linux::service::Service;
-use uav_relay_linux::{config, epoch, tap};
+use uav_relay_linux::stored::{StoredFile, next_epoch};
+use uav_relay_linux::{config, tap};
 
 struct Flight {
     service: Service,
@@ -30,8 +27,9 @@ struct Flight {
     ports: Ports,
     positions: Option<Positions>,
     autopilot: Option<Companion>,
-    views: Views,
-    uploads: Option<Uploads>,
+    /// Votes of the relay, and its newest upload.
+    views: Option<StoredFile>,
+    uploads: Option<StoredFile>,
     refusals: Refusals,
     waits: HoldReasonLog,
     lost: Lost,
@@ -71,13 +69,13 @@ impl Flight {
             key: "index",
             value: index.into(),
         };
-        let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
+        let options = &plan.options;
+        let service = Service::begin(&options.log, source, options.status_socket.as_deref())?;
         let log = service.log.clone();
-        let mut ports = Ports::open(&plan.ttys, plan.baud)?;
+        let mut ports = Ports::open(options)?;
         let listens = plan.settings.listen.is_some();
-        let positions = plan
-            .positions
-            .as_deref()
+        let positions = options.positions.as_deref();
+        let positions = positions
             .map(|path| Positions::open(path, listens))
             .transpose()?;
         let autopilot = plan
@@ -90,20 +88,19 @@ impl Flight {
             auth,
             ..plan.settings
         };
-        let mut views = Views::load(plan.view_file.as_deref())?;
-        let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), service.now())
+        let now = service.now();
+        let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now)
             .map_err(|error| error.to_string())?;
-        let resumed = resume(plan, &mut relay, &log);
-        if let Some(record) = views.stored() {
-            relay
-                .resume_view(service.now(), record)
-                .map_err(|error| views::refused(plan.view_file.as_deref(), error))?;
-        }
-        let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
-        let uploads = file.map(|file| Uploads::new(file)).transpose()?;
+        let file = options.upload_file.as_deref();
+        let resumed =
+            file.is_some_and(|file| records::resume_upload(file, &plan.mission, &mut relay, &log));
+        let uploads = file.map(records::uploads).transpose()?;
+        let views = options.view_file.as_deref();
+        let views = views.map(|file| records::resume_views(file, &mut relay, now));
+        let (mut views, stands_by) = views.transpose()?.unzip();
         // Last of the steps that may fail, so that repeated failing starts leave no files.
-        if let Some(asked) = &plan.capture {
-            tap::tell(&log, asked, &ports.capture(asked)?);
+        if let Some(asked) = &options.capture {
+            tap::attach(&log, env!("CARGO_BIN_NAME"), asked, ports.ttys())?;
         }
         let report = Report::new(
             log.clone(),
@@ -112,7 +109,7 @@ impl Flight {
             plan.settings.guard.map(|guard| guard.fence),
             plan.autopilot.is_some(),
         );
-        report.started(&ports.names(), plan.baud);
+        report.started(&ports.names(), options.baud);
         config::tell(&plan.overrides, &log);
         report.signs(auth.map(|auth| auth.epoch));
         match &autopilot {
@@ -122,11 +119,11 @@ impl Flight {
         if resumed {
             report.resumed(&relay);
         }
-        if views.stored().is_some() {
+        if stands_by == Some(true) {
             report.stands_by();
-        } else {
+        } else if let Some(views) = &mut views {
             // Written at once, so that a failure of the disk is reported before flight.
-            views.store(&relay.view_record());
+            views.store(&relay.view_record().to_bytes());
         }
         Ok(Self {
             service,
@@ -164,14 +161,17 @@ impl Flight {
         }
         let reopen = self.ports.tend(time, log);
         let views = &mut self.views;
-        views.tend(time, log);
-        let mut store = |record: &ViewRecord| views.store(record);
+        let retry = views.as_mut().and_then(|file| file.tend(time, log));
+        let mut store = |record: &ViewRecord| {
+            let file = views.as_mut();
+            file.is_none_or(|file| file.store(&record.to_bytes()))
+        };
         let wake = self.ports.poll(time, relay, &mut store);
         while let Some(event) = relay.poll_event() {
             if let (Event::Uploaded, Some(uploads), Some(upload)) =
                 (event, &mut self.uploads, relay.upload())
             {
-                uploads.take(upload);
+                records::store_upload(uploads, upload);
             }
             if let Some(autopilot) = &mut self.autopilot {
                 autopilot.tell(event);
@@ -180,23 +180,17 @@ impl Flight {
             self.report.event(time, event, relay);
         }
         let moves = self.report.look(time, relay, drone);
-        let files = [
-            self.uploads.as_mut().and_then(|it| it.tend(time, log)),
-            self.views.kept().and_then(StoredFile::wake),
-        ];
+        let uploads = self.uploads.as_mut();
+        let uploads = uploads.and_then(|file| file.tend(time, log));
         if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
-            log.tell(time, "rejected", format_args!("{why}"));
+            log.tell(time, "rejected", why);
         }
         let name = |node| self.report.name(node);
         let waits = self.waits.tend(time, log, relay, name);
         let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
         let alive = self.tell(time);
-        let others = [again, reopen, alive, waits, moves]
-            .into_iter()
-            .chain(files)
-            .flatten();
-        let wake = wake.into_iter().chain(others).min();
-        self.sleep(wake)
+        let wakes = [wake, again, reopen, alive, waits, moves, retry, uploads];
+        self.sleep(wakes.into_iter().flatten().min())
     }
 
     /// Handles signals and status requests; returns the time of the next call.
@@ -209,8 +203,7 @@ impl Flight {
             lost,
             ..
         } = self;
-        let uploads = self.uploads.as_ref().map(Uploads::kept);
-        let views = self.views.kept();
+        let (uploads, views) = (self.uploads.as_ref(), self.views.as_ref());
         let index = report.index();
         service.tend(time, "relay", |log, command| {
             if let Some((command, user)) = command {
@@ -235,36 +228,29 @@ impl Flight {
 
     /// Sleeps until there may be something to do; returns false after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> bool {
-        let span = self.service.until(wake);
-        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let fifo = self.positions.as_ref().map(Positions::fd);
-        let files = [self.views.kept(), self.uploads.as_ref().map(Uploads::kept)];
-        let files = files.into_iter().flatten().map(StoredFile::fd);
-        others.extend(fifo.into_iter().chain(files).map(|fd| (fd, PollFlags::IN)));
+        let files = [&self.views, &self.uploads].into_iter().flatten();
+        let files = files.map(StoredFile::fd);
+        let others = fifo.into_iter().chain(files);
+        let mut others: Vec<_> = others.map(|fd| (fd, PollFlags::IN)).collect();
         // The autopilot is the last entry, if there is one.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
-        let found = self.ports.sleep(span, &others);
         let has_autopilot = autopilot.is_some();
-        let Ok(found) = found else {
-            // A relay in flight continues.
-            Service::nap(span);
-            return true;
-        };
-        if let (true, Some(autopilot), Some(events)) =
-            (has_autopilot, &mut self.autopilot, found.last())
+        let (found, is_over) = self.service.sleep(wake, self.ports.ttys(), &others);
+        if has_autopilot
+            && let (Some(autopilot), Some(events)) = (&mut self.autopilot, found.last())
         {
             autopilot.noticed(*events);
         }
-        !Service::is_over(&found)
+        !is_over
     }
 
     fn end(&mut self) {
         self.service.stopping();
         let (time, log) = (self.service.now(), &self.service.log);
-        self.views.finish(time, log);
-        if let Some(uploads) = &mut self.uploads {
-            uploads.finish(time, log);
+        for file in [&mut self.views, &mut self.uploads].into_iter().flatten() {
+            file.finish(time, log);
         }
         if let Some(positions) = &self.positions {
             positions.stopped(time, log);
@@ -278,12 +264,12 @@ impl Flight {
 }
 
 fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
-    let Some(secret) = &plan.secret else {
+    let (Some(SigningKey(key)), Some(file)) = (plan.key, &plan.options.epoch_file) else {
         return Ok(None);
     };
     Ok(Some(Auth {
-        key: Key::new(secret.key),
-        epoch: epoch::next(&secret.epoch_file)?,
+        key: Key::new(key),
+        epoch: next_epoch(file)?,
     }))
 }
 
@@ -291,29 +277,4 @@ fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
 pub(crate) fn seed() -> u32 {
     let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
     u32::from_le_bytes([a, b, c, d])
-}
-
-/// Returns true if the relay resumes with an uploaded mission. An unusable file is logged and ignored: the chain sends the newer
-/// mission.
-fn resume(plan: &Plan, relay: &mut Relay, log: &Log) -> bool {
-    let unused = |why: &str| log.tell(Instant::ZERO, "file", format_args!("{why}; not used"));
-    match held(plan) {
-        Ok(None) => false,
-        Err(line) => {
-            unused(&line);
-            false
-        }
-        Ok(Some(held)) => match relay.resume(&held) {
-            Ok(()) => true,
-            Err(error) => {
-                unused(&format!("--upload-file: {error}"));
-                false
-            }
-        },
-    }
-}
-
-fn held(plan: &Plan) -> Result<Option<Upload>, String> {
-    let file = plan.secret.as_ref().and_then(|it| it.upload_file.as_ref());
-    file.map_or(Ok(None), |file| uploads::load(file, &plan.mission))
 }

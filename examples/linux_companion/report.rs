@@ -80,18 +80,11 @@ impl Report {
     /// Logs the signing epoch, or that frames are not signed.
     pub(crate) fn signs(&self, epoch: Option<u32>) {
         match epoch {
-            Some(epoch) => self.log.say(
-                Instant::ZERO,
-                "signed",
-                json!({ "epoch": epoch }),
-                format_args!("frames are signed, epoch {epoch}"),
-            ),
+            Some(epoch) => self.log.signed(epoch),
             None => self.log.tell(
                 Instant::ZERO,
                 "unsigned",
-                format_args!(
-                    "no --key-file: frames are not signed, and anybody in range can send frames"
-                ),
+                "no --key-file: frames are not signed, and anybody in range can send frames",
             ),
         }
     }
@@ -112,14 +105,12 @@ impl Report {
         self.log.tell(
             Instant::ZERO,
             "restored",
-            format_args!(
-                "votes of before this start, from --view-file; before another flight remove that file"
-            ),
+            "votes of before this start, from --view-file; before another flight remove that file",
         );
     }
 
     pub(crate) fn event(&mut self, now: Instant, event: Event, relay: &Relay) {
-        let tell = |word: &str, text: fmt::Arguments<'_>| self.log.tell(now, word, text);
+        let tell = |word: &str, text: &str| self.log.tell(now, word, text);
         match event {
             Event::SetpointChanged => {
                 if let Some(step) = self.movement.changed(now, relay) {
@@ -127,21 +118,17 @@ impl Report {
                 }
             }
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
-            Event::Infeasible => tell("infeasible", format_args!("no target SIR can be met")),
+            Event::Infeasible => tell("infeasible", "no target SIR can be met"),
             Event::Adopted => self.adopted(now, relay),
             Event::ViewAccepted => self.reformed(now, relay),
             Event::NewEstimate => self.believed(now, relay.belief()),
             Event::LeaseLapsed => tell(
                 "lease expired",
-                format_args!(
-                    "not all relays are reachable; holds its position and requests a new view"
-                ),
+                "not all relays are reachable; holds its position and requests a new view",
             ),
             Event::NoQuorum => tell(
                 "no quorum",
-                format_args!(
-                    "too few relays are reachable; holds its position; bring the missing relays into range, or land these"
-                ),
+                "too few relays are reachable; holds its position; bring the missing relays into range, or land these",
             ),
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
@@ -155,9 +142,7 @@ impl Report {
             }
             Event::InterfererUnclear => tell(
                 "interferer unclear",
-                format_args!(
-                    "the measurements do not fit one interferer on the ground, or are too few; the last estimate is kept"
-                ),
+                "the measurements do not fit one interferer on the ground, or are too few; the last estimate is kept",
             ),
             other => self.of_a_node(now, other, relay),
         }
@@ -179,21 +164,16 @@ impl Report {
 
     /// Logs a rejected upload, with the allowed range if it violates the geofence.
     fn refused(&self, now: Instant, why: LineError) {
-        let Some(fence) = self.fence else {
-            return self.log.tell(now, "upload refused", format_args!("{why}"));
+        const EVENT: &str = "upload refused";
+        let range_m = match (why, self.fence) {
+            (LineError::Altitude, Some(of)) => [of.least_altitude_m, of.most_altitude_m],
+            (LineError::Lateral, Some(of)) => [of.least_y_m, of.most_y_m],
+            (LineError::Length, Some(of)) => [of.least_x_m, of.most_x_m],
+            _ => return self.log.tell(now, EVENT, why),
         };
-        let range = match why {
-            LineError::Altitude => [fence.least_altitude_m, fence.most_altitude_m],
-            LineError::Lateral => [fence.least_y_m, fence.most_y_m],
-            LineError::Length => [fence.least_x_m, fence.most_x_m],
-            _ => {
-                return self.log.tell(now, "upload refused", format_args!("{why}"));
-            }
-        };
-        let [least, most] = range;
-        let what = format_args!("{why}, {least} to {most} m");
+        let what = format_args!("{why}, {} to {} m", range_m[0], range_m[1]);
         self.log
-            .say(now, "upload refused", json!({ "range_m": range }), what);
+            .say(now, EVENT, json!({ "range_m": range_m }), what);
     }
 
     fn of_a_node(&self, now: Instant, event: Event, relay: &Relay) {
@@ -306,20 +286,10 @@ impl Report {
     fn adopted(&self, now: Instant, relay: &Relay) {
         let version = relay.version();
         let fields = json!({ "version": version });
-        match relay.sites() {
-            Some(sites) => self.log.say(
-                now,
-                "adopted",
-                fields,
-                format_args!("flies version {version} of the mission, {}", Between(sites)),
-            ),
-            None => self.log.say(
-                now,
-                "adopted",
-                fields,
-                format_args!("flies version {version} of the mission"),
-            ),
-        }
+        let sites = relay.sites();
+        let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
+        let what = format_args!("flies version {version} of the mission{sites}");
+        self.log.say(now, "adopted", fields, what);
     }
 
     fn reformed(&self, now: Instant, relay: &Relay) {
@@ -341,13 +311,12 @@ impl Report {
             let text = format_args!("target SIR {:.6}, {db:.3} dB", Exact(target));
             self.log.say(now, "converged", fields, text);
         } else {
-            let text = format_args!("the relays spread along the line to measure the interferer");
+            let text = "the relays spread along the line to measure the interferer";
             self.log.say(now, "converged", fields, text);
         }
     }
 
     fn believed(&self, now: Instant, told: Told) {
-        let tell = |text: fmt::Arguments<'_>| self.log.tell(now, "estimate", text);
         match told.belief {
             Belief::Source { source, receiver_w } => self.log.say(
                 now,
@@ -368,11 +337,14 @@ impl Report {
                     Spread::TowardTx => "toward the transmitter",
                     Spread::TowardRx => "toward the receiver",
                 };
-                tell(format_args!(
-                    "interference unknown; the relays spread {spread} to measure it"
-                ));
+                let what =
+                    format_args!("interference unknown; the relays spread {spread} to measure it");
+                self.log.tell(now, "estimate", what);
             }
-            Belief::Mission => tell(format_args!("the interferer of the mission")),
+            Belief::Mission => {
+                let what = "the interferer of the mission";
+                self.log.tell(now, "estimate", what);
+            }
         }
     }
 }

@@ -14,15 +14,11 @@ pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
     for ((name, old), (_, new)) in pairs.filter(|((_, old), (_, new))| old != new) {
         is_same = false;
         let fields = json!({ "value": name, "old": old, "new": new });
-        log.say(
-            now,
-            "change",
-            fields,
-            format_args!("{name}: {old} -> {new}"),
-        );
+        let what = format_args!("{name}: {old} -> {new}");
+        log.say(now, "change", fields, what);
     }
     if is_same {
-        log.tell(now, "change", format_args!("none"));
+        log.tell(now, "change", "none");
     }
 }
 
@@ -68,7 +64,7 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
 pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
         let what = "cannot be computed in advance, since the relays measure the interference or find no positions";
-        log.tell(now, "move", format_args!("{what}"));
+        log.tell(now, "move", what);
         return;
     };
     let place = |at: Placement| json!({ "x_m": at.x_m, "y_m": at.y_m, "h_m": at.altitude_m });
@@ -86,15 +82,8 @@ pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
                 p.x_m, p.y_m, p.altitude_m
             )
         };
-        log.say(
-            now,
-            "move",
-            fields,
-            format_args!(
-                "relay {index} moves {metres:.1} m, from {} to {}",
-                at(before),
-                at(after)
-            ),
-        );
+        let (from, to) = (at(before), at(after));
+        let what = format_args!("relay {index} moves {metres:.1} m, from {from} to {to}");
+        log.say(now, "move", fields, what);
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use uav_relay::{Duration, Instant, Side};
-use uav_relay_linux::lines::{self, Begun, Fifo, LONGEST, POWER};
+use uav_relay_linux::lines::{self, Begun, Fifo, InvalidLines, POWER};
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
@@ -56,7 +56,7 @@ pub(crate) struct Measurements {
     is_silent: bool,
     last_w: Option<f32>,
     taken: u64,
-    bad: u64,
+    bad: InvalidLines,
 }
 
 impl Measurements {
@@ -86,7 +86,7 @@ impl Measurements {
             is_silent: false,
             last_w: None,
             taken: 0,
-            bad: 0,
+            bad: InvalidLines::default(),
         })
     }
 
@@ -142,8 +142,8 @@ impl Measurements {
 
     fn take(&mut self, now: Instant, log: &Log, text: &[u8]) {
         let Some(power_w) = level(text, self.end) else {
-            self.refuse(now, log, text);
-            return;
+            let expected = format!("POWER or {} POWER, {POWER}", name(self.end));
+            return self.bad.refuse(now, log, "measurement", text, &expected);
         };
         self.newest_w = Some(power_w);
         let is_first = self.last_at.replace(now).is_none();
@@ -157,21 +157,6 @@ impl Measurements {
                 format_args!("{power_w:.3e} W by {name}; further ones are reported without a line"),
             );
         }
-    }
-
-    fn refuse(&mut self, now: Instant, log: &Log, text: &[u8]) {
-        self.bad += 1;
-        if self.bad > 1 {
-            return;
-        }
-        let (text, own) = (String::from_utf8_lossy(text), name(self.end));
-        log.tell(
-            now,
-            "measurement",
-            format_args!(
-                "{text:?} is not POWER or {own} POWER, {POWER}; further ones are only counted"
-            ),
-        );
     }
 
     pub(crate) fn wake(&self) -> Option<Instant> {
@@ -198,7 +183,7 @@ impl Measurements {
             "from": self.name,
             "handed_on": self.taken,
             "last_w": self.last_w,
-            "refused": self.bad,
+            "refused": self.bad.count(),
             "silent": self.is_silent,
         })
     }
@@ -258,10 +243,7 @@ pub(crate) const fn name(end: Side) -> &'static str {
 
 /// Parses a power, W or dBm, alone or behind the name of this end; returns W.
 fn level(text: &[u8], end: Side) -> Option<f32> {
-    let text = std::str::from_utf8(text)
-        .ok()
-        .filter(|_| text.len() <= LONGEST)?;
-    let words: Vec<&str> = text.split_whitespace().collect();
+    let words = lines::words(text)?;
     match words.as_slice() {
         [whose, power @ ..] if *whose == name(end) => lines::power_w(power),
         power => lines::power_w(power),

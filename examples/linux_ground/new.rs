@@ -8,10 +8,12 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::{
     Band, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Sites, Upload,
 };
+use uav_relay_linux::command::number;
 use uav_relay_linux::mission::{
-    altitude, band, distance, interferer, left, mission, noise, power, right, separation,
+    ALTITUDE_M, DISTANCE_M, LEFT_M, NOISE_W, POWER_W, RIGHT_M, SEPARATION_M, band, interferer,
+    mission,
 };
-use uav_relay_linux::site::site;
+use uav_relay_linux::site::{site, swapped};
 
 /// Options of a new mission; values that are not given stay as they are flown.
 #[derive(Args, Debug)]
@@ -26,36 +28,36 @@ pub(crate) struct NewOptions {
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     new_site_rx: Option<Geodetic>,
     /// New distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = distance)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(DISTANCE_M))]
     new_distance: Option<f32>,
     /// New altitude of every relay, m, 0.1 to 1e4
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = altitude)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(ALTITUDE_M))]
     new_altitude: Option<f32>,
     /// New range of altitudes to choose from, m, 0.1 to 1e4. Default: the present range, or the new altitude alone if the present
     /// range is a single one
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
     /// New left limit of the relays' positions, facing the receiver, as y in m, -1e5 to 0
-    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = left)]
+    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = number(LEFT_M))]
     new_lateral_min: Option<f32>,
     /// New right limit, as y in m, 0 to 1e5
-    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = right)]
+    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     new_tx_power: Option<f32>,
     /// New power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = power)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     new_uav_power: Option<f32>,
     /// New interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to
     /// the right of it
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
     /// New noise power at every receiver, W, 0 to 1
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = noise)]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(NOISE_W))]
     new_noise: Option<f32>,
     /// New minimum distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = separation)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
     new_min_separation: Option<f32>,
 }
 
@@ -208,12 +210,7 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     if far_m <= most_m {
         return Ok(());
     }
-    let turned = |site: Geodetic| Geodetic {
-        lat_e7: site.lon_e7,
-        lon_e7: site.lat_e7,
-        ..site
-    };
-    let is_swapped = away_m(turned(sites.tx), turned(sites.rx)) <= most_m;
+    let is_swapped = away_m(swapped(sites.tx), swapped(sites.rx)) <= most_m;
     let hint = if is_swapped {
         ": are latitude and longitude swapped?"
     } else {
@@ -229,7 +226,6 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
 /// Returns the largest turn of the line, degrees, that keeps the relays' order. Position errors are up to 1 m.
 ///
 /// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
-/// For the separation s and the width w of the lateral range it solves s cos t - w sin t = min(2 m, s / 2).
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (
         config.min_separation_m,

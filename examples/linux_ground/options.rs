@@ -6,17 +6,17 @@ use std::process::ExitCode;
 
 use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
 use uav_relay::UploadError;
-use uav_relay::{Adjust, Duration, Mission, Side, Sites, Upload, Wiring};
-use uav_relay_linux::command;
+use uav_relay::{Duration, Side, Sites, Wiring};
+use uav_relay_linux::command::{self, whole};
 use uav_relay_linux::config::{self, Beyond, Given, Override};
 use uav_relay_linux::log::LogOptions;
-use uav_relay_linux::mission::{MissionOptions, mission};
+use uav_relay_linux::mission::{Method, MissionOptions, mission};
 use uav_relay_linux::site::SiteOptions;
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::key;
 
 use crate::forecast::Loaded;
-use crate::new::{Basis, NewOptions};
+use crate::new::NewOptions;
 
 /// Transmitter or receiver end of a chain of relays in flight. Uploads a new mission, or keeps answering the relays (--stand). The
 /// options up to --min-separation describe the mission loaded into the relays; those that begin with --new- change it. All other
@@ -25,13 +25,13 @@ use crate::new::{Basis, NewOptions};
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", version, disable_version_flag = true)]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
-struct Options {
+pub(crate) struct Options {
     /// TOML file with the loaded scenario, and the sections `network` and `ground`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Tty toward the relay next to this end of the chain
     #[arg(long, value_name = "TTY")]
-    tty: PathBuf,
+    pub(crate) tty: PathBuf,
     /// The tty leads to a radio channel shared by all relays, not to a wire
     #[arg(long)]
     shared: bool,
@@ -39,30 +39,30 @@ struct Options {
     #[arg(long, value_name = "END", value_enum)]
     end: End,
     /// Bit rate of the tty, bit/s, 1200 to 4000000
-    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u32>(text, 1_200, 4_000_000))]
-    baud: u32,
+    #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
+    pub(crate) baud: u32,
     /// Network number
-    #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 0, 65_535))]
-    network: u16,
+    #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = whole::<u16>(0, 65_535))]
+    pub(crate) network: u16,
     /// File with the network's key, 64 hexadecimal digits
     #[arg(long, value_name = "FILE")]
     key_file: PathBuf,
     /// File with the epoch, increased at every start; created if missing. It must never go back, and must not be shared with a
     /// relay
     #[arg(long, value_name = "FILE")]
-    epoch_file: PathBuf,
+    pub(crate) epoch_file: PathBuf,
     /// Version of the new mission, 1 to 65535: larger than that of every earlier upload. As the last word, without V, it prints
     /// the program's version
-    #[arg(long, value_name = "V", required_unless_present = "stand", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 65_535))]
-    version: Option<u16>,
+    #[arg(long, value_name = "V", required_unless_present = "stand", allow_negative_numbers = true, value_parser = whole::<u16>(1, 65_535))]
+    pub(crate) version: Option<u16>,
     /// Print the version of the program
     #[arg(short = 'V', action = ArgAction::Version)]
     own_version: Option<bool>,
     /// Seconds until an upload is given up, 1 to 86400. With --stand the failure is logged and the program goes on
-    #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u64>(text, 1, 86_400))]
-    timeout: u64,
+    #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = whole::<u64>(1, 86_400))]
+    pub(crate) timeout: u64,
     /// Number of relays, 1 to 1000
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |text: &str| command::whole::<u16>(text, 1, 1000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     of: u16,
     #[command(flatten)]
     loaded: MissionOptions,
@@ -72,21 +72,21 @@ struct Options {
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
     #[command(flatten)]
-    new: NewOptions,
+    pub(crate) new: NewOptions,
     /// Show the changes and exit; nothing is uploaded
     #[arg(long, requires = "version", conflicts_with = "stand")]
-    dry_run: bool,
+    pub(crate) dry_run: bool,
     /// Upload without confirmation; required if standard input is no terminal
     #[arg(long, requires = "version")]
-    yes: bool,
+    pub(crate) yes: bool,
     /// Upload missions outside the geofence, too, for relays without a drone, which have none. The geofence is that of --altitude,
     /// --band,
     /// --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
-    no_fence: bool,
+    pub(crate) no_fence: bool,
     /// Take values that are not given from the loaded mission instead of the flown one
     #[arg(long, requires = "version")]
-    from_loaded: bool,
+    pub(crate) from_loaded: bool,
     /// Source of interference measurements at this end. A FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or
     /// `udp:HOST:PORT`. Each line is the mean received power, W, 1e-30 to 1e6, or dBm with that unit, as -95 dBm. It is reported to
     /// nearby relays that --listen
@@ -96,20 +96,20 @@ struct Options {
         requires = "stand",
         help_heading = "Standing"
     )]
-    measurements: Option<String>,
+    pub(crate) measurements: Option<String>,
     /// Keep running until a signal: answer the relays, report measurements, and log which relays answer. With --version upload
     /// that mission first
     #[arg(long, help_heading = "Standing")]
-    stand: bool,
+    pub(crate) stand: bool,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
-    status_socket: Option<PathBuf>,
+    pub(crate) status_socket: Option<PathBuf>,
     /// Write every frame of the tty to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2, FILE-3 and so
     /// on is written instead. It grows as long as the program runs
     #[arg(long, value_name = "FILE", help_heading = "Log")]
-    capture: Option<PathBuf>,
+    pub(crate) capture: Option<PathBuf>,
     #[command(flatten)]
-    log: LogOptions,
+    pub(crate) log: LogOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -120,49 +120,28 @@ enum End {
     Rx,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-enum Method {
-    Align,
-    Joint,
-    Adjust,
-}
-
-#[derive(Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "one for each option")]
-pub(crate) struct Change {
-    pub(crate) version: u16,
-    new: NewOptions,
-    pub(crate) sited: Option<Sites>,
-    pub(crate) dry_run: bool,
-    pub(crate) yes: bool,
-    pub(crate) no_fence: bool,
-    pub(crate) from_loaded: bool,
-}
-
-impl Change {
-    /// Returns the upload that replaces `basis`.
-    pub(crate) fn upload(&self, loaded: &Mission, basis: &Basis) -> Result<Upload, String> {
-        self.new.upload(self.version, loaded, self.sited, basis)
-    }
-}
-
 pub(crate) struct Plan {
-    pub(crate) tty: PathBuf,
-    pub(crate) baud: u32,
+    pub(crate) options: Options,
     pub(crate) loaded: Loaded,
-    pub(crate) change: Option<Change>,
-    pub(crate) stands: bool,
-    pub(crate) measurements: Option<String>,
+    pub(crate) sited: Option<Sites>,
     pub(crate) end: Side,
-    pub(crate) wiring: Wiring,
-    pub(crate) network: u16,
     pub(crate) key: [u8; 32],
-    pub(crate) epoch_file: PathBuf,
-    pub(crate) timeout: Duration,
-    pub(crate) status_socket: Option<PathBuf>,
-    pub(crate) capture: Option<PathBuf>,
-    pub(crate) log: LogOptions,
     pub(crate) overrides: Vec<Override>,
+}
+
+impl Plan {
+    /// Returns the time until an upload is given up.
+    pub(crate) const fn timeout(&self) -> Duration {
+        Duration::from_millis(1_000 * self.options.timeout)
+    }
+
+    pub(crate) const fn wiring(&self) -> Wiring {
+        if self.options.shared {
+            Wiring::Shared
+        } else {
+            Wiring::Pair
+        }
+    }
 }
 
 /// Reads the command line; otherwise returns the exit status after help or a mistake has been printed.
@@ -176,7 +155,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
         return Err(ExitCode::SUCCESS);
     }
     let (options, beyond) = command::read(section)?;
-    plan(options, &beyond).map_err(|line| command::refuse(&line))
+    plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
 /// Adds the `[network]` and `[ground]` sections of the file.
@@ -196,7 +175,7 @@ fn section(deployment: &Deployment, given: &mut Given) {
     given.path("--capture", own.capture.as_ref());
 }
 
-fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
+fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
     let interference = options.loaded.interference(beyond.field);
     let base = options
         .loaded
@@ -204,21 +183,11 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
     let loaded = mission(base, "--")?;
     let sited = options.sites.of(options.loaded.distance)?;
     let key = key::load("--key-file", &options.key_file)?;
-    let change = options.version.map(|version| Change {
-        version,
-        new: options.new,
-        sited,
-        dry_run: options.dry_run,
-        yes: options.yes,
-        no_fence: options.no_fence,
-        from_loaded: options.from_loaded,
-    });
-    if let Some(change) = &change {
+    if let Some(version) = options.version {
         if loaded.field().is_some() {
             return Err(UploadError::Field.to_string());
         }
-        if !change.yes && !change.dry_run && !std::io::stdin().is_terminal() {
-            let version = change.version;
+        if !options.yes && !options.dry_run && !std::io::stdin().is_terminal() {
             return Err(format!(
                 "--version {version}: nobody can confirm the upload, since standard input is no terminal; give --yes, or --dry-run to see what it changes"
             ));
@@ -227,34 +196,16 @@ fn plan(options: Options, beyond: &Beyond) -> Result<Plan, String> {
     Ok(Plan {
         loaded: Loaded {
             mission: loaded,
-            method: match options.method {
-                Method::Align => uav_relay::Method::Align,
-                Method::Joint => uav_relay::Method::Joint,
-                Method::Adjust => uav_relay::Method::Adjust(Adjust::default()),
-            },
-            profiles: beyond.profiles.clone(),
+            method: options.method.into(),
+            profiles: beyond.profiles,
         },
-        change,
-        stands: options.stand,
-        measurements: options.measurements,
+        sited,
         end: match options.end {
             End::Tx => Side::Upstream,
             End::Rx => Side::Downstream,
         },
-        wiring: if options.shared {
-            Wiring::Shared
-        } else {
-            Wiring::Pair
-        },
-        network: options.network,
         key,
-        timeout: Duration::from_millis(1_000 * options.timeout),
-        baud: options.baud,
-        tty: options.tty,
-        epoch_file: options.epoch_file,
-        status_socket: options.status_socket,
-        capture: options.capture,
-        log: options.log,
-        overrides: beyond.overrides.clone(),
+        overrides: beyond.overrides,
+        options,
     })
 }

@@ -15,9 +15,13 @@ use crate::options::Plan;
 
 /// Logs the end of the chain, the port and the signing epoch.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
-    let (end, relays, network) = (name(plan.end), plan.loaded.mission.relays(), plan.network);
-    let (base, baud) = (plan.loaded.mission.digest(), plan.baud);
-    let tty = plan.tty.display();
+    let (end, relays, network) = (
+        name(plan.end),
+        plan.loaded.mission.relays(),
+        plan.options.network,
+    );
+    let (base, baud) = (plan.loaded.mission.digest(), plan.options.baud);
+    let tty = plan.options.tty.display();
     log.say(
         Instant::ZERO,
         "started",
@@ -29,12 +33,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
             "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
         ),
     );
-    log.say(
-        Instant::ZERO,
-        "signed",
-        json!({ "epoch": epoch }),
-        format_args!("frames are signed, epoch {epoch}"),
-    );
+    log.signed(epoch);
 }
 
 pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progress) {
@@ -42,13 +41,10 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
     match progress {
         Progress::Offering => {
             let digest = upload.id().digest;
-            let what = format!("version {version}, mission 0x{digest:04x}");
-            match upload.sites() {
-                Some(sites) => {
-                    log.tell(now, "offering", format_args!("{what}, {}", Between(sites)));
-                }
-                None => log.tell(now, "offering", format_args!("{what}")),
-            }
+            let sites = upload.sites();
+            let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
+            let what = format_args!("version {version}, mission 0x{digest:04x}{sites}");
+            log.tell(now, "offering", what);
         }
         Progress::Held { by } => log.tell(
             now,
@@ -102,7 +98,7 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
         (_, true) => format!("relay {by} flies version {version}"),
         (_, false) => format!("relay {by} holds version {version}, and does not fly it yet"),
     };
-    log.say(now, "current", fields, format_args!("{what}"));
+    log.say(now, "current", fields, what);
 }
 
 /// Returns the error for an upload refused by a relay, with the value that most likely causes it.
@@ -208,7 +204,7 @@ impl Outside {
 
 /// Returns the error for an upload that exceeds its time, with the most likely cause.
 pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
-    let seconds = plan.timeout.as_micros() / 1_000_000;
+    let seconds = plan.options.timeout;
     let state = match progress {
         Progress::Held { by } => {
             format!("relay {by} holds version {version}, and the chain does not fly it yet")
@@ -252,7 +248,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             stats.foreign,
             format!(
                 "frames are of another network number than --network {}",
-                plan.network
+                plan.options.network
             ),
         ),
         (
@@ -270,7 +266,7 @@ fn why(plan: &Plan, stats: &Stats) -> String {
             stats.crc,
             format!(
                 "frames are damaged: is --baud {} that of the relays?",
-                plan.baud
+                plan.options.baud
             ),
         ),
     ];
@@ -284,22 +280,21 @@ fn why(plan: &Plan, stats: &Stats) -> String {
         ),
         None => format!(
             "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
-            plan.tty.display(),
-            plan.network,
-            plan.baud
+            plan.options.tty.display(),
+            plan.options.network,
+            plan.options.baud
         ),
     }
 }
 
 pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
-    let fields = json!({ "node": node });
-    if is_heard {
-        let what = format_args!("relay {node} is received, and receives this station");
-        log.say(now, "back", fields, what);
+    let (event, what) = if is_heard {
+        ("back", "is received, and receives this station")
     } else {
-        let what = format_args!("relay {node} does not answer");
-        log.say(now, "lost", fields, what);
-    }
+        ("lost", "does not answer")
+    };
+    let text = format_args!("relay {node} {what}");
+    log.say(now, event, json!({ "node": node }), text);
 }
 
 /// Logs the counters at the end of a station that ran with `--stand`.

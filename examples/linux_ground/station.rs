@@ -1,19 +1,18 @@
 //! Main loop: exchange bytes, forward measurements, log the upload's progress, sleep.
 
-use std::os::fd::{AsFd as _, BorrowedFd};
+use std::os::fd::AsFd as _;
 
 use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
-use uav_relay_linux::counters::counted;
+use uav_relay_linux::counters::{Refusals, counted};
 use uav_relay_linux::log::{Log, Source};
-use uav_relay_linux::refusals::Refusals;
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::service::Service;
-use uav_relay_linux::sleep::sleep;
-use uav_relay_linux::{config, epoch, tap};
+use uav_relay_linux::stored::next_epoch;
+use uav_relay_linux::{config, tap};
 
 use crate::heard::Hearing;
 use crate::measurements::{Measurements, name};
@@ -61,30 +60,28 @@ impl<'a> Station<'a> {
             key: "station",
             value: name(plan.end).into(),
         };
-        let service = Service::begin(&plan.log, source, plan.status_socket.as_deref())?;
-        let mut tty = Replug::open("--tty", &plan.tty, plan.baud)?;
-        let measurements = plan.measurements.as_deref();
+        let options = &plan.options;
+        let service = Service::begin(&options.log, source, options.status_socket.as_deref())?;
+        let mut tty = Replug::open("--tty", &options.tty, options.baud)?;
+        let measurements = options.measurements.as_deref();
         let measurements = measurements
             .map(|from| Measurements::open(from, plan.end))
             .transpose()?;
         let auth = Auth {
             key: Key::new(plan.key),
-            epoch: epoch::next(&plan.epoch_file)?,
+            epoch: next_epoch(&options.epoch_file)?,
         };
         report::started(&service.log, plan, auth.epoch);
         config::tell(&plan.overrides, &service.log);
-        if let Some(asked) = &plan.capture {
-            let ports = [tty.to_string()];
-            let (taps, written) = tap::taps(env!("CARGO_BIN_NAME"), asked, &ports)?;
-            for tap in taps {
-                tty.tapped(tap);
-            }
-            tap::tell(&service.log, asked, &written);
+        if let Some(asked) = &options.capture {
+            let tty = std::iter::once(&mut tty);
+            tap::attach(&service.log, env!("CARGO_BIN_NAME"), asked, tty)?;
         }
         let loaded = &plan.loaded.mission;
-        let mut ground = Ground::new(loaded, plan.end, plan.network, plan.wiring, auth);
-        let change = plan.change.as_ref();
-        let uploading = change.map(|_| Uploading::begin(service.now(), plan, &mut ground));
+        let mut ground = Ground::new(loaded, plan.end, options.network, plan.wiring(), auth);
+        let uploading = options
+            .version
+            .map(|version| Uploading::begin(service.now(), plan, version, &mut ground));
         Ok(Self {
             plan,
             service,
@@ -107,7 +104,7 @@ impl<'a> Station<'a> {
         let log = &self.service.log;
         let silent = self.hearing.look(time, &self.ground, log);
         if let Some(why) = self.refusals.look(time, self.ground.stats(), true) {
-            log.tell(time, "rejected", format_args!("{why}"));
+            log.tell(time, "rejected", why);
         }
         let over = self.uploading(time);
         if over.is_some() {
@@ -179,14 +176,12 @@ impl<'a> Station<'a> {
         } else {
             None
         };
-        let change = plan.change.as_ref()?;
-        let over = over.or_else(|| uploading.turn(time, &service.log, plan, change, ground))?;
-        if !plan.stands {
+        let over = over.or_else(|| uploading.turn(time, &service.log, plan, ground))?;
+        if !plan.options.stand {
             return Some(over);
         }
         if let Err(fault) = over {
-            let line = fault.line;
-            service.log.tell(time, "not flown", format_args!("{line}"));
+            service.log.tell(time, "not flown", fault.line);
         }
         None
     }
@@ -230,28 +225,22 @@ impl<'a> Station<'a> {
 
     /// Sleeps until there may be something to do; returns the result after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> Over {
-        let span = self.service.until(wake);
-        let mut others: Vec<(BorrowedFd<'_>, PollFlags)> = self.service.interests().collect();
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
-        others.extend(measured.map(|fd| (fd, PollFlags::IN)));
+        let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
         let stdin = std::io::stdin();
-        let asks = self
-            .uploading
-            .as_ref()
-            .is_some_and(Uploading::is_confirming);
+        let uploading = self.uploading.as_ref();
+        let asks = uploading.is_some_and(Uploading::is_confirming);
         if asks {
             others.push((stdin.as_fd(), PollFlags::IN));
         }
-        let Ok(found) = sleep(span, std::iter::once(&mut self.tty), &others) else {
-            Service::nap(span);
-            return None;
-        };
+        let tty = std::iter::once(&mut self.tty);
+        let (found, is_over) = self.service.sleep(wake, tty, &others);
         self.is_answered = asks && found.last().is_some_and(|found| !found.is_empty());
-        Service::is_over(&found).then(|| self.stop().map_err(Fault::from))
+        is_over.then(|| self.stop().map_err(Fault::from))
     }
 
     fn stop(&self) -> Result<(), String> {
-        if !self.plan.stands {
+        if !self.plan.options.stand {
             return Err("stopped before the chain was known to fly it".to_owned());
         }
         self.service.stopping();
@@ -274,18 +263,13 @@ fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
     let Some(upload) = upload else {
         return Value::Null;
     };
-    let progress = match ground.progress() {
-        Progress::Held { .. } => "held",
-        Progress::Adopted { .. } => "adopted",
-        Progress::Refused { .. } => "refused",
-        Progress::Flown { .. } => "flown",
-        Progress::Outdated { .. } => "outdated",
-        _ => "offering",
-    };
-    let flown_by = match ground.progress() {
-        Progress::Adopted { .. } => 1,
-        Progress::Flown { relays, .. } => relays,
-        _ => 0,
+    let (progress, flown_by) = match ground.progress() {
+        Progress::Held { .. } => ("held", 0),
+        Progress::Adopted { .. } => ("adopted", 1),
+        Progress::Refused { .. } => ("refused", 0),
+        Progress::Flown { relays, .. } => ("flown", relays),
+        Progress::Outdated { .. } => ("outdated", 0),
+        _ => ("offering", 0),
     };
     json!({ "version": upload.version(), "progress": progress, "flown_by": flown_by, "relays": upload.config().relays })
 }

@@ -17,7 +17,7 @@ use uav_relay_linux::log::Log;
 use crate::change;
 use crate::forecast::moves;
 use crate::new::Basis;
-use crate::options::{Change, Plan};
+use crate::options::Plan;
 use crate::report::{self, Outside};
 
 /// Time that a relay has to send the values of its mission.
@@ -38,18 +38,21 @@ impl From<String> for Fault {
 /// Result of the upload; `None` while it goes on.
 pub(crate) type Over = Option<Result<(), Fault>>;
 
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 enum Stage {
     /// Time since when a relay is known to hold an upload with unknown values.
     Asking(Option<Instant>),
-    Confirming(Box<Upload>),
-    Uploading(Box<Upload>),
-    Over(Option<Box<Upload>>),
+    Confirming,
+    Uploading,
+    Over,
 }
 
 #[derive(Debug)]
 pub(crate) struct Uploading {
+    version: u16,
     stage: Stage,
+    /// Upload, once its values are known.
+    upload: Option<Upload>,
     progress: Progress,
     /// End of the stage; `None` while a confirmation is awaited, and at the end.
     late_at: Option<Instant>,
@@ -57,12 +60,14 @@ pub(crate) struct Uploading {
 
 impl Uploading {
     /// Starts by asking the chain for the mission that it flies.
-    pub(crate) fn begin(now: Instant, plan: &Plan, ground: &mut Ground) -> Self {
+    pub(crate) fn begin(now: Instant, plan: &Plan, version: u16, ground: &mut Ground) -> Self {
         ground.ask_flown(now);
         Self {
+            version,
             stage: Stage::Asking(None),
+            upload: None,
             progress: Progress::Idle,
-            late_at: Some(now + plan.timeout),
+            late_at: Some(now + plan.timeout()),
         }
     }
 
@@ -75,16 +80,11 @@ impl Uploading {
     }
 
     pub(crate) const fn is_confirming(&self) -> bool {
-        matches!(self.stage, Stage::Confirming(_))
+        matches!(self.stage, Stage::Confirming)
     }
 
-    /// Returns the upload, once its values are known.
-    pub(crate) fn upload(&self) -> Option<&Upload> {
-        match &self.stage {
-            Stage::Asking(_) => None,
-            Stage::Confirming(upload) | Stage::Uploading(upload) => Some(upload),
-            Stage::Over(upload) => upload.as_deref(),
-        }
+    pub(crate) const fn upload(&self) -> Option<&Upload> {
+        self.upload.as_ref()
     }
 
     /// Handles the operator's answer: a line, empty at the end of standard input.
@@ -95,19 +95,17 @@ impl Uploading {
         ground: &mut Ground,
         line: &str,
     ) -> Over {
-        let Stage::Confirming(upload) = &self.stage else {
+        let (Stage::Confirming, Some(upload)) = (self.stage, self.upload) else {
             return None;
         };
-        let upload = **upload;
         if matches!(line.trim(), "y" | "Y" | "yes") {
             return self.start(now, plan, ground, upload);
         }
-        self.stage = Stage::Over(Some(Box::new(upload)));
-        let version = upload.version();
-        Some(Err(format!(
+        self.stage = Stage::Over;
+        let version = self.version;
+        over(format!(
             "--version {version}: not confirmed, nothing was uploaded"
-        )
-        .into()))
+        ))
     }
 
     /// Advances the upload; returns its result at the end.
@@ -116,22 +114,15 @@ impl Uploading {
         now: Instant,
         log: &Log,
         plan: &Plan,
-        change: &Change,
         ground: &mut Ground,
     ) -> Over {
-        let over = match &self.stage {
-            Stage::Asking(since) => {
-                let since = *since;
-                self.asked(now, log, plan, change, ground, since)
-            }
-            Stage::Confirming(_) | Stage::Over(_) => None,
-            Stage::Uploading(upload) => {
-                let upload = **upload;
-                self.follow(now, log, plan, &upload, ground)
-            }
+        let over = match (self.stage, self.upload) {
+            (Stage::Asking(since), _) => self.asked(now, log, plan, ground, since),
+            (Stage::Uploading, Some(upload)) => self.follow(now, log, plan, &upload, ground),
+            _ => None,
         };
         if over.is_some() {
-            self.stage = Stage::Over(self.upload().copied().map(Box::new));
+            self.stage = Stage::Over;
             self.late_at = None;
         }
         over
@@ -142,37 +133,31 @@ impl Uploading {
         now: Instant,
         log: &Log,
         plan: &Plan,
-        change: &Change,
         ground: &mut Ground,
         since: Option<Instant>,
     ) -> Over {
-        let version = change.version;
-        match ground.flown().copied() {
-            Some(flown) if flown.is_known() => {
-                return self.decide(now, log, plan, change, ground, flown);
+        let version = self.version;
+        if let Some(flown) = ground.flown().copied() {
+            if flown.is_known() {
+                return self.decide(now, log, plan, ground, flown);
             }
-            Some(flown) => {
-                let since = since.unwrap_or(now);
-                self.stage = Stage::Asking(Some(since));
-                if since + VALUES <= now {
-                    if flown.version < version && change.from_loaded {
-                        return self.decide(now, log, plan, change, ground, flown);
-                    }
-                    let line = if flown.version < version {
-                        format!(
-                            "--version {version}: relay {} holds version {} and does not send its values, as an older firmware does not; give --from-loaded, and state all that is to stay as it is flown",
-                            flown.by, flown.version
-                        )
-                    } else {
-                        report::outdated(version, flown.version)
-                    };
-                    return Some(Err(line.into()));
+            let since = since.unwrap_or(now);
+            self.stage = Stage::Asking(Some(since));
+            if since + VALUES <= now {
+                if flown.version >= version {
+                    return over(report::outdated(version, flown.version));
                 }
+                if plan.options.from_loaded {
+                    return self.decide(now, log, plan, ground, flown);
+                }
+                return over(format!(
+                    "--version {version}: relay {} holds version {} and does not send its values, as an older firmware does not; give --from-loaded, and state all that is to stay as it is flown",
+                    flown.by, flown.version
+                ));
             }
-            None => {}
         }
-        let is_late = self.late_at.is_some_and(|at| at <= now);
-        is_late.then(|| Err(report::late(plan, version, Progress::Idle, ground).into()))
+        self.late_at.filter(|at| *at <= now)?;
+        over(report::late(plan, version, Progress::Idle, ground))
     }
 
     /// Builds the upload from the flown mission and shows its changes.
@@ -181,48 +166,48 @@ impl Uploading {
         now: Instant,
         log: &Log,
         plan: &Plan,
-        change: &Change,
         ground: &mut Ground,
         flown: FlownMission,
     ) -> Over {
-        let version = change.version;
+        let (version, options) = (self.version, &plan.options);
         report::flown(log, now, &flown);
         if flown.version > version {
-            return Some(Err(report::outdated(version, flown.version).into()));
+            return over(report::outdated(version, flown.version));
         }
-        let loaded = Basis::loaded(&plan.loaded.mission, change.sited);
+        let loaded = Basis::loaded(&plan.loaded.mission, plan.sited);
         let before = match flown.upload {
-            Some(upload) => Basis::flown(upload, change.sited),
+            Some(upload) => Basis::flown(upload, plan.sited),
             None => loaded,
         };
-        let basis = if change.from_loaded { loaded } else { before };
-        let upload = match change.upload(&plan.loaded.mission, &basis) {
+        let basis = if options.from_loaded { loaded } else { before };
+        let loaded = &plan.loaded.mission;
+        let upload = match options.new.upload(version, loaded, plan.sited, &basis) {
             Ok(upload) => upload,
             Err(line) => return Some(Err(Fault { line, status: 2 })),
         };
         if flown.version == version && flown.upload.is_none_or(|it| it.id() != upload.id()) {
-            return Some(Err(report::outdated(version, flown.version).into()));
+            return over(report::outdated(version, flown.version));
         }
-        let after = Basis::flown(upload, change.sited);
+        let after = Basis::flown(upload, plan.sited);
         change::tell(log, now, &before, &after);
         let lines = [before.line, after.line];
         let moves = moves(&plan.loaded, flown.upload.as_ref(), &upload, lines);
         change::tell_moves(log, now, moves.as_deref());
         if let Some(outside) = Outside::of(plan, &upload)
-            && !change.no_fence
+            && !options.no_fence
         {
             let outside = outside.line(moves.as_deref());
-            return Some(Err(format!("--version {version}: {outside}").into()));
+            return over(format!("--version {version}: {outside}"));
         }
-        if change.dry_run {
+        if options.dry_run {
             let what = format_args!("version {version} was not uploaded");
             log.tell(now, "dry run", what);
             return Some(Ok(()));
         }
-        if change.yes {
+        if options.yes {
             return self.start(now, plan, ground, upload);
         }
-        self.stage = Stage::Confirming(Box::new(upload));
+        (self.stage, self.upload) = (Stage::Confirming, Some(upload));
         self.late_at = None;
         // Earlier log lines must be printed before the question. A closed standard error is ignored.
         log.flush(std::time::Duration::from_millis(500));
@@ -234,10 +219,10 @@ impl Uploading {
 
     fn start(&mut self, now: Instant, plan: &Plan, ground: &mut Ground, upload: Upload) -> Over {
         if let Err(error) = ground.upload(now, upload) {
-            return Some(Err(error.to_string().into()));
+            return over(error.to_string());
         }
-        self.stage = Stage::Uploading(Box::new(upload));
-        self.late_at = Some(now + plan.timeout);
+        (self.stage, self.upload) = (Stage::Uploading, Some(upload));
+        self.late_at = Some(now + plan.timeout());
         None
     }
 
@@ -264,6 +249,12 @@ impl Uploading {
                 report::late(plan, upload.version(), progress, ground)
             }
         };
-        Some(Err(fault.into()))
+        over(fault)
     }
+}
+
+/// Ends the upload with a fault.
+#[expect(clippy::unnecessary_wraps, reason = "as the stages return it")]
+fn over(line: String) -> Over {
+    Some(Err(line.into()))
 }

@@ -20,9 +20,9 @@ use uav_relay::flight::course::Course;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Duration, Event, Instant, Mission, Relay};
 
-use super::config::{self, Sites};
-use super::port::{self, OUTGOING, Port, Queues, Slot};
-use super::{board, chip, log};
+use crate::firmware::config::{self, Sites};
+use crate::firmware::port::{self, OUTGOING, Port, Queues, Slot};
+use crate::firmware::{board, chip, log};
 
 /// Capacity of the receive queue, bytes: 44 ms. An autopilot sends bursts, and the main loop may be busy with a sweep.
 const RECEIVED: usize = 512;

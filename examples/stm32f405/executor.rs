@@ -7,8 +7,8 @@ use core::task::{Context, Poll, RawWaker, RawWakerVTable, Waker};
 
 use uav_relay::Instant;
 
-use super::chip;
-use super::clock::{self, Clock};
+use crate::firmware::chip;
+use crate::firmware::clock::{self, Clock};
 
 /// Clock of the board, and the earliest wake-up time of the task.
 pub(crate) struct Time {

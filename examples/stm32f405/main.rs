@@ -17,56 +17,37 @@
 //! | `main.rs` | entry point with a serial port to each neighbour |
 //! | `main_radio.rs` | entry point of `stm32f405_radio`, with one serial port to a radio |
 //! | `main_async.rs` | entry point of `stm32f405_async`, on asynchronous ports |
-//! | `wires.rs`, `radio.rs` | pins and interrupts, for either wiring |
-//! | `executor.rs`, `ports.rs` | executor and asynchronous ports of `stm32f405_async` |
-//! | `drone.rs` | drone as defined by its configuration block, for either wiring |
+//! | `wires.rs` | pins of the second neighbour's port |
 //! | `main_loop.rs` | main loop |
+//! | `executor.rs`, `ports.rs` | executor and asynchronous ports of `stm32f405_async` |
 //! | `autopilot.rs`, `no_autopilot.rs` | autopilot link with the feature `flight`, and its replacement |
-//! | `uploads.rs` | journal of uploaded missions, with the feature `upload` |
-//! | `persistent.rs` | storing and restoring of uploads and votes |
-//! | `flash.rs` | flash sectors of the journals, with their unsafe code |
-//! | `port.rs` | interrupt-driven serial port |
-//! | `chip.rs` | clocks, watchdog, cause of the last reset |
-//! | `clock.rs` | time and sleep |
-//! | `log.rs`, `no_log.rs` | log with `--features defmt`, and its replacement |
-//! | `sink_uart.rs`, `sink_rtt.rs` | log output: a spare UART, or the debug probe with `--features rtt` |
-//! | `board.rs` | all other unsafe code |
+//! | `firmware/pins.rs` | pins of every image |
+//! | `firmware/drone.rs` | drone as defined by its configuration block, for either wiring |
+//! | `firmware/persistent.rs` | storing and restoring of uploads and votes |
+//! | `firmware/uploads.rs` | journal of uploaded missions, with the feature `upload` |
+//! | `firmware/flash.rs` | flash sectors of the journals, with their unsafe code |
+//! | `firmware/port.rs` | interrupt-driven serial port |
+//! | `firmware/chip.rs` | clocks, watchdog, cause of the last reset |
+//! | `firmware/clock.rs` | time and sleep |
+//! | `firmware/log.rs` | log, with `--features defmt` |
+//! | `firmware/uart_log.rs` | log output over a spare UART, unless the debug probe has it (`--features rtt`) |
+//! | `firmware/board.rs` | all other unsafe code |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 #[cfg_attr(not(feature = "flight"), path = "no_autopilot.rs")]
 mod autopilot;
 #[cfg(target_os = "none")]
-mod board;
-#[cfg(target_os = "none")]
-mod chip;
-#[cfg(target_os = "none")]
-mod clock;
-#[cfg(target_os = "none")]
-mod drone;
-#[cfg(target_os = "none")]
-mod flash;
-#[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "defmt"), path = "no_log.rs")]
-mod log;
+mod firmware;
 #[cfg(target_os = "none")]
 mod main_loop;
-#[cfg(target_os = "none")]
-mod persistent;
-#[cfg(target_os = "none")]
-mod port;
-#[cfg(all(target_os = "none", feature = "upload"))]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod uploads;
 #[cfg(target_os = "none")]
 mod wires;
 
 #[cfg(target_os = "none")]
-use uav_relay_block as config;
-
-#[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    use firmware::{board, drone};
     use uav_relay::Wiring;
 
     let Some((mut clock, links, uart)) = connect() else {
@@ -82,7 +63,8 @@ fn main() -> ! {
 /// Creates the links in static RAM; not inlined, so that its stack frame is released.
 #[cfg(target_os = "none")]
 #[inline(never)]
-fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
+fn connect() -> Option<(firmware::clock::Clock, &'static mut Links, autopilot::Uart)> {
+    use firmware::port;
     use uav_relay::serial::{Pair, SerialLink};
 
     let (clock, upstream, downstream, uart) = wires::start()?;
@@ -94,7 +76,7 @@ fn connect() -> Option<(clock::Clock, &'static mut Links, autopilot::Uart)> {
 }
 
 #[cfg(target_os = "none")]
-type Links = uav_relay::serial::Pair<port::Port, port::Port>;
+type Links = uav_relay::serial::Pair<firmware::port::Port, firmware::port::Port>;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

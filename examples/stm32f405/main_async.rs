@@ -7,40 +7,25 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-mod board;
-#[cfg(target_os = "none")]
-mod chip;
-#[cfg(target_os = "none")]
-mod clock;
-#[cfg(target_os = "none")]
-mod drone;
-#[cfg(target_os = "none")]
 mod executor;
 #[cfg(target_os = "none")]
-mod flash;
-#[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "defmt"), path = "no_log.rs")]
-#[allow(dead_code, reason = "what only an autopilot logs")]
-mod log;
+#[allow(
+    dead_code,
+    reason = "parts that only polled ports or an autopilot need"
+)]
+mod firmware;
 #[cfg(target_os = "none")]
 #[allow(dead_code, reason = "what only polled ports call")]
 mod no_autopilot;
 #[cfg(target_os = "none")]
-mod persistent;
-#[cfg(target_os = "none")]
-mod port;
-#[cfg(target_os = "none")]
 mod ports;
-#[cfg(all(target_os = "none", feature = "upload"))]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod uploads;
 #[cfg(target_os = "none")]
 mod wires;
 
 #[cfg(target_os = "none")]
-use no_autopilot as autopilot;
+use firmware::{board, chip, clock, drone, log, port};
 #[cfg(target_os = "none")]
-use uav_relay_block as config;
+use no_autopilot as autopilot;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
@@ -109,7 +94,7 @@ async fn tell(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infal
             log::event(event, relay);
             #[cfg(feature = "upload")]
             if event == uav_relay::Event::Uploaded {
-                persistent::keep_upload(relay);
+                firmware::persistent::keep_upload(relay);
             }
         });
     }

@@ -6,12 +6,12 @@ use uav_relay::Event;
 use uav_relay::serial::{Pair, SerialLink, SerialPort, Shared};
 use uav_relay::{Instant, Sample};
 
-use super::chip;
-use super::clock::Clock;
-use super::drone::Drone;
-use super::log;
+use crate::firmware::chip;
+use crate::firmware::clock::Clock;
+use crate::firmware::drone::Drone;
+use crate::firmware::log;
 #[cfg(feature = "upload")]
-use super::persistent;
+use crate::firmware::persistent;
 
 pub(crate) trait Links {
     /// Exchanges bytes between the ports and the relay, and stores its votes between receiving and sending. Returns the time of

@@ -4,43 +4,22 @@
 //! ```text
 //! cargo run --profile firmware --target thumbv7em-none-eabihf --example stm32f405_radio     # flashes, with probe-rs
 //! ```
-//! `radio.rs` has the pins; everything else, and the configuration of a drone, is that of `main.rs`.
+//! The radio, or the transceiver of a bus, is at USART2. PA1 is the driver enable, if the radio has one: high while this relay sends.
+//! Everything else, and the configuration of a drone, is that of `main.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 #[cfg_attr(not(feature = "flight"), path = "no_autopilot.rs")]
 mod autopilot;
 #[cfg(target_os = "none")]
-mod board;
-#[cfg(target_os = "none")]
-mod chip;
-#[cfg(target_os = "none")]
-mod clock;
-#[cfg(target_os = "none")]
-mod drone;
-#[cfg(target_os = "none")]
-mod flash;
-#[cfg(target_os = "none")]
-#[cfg_attr(not(feature = "defmt"), path = "no_log.rs")]
-mod log;
+mod firmware;
 #[cfg(target_os = "none")]
 mod main_loop;
-#[cfg(target_os = "none")]
-mod persistent;
-#[cfg(target_os = "none")]
-mod port;
-#[cfg(target_os = "none")]
-mod radio;
-#[cfg(all(target_os = "none", feature = "upload"))]
-#[expect(unreachable_pub, reason = "the tests on the ground have it public")]
-mod uploads;
-
-#[cfg(target_os = "none")]
-use uav_relay_block as config;
 
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    use firmware::{board, drone};
     use uav_relay::Wiring;
 
     let Some((mut clock, channel, uart)) = connect() else {
@@ -56,18 +35,27 @@ fn main() -> ! {
 /// Creates the link in static RAM; not inlined, so that its stack frame is released.
 #[cfg(target_os = "none")]
 #[inline(never)]
-fn connect() -> Option<(clock::Clock, &'static mut Channel, autopilot::Uart)> {
+fn connect() -> Option<(
+    firmware::clock::Clock,
+    &'static mut Channel,
+    autopilot::Uart,
+)> {
+    use firmware::{pins, port};
     use uav_relay::serial::{SerialLink, Shared};
 
-    let (clock, channel, driver_enable, uart) = radio::start()?;
+    let board = pins::start()?;
+    let driver_enable = board.pa1.into_push_pull_output();
     let channel = cortex_m::singleton!(
-        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(channel, port::BAUD, driver_enable))
+        CHANNEL: Channel = Shared::new(SerialLink::half_duplex(board.first, port::BAUD, driver_enable))
     )?;
-    Some((clock, channel, uart))
+    Some((board.clock, channel, board.uart))
 }
 
 #[cfg(target_os = "none")]
-type Channel = uav_relay::serial::Shared<port::Port, radio::DriverEnable>;
+type Channel = uav_relay::serial::Shared<
+    firmware::port::Port,
+    stm32f4xx_hal::gpio::PA1<stm32f4xx_hal::gpio::Output>,
+>;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

@@ -6,8 +6,8 @@ use stm32f4xx_hal::rcc::Rcc;
 use uav_relay::GuardConfig;
 use uav_relay::{Event, Instant, Mission, Relay};
 
-use super::config::Sites;
-use super::log;
+use crate::firmware::config::Sites;
+use crate::firmware::log;
 
 pub(crate) struct Uart;
 

@@ -10,8 +10,8 @@ use uav_relay::Duration;
 use uav_relay::asynch::Clock as _;
 use uav_relay::serial::SerialPort as _;
 
-use super::executor::Time;
-use super::port::Port;
+use crate::executor::Time;
+use crate::firmware::port::Port;
 
 /// Pause before the next attempt on a full port; 11 bytes leave meanwhile.
 const PAUSE: Duration = Duration::from_millis(1);

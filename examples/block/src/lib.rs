@@ -63,21 +63,23 @@
 //! | --- | --- |
 //! | `lib.rs` | table, and the check of a block |
 //! | `types.rs` | content of a block, and its errors |
-//! | `reader.rs` | numbers from bytes |
+//! | `layout.rs` | bytes as a structure, and the checks of its groups |
 //! | `write.rs` | writer of a block, on the ground only |
 
 #![cfg_attr(target_os = "none", no_std)]
 #![forbid(unsafe_code)]
 
-mod reader;
+mod layout;
 mod types;
 #[cfg(not(target_os = "none"))]
 mod write;
 
 use uav_relay::CRC_32C;
-use uav_relay::{FieldPoint, Identity, Interferer, Method, Mission, MissionConfig};
+use uav_relay::{FieldPoint, Identity, Method, Mission, MissionConfig};
 
-use reader::Reader;
+use zerocopy::little_endian::F64;
+
+use layout::{Layout, band, profile};
 pub use types::{ChannelNumbers, Config, ConfigError, Secret, Sites};
 #[cfg(not(target_os = "none"))]
 pub use write::write;
@@ -102,24 +104,6 @@ pub const MAX_POINTS: usize = 16;
 
 /// Number of bytes covered by the CRC.
 const CHECKED: usize = LEN - 4;
-
-/// Offset of the epoch and the key.
-const SECRET: usize = 252;
-
-/// Offset of the sites.
-const SITES: usize = SECRET + 36;
-
-/// Offset of the autopilot's key.
-const AUTOPILOT_KEY: usize = SITES + 28;
-
-/// Offset of the noise power.
-const NOISE: usize = AUTOPILOT_KEY + 32;
-
-/// Offset of the sensing settings.
-const LISTEN: usize = NOISE + 4;
-
-/// Offset of the silence.
-const SILENCE: usize = LISTEN + 20;
 
 /// Longest silence until a neighbour is probed, ms.
 pub const MOST_PROBE_AFTER_MS: u32 = 1_200_000;
@@ -150,93 +134,71 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);
     }
-    let mut rest = Reader(block);
-    if rest.take() != MAGIC {
+    let raw: &Layout = zerocopy::transmute_ref!(block);
+    if raw.magic != MAGIC {
         return Err(ConfigError::Magic);
     }
-    if rest.u16() != VERSION || rest.u16() != LEN_FIELD {
+    if raw.version != VERSION || raw.length != LEN_FIELD {
         return Err(ConfigError::Version);
     }
-    let (checked, check) = block.split_at(CHECKED);
-    if crc(checked).to_le_bytes() != *check {
+    let (checked, _) = block.split_at(CHECKED);
+    if raw.crc != crc(checked) {
         return Err(ConfigError::Crc);
     }
-    let index = rest.u16();
-    let network = rest.u16();
-    let relays = rest.u16();
-    let [method, hold] = rest.take();
-    let distance_m = rest.f32();
-    let min_separation_m = rest.f32();
-    let tx_power_w = rest.f32();
-    let common = rest.profile();
-    let profile = rest.profile();
-    let interferer = Interferer {
-        power_w: rest.f32(),
-        x_m: rest.f32(),
-        y_m: rest.f32(),
-    };
-    let tolerance = rest.f32();
-    let numbers = ChannelNumbers {
-        carrier_hz: rest.f64(),
-        excess_los: rest.f64(),
-        excess_nlos: rest.f64(),
-        los_weight: rest.f64(),
-    };
-    let band = rest.band();
-    let lateral = rest.band();
-    let method = rest.method(method)?;
-    let points = rest.u16();
-    let measure = rest.measure()?;
-    let (_, listen) = block.split_at(LISTEN);
-    let listen = Reader(listen).listen()?;
-    if listen.is_some() && points > 0 {
-        return Err(ConfigError::Listen);
-    }
-    let interference = rest.interference(points, interferer, listen.is_some(), room)?;
-    let (_, sites) = block.split_at(SITES);
-    let sites = Reader(sites).sites()?;
+    let method = raw.method()?;
+    let measure = raw.measure()?;
+    let listen = raw.listen()?;
+    let interference = raw.interference(listen.is_some(), room)?;
+    let sites = raw.sites()?;
     if sites.is_none() && autopilot_key(block).is_some() {
         return Err(ConfigError::AutopilotKey);
     }
-    let (_, noise) = block.split_at(NOISE);
-    let noise_w = Reader(noise).f32();
-    let (_, silence) = block.split_at(SILENCE);
-    let probe_after_ms = Reader(silence).u32();
+    let probe_after_ms = raw.probe_after_ms.get();
     if probe_after_ms > MOST_PROBE_AFTER_MS {
         return Err(ConfigError::Silence);
     }
-    let channel = numbers.channel().map_err(ConfigError::Channel)?;
+    let [carrier_hz, excess_los, excess_nlos, los_weight] = raw.channel.map(F64::get);
+    let numbers = ChannelNumbers {
+        carrier_hz,
+        excess_los,
+        excess_nlos,
+        los_weight,
+    };
     let mission = Mission::try_new(MissionConfig {
-        relays,
-        distance_m,
-        min_separation_m,
-        tx_power_w,
-        common,
-        band,
-        lateral,
-        channel,
+        relays: raw.relays.get(),
+        distance_m: raw.distance_m.get(),
+        min_separation_m: raw.min_separation_m.get(),
+        tx_power_w: raw.tx_power_w.get(),
+        common: profile(raw.common),
+        band: band(raw.band),
+        lateral: band(raw.lateral),
+        channel: numbers.channel().map_err(ConfigError::Channel)?,
         interference,
-        noise_w,
-        tolerance,
+        noise_w: raw.noise_w.get(),
+        tolerance: raw.tolerance.get(),
     })
     .map_err(ConfigError::Mission)?;
-    if index < 1 || index > relays {
+    let (index, profile) = (raw.index.get(), profile(raw.own));
+    if index < 1 || index > raw.relays.get() {
         return Err(ConfigError::Index);
     }
     if !profile.is_valid() {
         return Err(ConfigError::Profile);
     }
-    if hold > 1 {
+    if raw.hold > 1 {
         return Err(ConfigError::Hold);
     }
-    if method != Method::Align && points > 0 {
+    if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
     }
     Ok(Config {
-        identity: Identity { network, index },
+        identity: Identity {
+            network: raw.network.get(),
+            index,
+        },
         mission,
         profile,
-        hold_altitude: hold == 1,
+        hold_altitude: raw.hold == 1,
         method,
         measure,
         listen,
@@ -250,10 +212,8 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
 /// # Errors
 /// [`ConfigError::Secret`] for a key without an epoch, or an epoch without a key.
 pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
-    let (_, rest) = block.split_at(SECRET);
-    let mut rest = Reader(rest);
-    let epoch = rest.u32();
-    let key = rest.take();
+    let raw: &Layout = zerocopy::transmute_ref!(block);
+    let (key, epoch) = (raw.key, raw.epoch.get());
     match (epoch, key.iter().all(|&byte| byte == 0)) {
         (0, true) => Ok(None),
         (1..=0xFFFF_FFFE, false) => Ok(Some(Secret { key, epoch })),
@@ -263,8 +223,8 @@ pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
 
 /// Returns the autopilot's signing key in a block that [`read`] has accepted.
 pub fn autopilot_key(block: &Block) -> Option<[u8; 32]> {
-    let (_, rest) = block.split_at(AUTOPILOT_KEY);
-    let key = Reader(rest).take();
+    let raw: &Layout = zerocopy::transmute_ref!(block);
+    let key = raw.autopilot_key;
     key.iter().any(|&byte| byte != 0).then_some(key)
 }
 

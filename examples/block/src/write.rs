@@ -1,11 +1,11 @@
 //! Writer of a block.
 
 use uav_relay::{Interference, Interferer, Method};
+use zerocopy::little_endian::{F32, F64, I32, U64};
+use zerocopy::{FromZeros as _, IntoBytes as _};
 
-use super::{
-    AUTOPILOT_KEY, Block, ChannelNumbers, Config, LEN, LEN_FIELD, MAGIC, SECRET, SILENCE, SITES,
-    Secret, Sites, VERSION, crc,
-};
+use super::layout::Layout;
+use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VERSION, crc};
 
 /// Returns the block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of its channel.
 ///
@@ -31,89 +31,58 @@ pub fn write(
         Method::Joint => (1, 0, 0.0),
         Method::Adjust(adjust) => (2, adjust.rounds, adjust.explore_m),
     };
-    let (i_max_w, samples) = config
-        .measure
-        .map_or((0.0, 0), |measure| (measure.i_max_w, measure.samples));
-    let mut bytes = Vec::with_capacity(LEN);
-    bytes.extend(MAGIC);
-    for number in [
-        VERSION,
-        LEN_FIELD,
-        config.identity.index,
-        config.identity.network,
-        mission.relays,
-    ] {
-        bytes.extend(number.to_le_bytes());
+    let (common, own) = (mission.common, config.profile);
+    let mut block = Layout {
+        magic: MAGIC,
+        version: VERSION.into(),
+        length: LEN_FIELD.into(),
+        index: config.identity.index.into(),
+        network: config.identity.network.into(),
+        relays: mission.relays.into(),
+        method,
+        hold: config.hold_altitude.into(),
+        distance_m: mission.distance_m.into(),
+        min_separation_m: mission.min_separation_m.into(),
+        tx_power_w: mission.tx_power_w.into(),
+        common: [common.altitude_m, common.power_w].map(F32::new),
+        own: [own.altitude_m, own.power_w].map(F32::new),
+        interferer: [source.power_w, source.x_m, source.y_m].map(F32::new),
+        tolerance: mission.tolerance.into(),
+        channel: [
+            numbers.carrier_hz,
+            numbers.excess_los,
+            numbers.excess_nlos,
+            numbers.los_weight,
+        ]
+        .map(F64::new),
+        band: [mission.band.least_m, mission.band.most_m].map(F32::new),
+        lateral: [mission.lateral.least_m, mission.lateral.most_m].map(F32::new),
+        explore_m: explore_m.into(),
+        rounds: rounds.into(),
+        points: u16::try_from(points.len()).unwrap_or(u16::MAX).into(),
+        noise_w: mission.noise_w.into(),
+        autopilot_key: autopilot_key.unwrap_or_default(),
+        probe_after_ms: config.probe_after_ms.into(),
+        ..Layout::new_zeroed()
+    };
+    for (place, point) in block.field.iter_mut().zip(points) {
+        *place = [point.x_m, point.upsilon_per_w].map(F32::new);
     }
-    bytes.extend([method, u8::from(config.hold_altitude)]);
-    for number in [
-        mission.distance_m,
-        mission.min_separation_m,
-        mission.tx_power_w,
-        mission.common.altitude_m,
-        mission.common.power_w,
-        config.profile.altitude_m,
-        config.profile.power_w,
-        source.power_w,
-        source.x_m,
-        source.y_m,
-        mission.tolerance,
-    ] {
-        bytes.extend(number.to_le_bytes());
+    if let Some(measure) = config.measure {
+        (block.i_max_w, block.samples) = (measure.i_max_w.into(), measure.samples.into());
     }
-    for number in [
-        numbers.carrier_hz,
-        numbers.excess_los,
-        numbers.excess_nlos,
-        numbers.los_weight,
-    ] {
-        bytes.extend(number.to_le_bytes());
-    }
-    for number in [
-        mission.band.least_m,
-        mission.band.most_m,
-        mission.lateral.least_m,
-        mission.lateral.most_m,
-        explore_m,
-    ] {
-        bytes.extend(number.to_le_bytes());
-    }
-    for number in [rounds, u16::try_from(points.len()).unwrap_or(u16::MAX)] {
-        bytes.extend(number.to_le_bytes());
-    }
-    bytes.extend(i_max_w.to_le_bytes());
-    bytes.extend(samples.to_le_bytes());
-    for point in points {
-        bytes.extend(point.x_m.to_le_bytes());
-        bytes.extend(point.upsilon_per_w.to_le_bytes());
-    }
-    bytes.resize(SECRET, 0);
     if let Some(Secret { key, epoch }) = secret {
-        bytes.extend(epoch.to_le_bytes());
-        bytes.extend(key);
+        (block.key, block.epoch) = (key, epoch.into());
     }
-    bytes.resize(SITES, 0);
-    if let Some(Sites { ends, speed_m_s }) = config.sites {
-        for number in ends.as_flattened() {
-            bytes.extend(number.to_le_bytes());
-        }
-        bytes.extend(speed_m_s.to_le_bytes());
+    if let Some(sites) = config.sites {
+        block.ends = sites.ends.map(|site| site.map(I32::new));
+        block.speed_m_s = sites.speed_m_s.into();
     }
-    bytes.resize(AUTOPILOT_KEY, 0);
-    bytes.extend(autopilot_key.unwrap_or_default());
-    bytes.extend(mission.noise_w.to_le_bytes());
     if let Some(listen) = config.listen {
-        bytes.extend(listen.every.as_micros().to_le_bytes());
-        bytes.extend(listen.half_life.as_micros().to_le_bytes());
-        bytes.extend(listen.relative_error.to_le_bytes());
+        block.listen_us = [listen.every, listen.half_life].map(|span| U64::new(span.as_micros()));
+        block.relative_error = listen.relative_error.into();
     }
-    bytes.resize(SILENCE, 0);
-    bytes.extend(config.probe_after_ms.to_le_bytes());
-    let check = crc(&bytes);
-    bytes.extend(check.to_le_bytes());
-    let mut block = [0; LEN];
-    for (place, byte) in block.iter_mut().zip(bytes) {
-        *place = byte;
-    }
-    block
+    let (checked, _) = block.as_bytes().split_at(CHECKED);
+    block.crc = crc(checked).into();
+    zerocopy::transmute!(block)
 }

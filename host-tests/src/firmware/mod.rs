@@ -21,7 +21,7 @@ pub mod network;
 pub mod ram;
 #[cfg(unix)]
 pub mod slow;
-#[path = "../../../examples/stm32f405/uploads.rs"]
+#[path = "../../../examples/stm32f405/firmware/uploads.rs"]
 pub mod uploads;
 
 pub use uav_relay_kept::{epoch, journal, views};

@@ -28,6 +28,7 @@ use embassy_time::{Duration, Timer};
 use embedded_hal::digital::OutputPin;
 use embedded_io_async::{Read, Write};
 use embedded_storage::nor_flash::NorFlash;
+use static_cell::StaticCell;
 use uav_relay::asynch::{AsyncAutopilot, AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::{Instant, Relay, ViewRecord, Wiring};
 use uav_relay_chip::watchdog;
@@ -57,6 +58,28 @@ impl Clock for EmbassyClock {
 
 /// Size of the receive buffer of an autopilot's UART, bytes: it sends bursts.
 pub const BURST: usize = 512;
+
+/// Static buffers of a UART driver, which receives into `IN` bytes.
+pub struct Buffers<const IN: usize = BUFFER> {
+    sent: StaticCell<[u8; BUFFER]>,
+    received: StaticCell<[u8; IN]>,
+}
+
+impl<const IN: usize> Buffers<IN> {
+    /// Creates unused buffers.
+    #[expect(clippy::new_without_default, reason = "they are statics")]
+    pub const fn new() -> Self {
+        Self {
+            sent: StaticCell::new(),
+            received: StaticCell::new(),
+        }
+    }
+
+    /// Returns the send and the receive buffer, once.
+    pub fn take(&'static self) -> (&'static mut [u8], &'static mut [u8]) {
+        (self.sent.init([0; BUFFER]), self.received.init([0; IN]))
+    }
+}
 
 /// Longest time between two feedings of the watchdog while the relay makes progress.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
@@ -100,25 +123,19 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     autopilot: Option<(AR, AW)>,
     feed: &mut dyn FnMut(),
 ) -> Result<Infallible, Refused> {
-    let Drone {
-        relay,
-        mut votes,
-        autopilot: link,
-    } = begin(room, board, Wiring::Pair, autopilot.is_some())?;
-    let relay = AsyncRelay::new(relay);
     let mut ports = AsyncPair::new(
         AsyncLink::new(up_rx, up_tx, BAUD),
         AsyncLink::new(down_rx, down_tx, BAUD),
     );
-    let beside = beside(&relay, link.as_ref(), autopilot);
-    let store = |record: &ViewRecord| {
-        if let Some(votes) = &mut votes {
-            votes.store(record);
-        }
-        true
-    };
-    let runs = ports.run(&relay, &EmbassyClock, store);
-    Ok(join3(runs, beside, watch(&relay, feed)).await.0)
+    fly_over(
+        room,
+        board,
+        Wiring::Pair,
+        autopilot,
+        feed,
+        async |relay, store| ports.run(relay, &EmbassyClock, store).await,
+    )
+    .await
 }
 
 /// Flies the relay with one UART to a radio shared by all relays; `pin` is high while this one sends.
@@ -133,32 +150,43 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     autopilot: Option<(AR, AW)>,
     feed: &mut dyn FnMut(),
 ) -> Result<Infallible, Refused> {
+    let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
+    fly_over(
+        room,
+        board,
+        Wiring::Shared,
+        autopilot,
+        feed,
+        async |relay, store| ports.run(relay, &EmbassyClock, store).await,
+    )
+    .await
+}
+
+/// Flies the relay of `board` over the ports that `run` serves. It stores a changed record before it sends.
+async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
+    room: &'static mut Room,
+    board: Board<F>,
+    wiring: Wiring,
+    autopilot: Option<(AR, AW)>,
+    feed: &mut dyn FnMut(),
+    run: impl AsyncFnOnce(&AsyncRelay<'_>, &mut dyn FnMut(&ViewRecord) -> bool) -> Infallible,
+) -> Result<Infallible, Refused> {
+    let drone = drone::begin(room, board, wiring, autopilot.is_some(), EmbassyClock.now());
     let Drone {
         relay,
         mut votes,
         autopilot: link,
-    } = begin(room, board, Wiring::Shared, autopilot.is_some())?;
+    } = drone.inspect_err(|why| log::refused(*why))?;
     let relay = AsyncRelay::new(relay);
-    let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
-    let beside = beside(&relay, link.as_ref(), autopilot);
-    let store = |record: &ViewRecord| {
+    let mut store = |record: &ViewRecord| {
         if let Some(votes) = &mut votes {
             votes.store(record);
         }
         true
     };
-    let runs = ports.run(&relay, &EmbassyClock, store);
+    let runs = run(&relay, &mut store);
+    let beside = beside(&relay, link.as_ref(), autopilot);
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
-}
-
-fn begin<F: NorFlash>(
-    room: &'static mut Room,
-    board: Board<F>,
-    wiring: Wiring,
-    flies: bool,
-) -> Result<Drone<F>, Refused> {
-    let now = EmbassyClock.now();
-    drone::begin(room, board, wiring, flies, now).inspect_err(|why| log::refused(*why))
 }
 
 /// Runs the autopilot's port, for a drone with sites, and the log.

@@ -18,25 +18,13 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use defmt_rtt as _;
 use embassy_stm32::flash::{Blocking, Flash};
-use embassy_stm32::interrupt::typelevel::Binding;
-use embassy_stm32::peripherals::{FLASH, PA9, PA10, PC6, PC7, PC10, PC11, USART1, USART3, USART6};
-use embassy_stm32::rcc;
-use embassy_stm32::time::Hertz;
-use embassy_stm32::usart::{
-    BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
-    Instance, RxPin, TxPin,
-};
-use embassy_stm32::{Peri, Peripherals, bind_interrupts};
-use panic_probe as _;
+use embassy_stm32::peripherals::{FLASH, USART1, USART3, USART6};
+use embassy_stm32::usart::BufferedInterruptHandler;
+use embassy_stm32::{Peri, bind_interrupts};
 use relay_app::board::{Board, Storage};
-use relay_app::{BAUD, BUFFER, BURST};
-use static_cell::StaticCell;
-use uav_relay_chip::clock::{self, Clocks, NUCLEO_F446RE as PLAN, Source};
-use uav_relay_chip::registers::Chip;
-use uav_relay_chip::reset::Reset;
-use uav_relay_chip::watchdog;
+use relay_stm32::seed;
+pub use uav_relay_chip::clock::NUCLEO_F446RE as PLAN;
 
 bind_interrupts!(
     /// Interrupt handlers of the UARTs.
@@ -46,62 +34,6 @@ bind_interrupts!(
         USART6 => BufferedInterruptHandler<USART6>;
     }
 );
-
-/// Starts the watchdog and the clocks; returns the peripherals and the cause of the last reset.
-///
-/// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
-/// between, the watchdog restarts the chip.
-pub fn init() -> (Peripherals, Reset) {
-    let reset = Reset::take(&mut Chip);
-    watchdog::start(&mut Chip);
-    let clocks = clock::probe(&mut Chip, &PLAN);
-    let mut config = embassy_stm32::Config::default();
-    config.rcc = tree(clocks);
-    let peripherals = embassy_stm32::init(config);
-    clock::cache_flash(&mut Chip);
-    defmt::info!("clock {} MHz", clocks.core_hz / 1_000_000);
-    (peripherals, reset)
-}
-
-/// Feeds the watchdog.
-pub fn feed() {
-    watchdog::feed(&mut Chip);
-}
-
-/// Returns Embassy's settings for the probed clocks.
-fn tree(clocks: Clocks) -> rcc::Config {
-    let mut config = rcc::Config::new();
-    let (Some(source), Some(crystal)) = (clocks.pll, PLAN.crystal) else {
-        return config;
-    };
-    let prediv = match source {
-        Source::Crystal => {
-            config.hse = Some(rcc::Hse {
-                freq: Hertz(crystal.hz),
-                mode: rcc::HseMode::Bypass,
-            });
-            config.pll_src = rcc::PllSource::HSE;
-            rcc::PllPreDiv::DIV4
-        }
-        Source::Internal => rcc::PllPreDiv::DIV8,
-    };
-    let mul = if clocks.core_hz == 180_000_000 {
-        rcc::PllMul::MUL180
-    } else {
-        rcc::PllMul::MUL168
-    };
-    config.pll = Some(rcc::Pll {
-        prediv,
-        mul,
-        divp: Some(rcc::PllPDiv::DIV2),
-        divq: None,
-        divr: None,
-    });
-    config.sys = rcc::Sysclk::PLL1_P;
-    config.apb1_pre = rcc::APBPrescaler::DIV4;
-    config.apb2_pre = rcc::APBPrescaler::DIV2;
-    config
-}
 
 /// Creates the board. An erase stops its CPU: 0.25 s for 16 KiB, 0.55 s for 64 KiB, twice that at most.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
@@ -114,75 +46,4 @@ pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
             views: [0x4000..0x8000, 0x8000..0xC000],
         },
     )
-}
-
-type Halves = (BufferedUartRx<'static>, BufferedUartTx<'static>);
-type Buffer = StaticCell<[u8; BUFFER]>;
-
-/// Returns reader and writer of USART1.
-///
-/// # Errors
-/// The UART's clock does not permit the baud rate.
-pub fn usart1(
-    uart: Peri<'static, USART1>,
-    tx: Peri<'static, PA9>,
-    rx: Peri<'static, PA10>,
-) -> Result<Halves, ConfigError> {
-    static SENT: Buffer = StaticCell::new();
-    static RECEIVED: Buffer = StaticCell::new();
-    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BUFFER]));
-    halves(uart, tx, rx, sent, received)
-}
-
-/// Returns reader and writer of USART3.
-///
-/// # Errors
-/// The UART's clock does not permit the baud rate.
-pub fn usart3(
-    uart: Peri<'static, USART3>,
-    tx: Peri<'static, PC10>,
-    rx: Peri<'static, PC11>,
-) -> Result<Halves, ConfigError> {
-    static SENT: Buffer = StaticCell::new();
-    static RECEIVED: Buffer = StaticCell::new();
-    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BUFFER]));
-    halves(uart, tx, rx, sent, received)
-}
-
-/// Returns reader and writer of USART6, to the autopilot.
-///
-/// # Errors
-/// The UART's clock does not permit the baud rate.
-pub fn usart6(
-    uart: Peri<'static, USART6>,
-    tx: Peri<'static, PC6>,
-    rx: Peri<'static, PC7>,
-) -> Result<Halves, ConfigError> {
-    static SENT: Buffer = StaticCell::new();
-    static RECEIVED: StaticCell<[u8; BURST]> = StaticCell::new();
-    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BURST]));
-    halves(uart, tx, rx, sent, received)
-}
-
-fn halves<T: Instance>(
-    uart: Peri<'static, T>,
-    tx: Peri<'static, impl TxPin<T>>,
-    rx: Peri<'static, impl RxPin<T>>,
-    sent: &'static mut [u8],
-    received: &'static mut [u8],
-) -> Result<Halves, ConfigError>
-where
-    Irqs: Binding<T::Interrupt, BufferedInterruptHandler<T>>,
-{
-    let mut config = Config::default();
-    config.baudrate = BAUD;
-    let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, Irqs, config)?.split();
-    Ok((rx, tx))
-}
-
-/// Returns a seed from the chip's unique number, because the chip has no random number generator.
-fn seed() -> u32 {
-    let words = embassy_stm32::uid::uid().map(u32::from);
-    let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
-    words.into_iter().fold(0x811C_9DC5, step)
 }

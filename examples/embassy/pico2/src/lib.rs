@@ -14,18 +14,19 @@
 
 use defmt_rtt as _;
 use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::interrupt::typelevel::Binding;
 use embassy_rp::peripherals::{FLASH, TRNG, UART0, UART1, WATCHDOG};
 use embassy_rp::trng::Trng;
 use embassy_rp::uart::{
-    BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config,
+    BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, Instance,
+    RxPin, TxPin,
 };
 use embassy_rp::watchdog::{ResetReason, Watchdog};
 use embassy_rp::{Peri, bind_interrupts};
 use embassy_time::Duration;
 use panic_probe as _;
 use relay_app::board::{Board, Storage};
-use relay_app::{BAUD, BUFFER, BURST};
-use static_cell::StaticCell;
+use relay_app::{BAUD, Buffers};
 use uav_relay_chip::reset::Reset;
 
 bind_interrupts!(
@@ -91,33 +92,19 @@ pub type Port = (BufferedUartRx, BufferedUartTx);
 /// Absent autopilot port: both UARTs lead to neighbours.
 pub const NO_AUTOPILOT: Option<Port> = None;
 
-/// Returns reader and writer of UART0.
-pub fn uart0(
-    uart: Peri<'static, UART0>,
-    tx: Peri<'static, embassy_rp::peripherals::PIN_0>,
-    rx: Peri<'static, embassy_rp::peripherals::PIN_1>,
-) -> Port {
-    static BUFFERS: StaticCell<[[u8; BUFFER]; 2]> = StaticCell::new();
-    let [sent, received] = BUFFERS.init([[0; BUFFER]; 2]);
-    let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config()).split();
-    (rx, tx)
-}
-
-/// Returns reader and writer of UART1.
-pub fn uart1(
-    uart: Peri<'static, UART1>,
-    tx: Peri<'static, embassy_rp::peripherals::PIN_4>,
-    rx: Peri<'static, embassy_rp::peripherals::PIN_5>,
-) -> Port {
-    static SENT: StaticCell<[u8; BUFFER]> = StaticCell::new();
-    static RECEIVED: StaticCell<[u8; BURST]> = StaticCell::new();
-    let (sent, received) = (SENT.init([0; BUFFER]), RECEIVED.init([0; BURST]));
-    let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config()).split();
-    (rx, tx)
-}
-
-fn config() -> Config {
+/// Opens a UART with the `buffers` of its own.
+pub fn port<T: Instance, const IN: usize>(
+    uart: Peri<'static, T>,
+    tx: Peri<'static, impl TxPin<T>>,
+    rx: Peri<'static, impl RxPin<T>>,
+    buffers: &'static Buffers<IN>,
+) -> Port
+where
+    Irqs: Binding<T::Interrupt, BufferedInterruptHandler<T>>,
+{
+    let (sent, received) = buffers.take();
     let mut config = Config::default();
     config.baudrate = BAUD;
-    config
+    let (tx, rx) = BufferedUart::new(uart, tx, rx, Irqs, sent, received, config).split();
+    (rx, tx)
 }

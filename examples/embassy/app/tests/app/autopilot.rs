@@ -14,7 +14,7 @@ fn apart(a: Placement, b: Placement) -> f32 {
     apart.map(|part| part * part).iter().sum::<f32>().sqrt()
 }
 
-/// A drone on the ground gets no target, in its pilot's hands its own position. Engaged it flies to its relay's position.
+/// A drone on the ground gets no target, in its pilot's hands its own position. Engaged it flies to its relay's position within its
 /// speed limit.
 #[test]
 fn a_drone_with_sites_is_flown_to_its_place_and_released() {

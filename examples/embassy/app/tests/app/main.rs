@@ -9,8 +9,19 @@
 mod autopilot;
 mod bench;
 mod key;
-mod logger;
 mod ram;
 mod vehicle;
 mod votes;
 mod watchdog;
+
+/// Logger that discards everything: the tests check that lines are built and that none panics.
+#[defmt::global_logger]
+struct Logger;
+
+// SAFETY: nothing is written, so writes can not overlap.
+unsafe impl defmt::Logger for Logger {
+    fn acquire() {}
+    unsafe fn flush() {}
+    unsafe fn release() {}
+    unsafe fn write(_: &[u8]) {}
+}

@@ -1,12 +1,11 @@
 //! Watchdog: fed only while the relay's ports and timers are served.
 
-use uav_relay::{Duration, Event};
+use uav_relay::{Duration, Event, Placement};
 use uav_relay_chip::reset::Reset;
 
 use crate::bench::{Bench, FED, SITES, block, block_alone};
 use crate::ram::Ram;
 use crate::vehicle::Vehicle;
-use uav_relay::Placement;
 
 #[test]
 fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {

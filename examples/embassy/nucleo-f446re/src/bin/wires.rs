@@ -4,18 +4,23 @@
 
 use embassy_executor::Spawner;
 use relay_app::drone::Room;
-use relay_nucleo_f446re::{board, feed, init, usart1, usart3, usart6};
+use relay_app::{BURST, Buffers};
+use relay_nucleo_f446re::{Irqs, PLAN, board};
+use relay_stm32::{feed, init, port};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
+static UPSTREAM: Buffers = Buffers::new();
+static DOWNSTREAM: Buffers = Buffers::new();
+static AUTOPILOT: Buffers<BURST> = Buffers::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
-    let (chip, reset) = init();
+    let (chip, reset) = init(&PLAN);
     let board = board(chip.FLASH).reset_by(reset);
-    let upstream = usart1(chip.USART1, chip.PA9, chip.PA10);
-    let downstream = usart3(chip.USART3, chip.PC10, chip.PC11);
-    let autopilot = usart6(chip.USART6, chip.PC6, chip.PC7).ok();
+    let upstream = port(chip.USART1, chip.PA9, chip.PA10, Irqs, &UPSTREAM);
+    let downstream = port(chip.USART3, chip.PC10, chip.PC11, Irqs, &DOWNSTREAM);
+    let autopilot = port(chip.USART6, chip.PC6, chip.PC7, Irqs, &AUTOPILOT).ok();
     if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
         let room = ROOM.init_with(Room::new);
         let _ = relay_app::fly(room, board, upstream, downstream, autopilot, &mut feed).await;

@@ -5,18 +5,21 @@
 use embassy_executor::Spawner;
 use embassy_rp::gpio::{Level, Output};
 use relay_app::drone::Room;
-use relay_pico2::{Guard, board, uart0, uart1};
+use relay_app::{BURST, Buffers};
+use relay_pico2::{Guard, board, port};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
+static RADIO: Buffers = Buffers::new();
+static AUTOPILOT: Buffers<BURST> = Buffers::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_rp::init(embassy_rp::config::Config::default());
     let (mut guard, reset) = Guard::start(chip.WATCHDOG);
     let board = board(chip.FLASH, chip.TRNG).reset_by(reset);
-    let radio = uart0(chip.UART0, chip.PIN_0, chip.PIN_1);
-    let autopilot = uart1(chip.UART1, chip.PIN_4, chip.PIN_5);
+    let radio = port(chip.UART0, chip.PIN_0, chip.PIN_1, &RADIO);
+    let autopilot = port(chip.UART1, chip.PIN_4, chip.PIN_5, &AUTOPILOT);
     let enable = Output::new(chip.PIN_2, Level::Low);
     let room = ROOM.init_with(Room::new);
     let _ = relay_app::fly_shared(room, board, radio, enable, Some(autopilot), &mut || {

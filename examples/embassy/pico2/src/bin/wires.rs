@@ -3,19 +3,22 @@
 #![no_main]
 
 use embassy_executor::Spawner;
+use relay_app::Buffers;
 use relay_app::drone::Room;
-use relay_pico2::{Guard, NO_AUTOPILOT, board, uart0, uart1};
+use relay_pico2::{Guard, NO_AUTOPILOT, board, port};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
+static UPSTREAM: Buffers = Buffers::new();
+static DOWNSTREAM: Buffers = Buffers::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let chip = embassy_rp::init(embassy_rp::config::Config::default());
     let (mut guard, reset) = Guard::start(chip.WATCHDOG);
     let board = board(chip.FLASH, chip.TRNG).reset_by(reset);
-    let upstream = uart0(chip.UART0, chip.PIN_0, chip.PIN_1);
-    let downstream = uart1(chip.UART1, chip.PIN_4, chip.PIN_5);
+    let upstream = port(chip.UART0, chip.PIN_0, chip.PIN_1, &UPSTREAM);
+    let downstream = port(chip.UART1, chip.PIN_4, chip.PIN_5, &DOWNSTREAM);
     let room = ROOM.init_with(Room::new);
     let _ = relay_app::fly(room, board, upstream, downstream, NO_AUTOPILOT, &mut || {
         guard.feed();

@@ -5,18 +5,22 @@
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use relay_app::drone::Room;
-use relay_stm32f405::{board, feed, init, usart1, usart2};
+use relay_app::{BURST, Buffers};
+use relay_stm32::{feed, init, port};
+use relay_stm32f405::{Irqs, PLAN, board};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
+static RADIO: Buffers = Buffers::new();
+static AUTOPILOT: Buffers<BURST> = Buffers::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
-    let (chip, reset) = init();
+    let (chip, reset) = init(&PLAN);
     let board = board(chip.FLASH).reset_by(reset);
     let enable = Output::new(chip.PA1, Level::Low, Speed::Low);
-    let autopilot = usart1(chip.USART1, chip.PA9, chip.PA10).ok();
-    if let Ok(radio) = usart2(chip.USART2, chip.PA2, chip.PA3) {
+    let autopilot = port(chip.USART1, chip.PA9, chip.PA10, Irqs, &AUTOPILOT).ok();
+    if let Ok(radio) = port(chip.USART2, chip.PA2, chip.PA3, Irqs, &RADIO) {
         let room = ROOM.init_with(Room::new);
         let _ = relay_app::fly_shared(room, board, radio, enable, autopilot, &mut feed).await;
     }

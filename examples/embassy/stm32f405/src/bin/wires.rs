@@ -4,18 +4,23 @@
 
 use embassy_executor::Spawner;
 use relay_app::drone::Room;
-use relay_stm32f405::{board, feed, init, usart1, usart2, usart3};
+use relay_app::{BURST, Buffers};
+use relay_stm32::{feed, init, port};
+use relay_stm32f405::{Irqs, PLAN, board};
 use static_cell::StaticCell;
 
 static ROOM: StaticCell<Room> = StaticCell::new();
+static UPSTREAM: Buffers = Buffers::new();
+static DOWNSTREAM: Buffers = Buffers::new();
+static AUTOPILOT: Buffers<BURST> = Buffers::new();
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
-    let (chip, reset) = init();
+    let (chip, reset) = init(&PLAN);
     let board = board(chip.FLASH).reset_by(reset);
-    let upstream = usart2(chip.USART2, chip.PA2, chip.PA3);
-    let downstream = usart3(chip.USART3, chip.PB10, chip.PB11);
-    let autopilot = usart1(chip.USART1, chip.PA9, chip.PA10).ok();
+    let upstream = port(chip.USART2, chip.PA2, chip.PA3, Irqs, &UPSTREAM);
+    let downstream = port(chip.USART3, chip.PB10, chip.PB11, Irqs, &DOWNSTREAM);
+    let autopilot = port(chip.USART1, chip.PA9, chip.PA10, Irqs, &AUTOPILOT).ok();
     if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
         let room = ROOM.init_with(Room::new);
         let _ = relay_app::fly(room, board, upstream, downstream, autopilot, &mut feed).await;

@@ -11,7 +11,7 @@ use stm32f4xx_hal::pac::{Interrupt, UART4, interrupt};
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::serial::SerialPort;
 
-use crate::port::{self, Port, Queues, RECEIVED, Slot};
+use super::port::{self, Port, Queues, RECEIVED, Slot};
 
 /// Buffer of a frame; the longest has the relay's counters.
 type Frame = Vec<u8, 160>;

@@ -16,7 +16,6 @@ static WAS_HUNG: AtomicBool = AtomicBool::new(false);
 
 pub(crate) struct Begun {
     pub(crate) clocks: Clocks,
-    #[cfg_attr(not(feature = "defmt"), expect(dead_code, reason = "it is logged"))]
     pub(crate) reset: Reset,
 }
 

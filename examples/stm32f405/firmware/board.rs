@@ -77,7 +77,7 @@ mod defmt_frames {
     use cortex_m::interrupt;
     use cortex_m::register::primask;
 
-    use crate::log;
+    use crate::firmware::uart_log as log;
 
     #[defmt::global_logger]
     struct Logger;

@@ -8,10 +8,10 @@ use uav_relay::{Instant, Relay, Settings, Wiring};
 #[cfg(feature = "auth")]
 use uav_relay_kept::{epoch, journal::Journal};
 
-use super::autopilot::{Autopilot, Uart};
 #[cfg(feature = "auth")]
 use super::flash;
 use super::{board, config, log, persistent};
+use crate::autopilot::{Autopilot, Uart};
 
 /// Relay, its votes, and the autopilot of a drone with sites; in static RAM, to save stack.
 pub(crate) struct Drone {

@@ -1,0 +1,108 @@
+//! Parts that all STM32F4 boards share: clocks, watchdog, seed and UARTs.
+#![no_std]
+#![forbid(unsafe_code)]
+
+use defmt_rtt as _;
+use embassy_stm32::interrupt::typelevel::Binding;
+use embassy_stm32::rcc;
+use embassy_stm32::time::Hertz;
+use embassy_stm32::usart::{
+    BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx, Config, ConfigError,
+    Instance, RxPin, TxPin,
+};
+use embassy_stm32::{Peri, Peripherals};
+use panic_probe as _;
+use relay_app::{BAUD, Buffers};
+use uav_relay_chip::clock::{self, Clocks, Plan, Source};
+use uav_relay_chip::registers::Chip;
+use uav_relay_chip::reset::Reset;
+use uav_relay_chip::watchdog;
+
+/// Starts the watchdog and the clocks of `plan`. Returns the peripherals and the cause of the last reset.
+///
+/// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
+/// between, the watchdog restarts the chip.
+pub fn init(plan: &Plan) -> (Peripherals, Reset) {
+    let reset = Reset::take(&mut Chip);
+    watchdog::start(&mut Chip);
+    let clocks = clock::probe(&mut Chip, plan);
+    let mut config = embassy_stm32::Config::default();
+    config.rcc = tree(plan, clocks);
+    let peripherals = embassy_stm32::init(config);
+    clock::cache_flash(&mut Chip);
+    defmt::info!("clock {} MHz", clocks.core_hz / 1_000_000);
+    (peripherals, reset)
+}
+
+/// Feeds the watchdog.
+pub fn feed() {
+    watchdog::feed(&mut Chip);
+}
+
+/// Returns Embassy's settings for the probed clocks.
+fn tree(plan: &Plan, clocks: Clocks) -> rcc::Config {
+    let mut config = rcc::Config::new();
+    let (Some(source), Some(crystal)) = (clocks.pll, plan.crystal) else {
+        return config;
+    };
+    let prediv = match source {
+        Source::Crystal => {
+            config.hse = Some(rcc::Hse {
+                freq: Hertz(crystal.hz),
+                mode: if crystal.bypass {
+                    rcc::HseMode::Bypass
+                } else {
+                    rcc::HseMode::Oscillator
+                },
+            });
+            config.pll_src = rcc::PllSource::HSE;
+            rcc::PllPreDiv::DIV4
+        }
+        Source::Internal => rcc::PllPreDiv::DIV8,
+    };
+    let mul = if clocks.core_hz == 180_000_000 {
+        rcc::PllMul::MUL180
+    } else {
+        rcc::PllMul::MUL168
+    };
+    config.pll = Some(rcc::Pll {
+        prediv,
+        mul,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: None,
+        divr: None,
+    });
+    config.sys = rcc::Sysclk::PLL1_P;
+    config.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
+
+/// Reader and writer of a UART.
+pub type Port = (BufferedUartRx<'static>, BufferedUartTx<'static>);
+
+/// Opens a UART with the `buffers` of its own.
+///
+/// # Errors
+/// The UART's clock does not permit the baud rate.
+pub fn port<T: Instance, const IN: usize>(
+    uart: Peri<'static, T>,
+    tx: Peri<'static, impl TxPin<T>>,
+    rx: Peri<'static, impl RxPin<T>>,
+    irqs: impl Binding<T::Interrupt, BufferedInterruptHandler<T>> + 'static,
+    buffers: &'static Buffers<IN>,
+) -> Result<Port, ConfigError> {
+    let (sent, received) = buffers.take();
+    let mut config = Config::default();
+    config.baudrate = BAUD;
+    let (tx, rx) = BufferedUart::new(uart, rx, tx, sent, received, irqs, config)?.split();
+    Ok((rx, tx))
+}
+
+/// Returns a seed from the chip's unique number. The STM32F446 has no random number generator, and the clock of the STM32F405's,
+/// PLLQ, is not set up here.
+pub fn seed() -> u32 {
+    let words = embassy_stm32::uid::uid().map(u32::from);
+    let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);
+    words.into_iter().fold(0x811C_9DC5, step)
+}

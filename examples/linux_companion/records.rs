@@ -1,0 +1,94 @@
+//! Records that survive a restart in flight: the relay's votes on views, and its newest upload.
+//!
+//! A vote is on the disk before it is sent, because a relay that forgets a promise could split the chain into two views. While a
+//! separate thread writes it nothing is sent; everything else continues. Remove the file before another flight.
+//!
+//! Without a valid upload a relay starts with the mission of its options; the chain sends it the newer one.
+
+use std::path::Path;
+
+use uav_relay::{Instant, Mission, RecordError, Relay, Upload, ViewRecord};
+use uav_relay_linux::log::Log;
+use uav_relay_linux::stored::{StoredFile, load, record};
+
+use crate::relay::Refusal;
+
+const VIEWS: &str = "--view-file";
+const UPLOADS: &str = "--upload-file";
+
+/// Restores the votes of an earlier start into `relay`. Returns their file, and true if it held any.
+///
+/// # Errors
+/// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
+/// flight.
+pub(crate) fn resume_views(
+    file: &Path,
+    relay: &mut Relay,
+    now: Instant,
+) -> Result<(StoredFile, bool), Refusal> {
+    let refused = |why: &str| Refusal {
+        line: format!("{VIEWS} {}: {why}", file.display()),
+        is_final: true,
+    };
+    let bytes = load(VIEWS, file)?;
+    let mut stored = None;
+    if let Some(bytes) = &bytes {
+        stored = record(bytes, ViewRecord::LENGTH);
+        let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
+            refused("is damaged, or no record of views: remove the file before the next flight, and start again")
+        })?;
+        relay.resume_view(now, &votes).map_err(|error| match error {
+            RecordError::Base => refused(&format!(
+                "{error}: for a new flight remove the file, and start again; in the same flight start the relay with the mission that it had"
+            )),
+            _ => refused(&error.to_string()),
+        })?;
+    }
+    Ok((StoredFile::new(VIEWS, file, stored)?, stored.is_some()))
+}
+
+/// Resumes with the mission uploaded before this start to relays configured with `mission`. Returns true if there is one.
+///
+/// An unusable file is logged and ignored.
+pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, log: &Log) -> bool {
+    let resumed = held(file, mission).and_then(|upload| match upload {
+        Some(upload) => match relay.resume(&upload) {
+            Ok(()) => Ok(true),
+            Err(error) => Err(format!("{UPLOADS}: {error}")),
+        },
+        None => Ok(false),
+    });
+    resumed.unwrap_or_else(|why| {
+        log.tell(Instant::ZERO, "file", format_args!("{why}; not used"));
+        false
+    })
+}
+
+fn held(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
+    let named = |error: &str| format!("{UPLOADS} {}: {error}", file.display());
+    let Some(bytes) = load(UPLOADS, file)? else {
+        return Ok(None);
+    };
+    let upload = record(&bytes, Upload::LENGTH).and_then(Upload::decode);
+    let upload = upload.ok_or_else(|| named("is damaged, or no upload"))?;
+    let (base, loaded) = (upload.base(), mission.digest());
+    if base != loaded || upload.config().relays != mission.relays() {
+        return Err(named(&format!(
+            "is for relays that were loaded with mission 0x{base:04x} and not 0x{loaded:04x}"
+        )));
+    }
+    Ok(Some(upload))
+}
+
+/// Starts the writer thread of the upload file; writes nothing yet.
+pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
+    StoredFile::new(UPLOADS, file, None)
+}
+
+/// Begins to store an upload. A mission that can not be stored is flown all the same.
+pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
+    let mut bytes = [0; Upload::LENGTH];
+    // The buffer has room for every upload.
+    upload.encode(&mut bytes);
+    file.store(&bytes);
+}
