@@ -118,7 +118,7 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Delivers the next frame that has arrived, or else advances to the next timer or arrival, at most to `until`.
+    /// Delivers the next frame that has arrived, or else advances to the next timer or arrival. Stops at `until`.
     ///
     /// Then all nodes handle their timers and send. Returns false at `until`.
     ///
@@ -251,7 +251,7 @@ impl Bench {
     }
 }
 
-/// Carries frames between neighbours, on wires or on a radio channel that reaches one relay in each direction.
+/// Carries frames between neighbours. They are on wires, or on a radio channel that reaches one relay in each direction.
 pub fn between_neighbours(from: usize, port: Port, to: usize) -> Option<Port> {
     match port {
         Port::Shared => (from.abs_diff(to) == 1).then_some(port),

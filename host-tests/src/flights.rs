@@ -43,7 +43,8 @@ pub fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// Runs `setup` without faults and on a [`Faults::BAD_DAY`], which must change neither the ending nor a bit of the positions.
+/// Runs `setup` without faults and on a [`Faults::BAD_DAY`]. The faults must change neither the ending nor a bit of the
+/// positions.
 ///
 /// Returns the run with faults.
 ///
@@ -93,7 +94,7 @@ pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
 /// Separation of guarded flights, m.
 pub const SEPARATION_M: f32 = 5.0;
 
-/// Smallest permitted distance of two drones, m: positions are f32 of up to 1 km, with rounding errors of 2 mm.
+/// Smallest permitted distance of two drones, m. Positions are f32 of up to 1 km, with rounding errors of 2 mm.
 pub const APART_M: f64 = SEPARATION_M as f64 - 2e-3;
 
 /// Gives `setup` a guard, and eight drones that start at least the separation apart.

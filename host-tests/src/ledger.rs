@@ -7,7 +7,7 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, RelayEnd};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Time limit from the last event of a schedule to a settled chain, while frames are lost: twenty times `dead_after`.
+/// Time limit from the last event of a schedule to a settled chain, while frames are lost. Twenty times `dead_after`.
 pub const RECOVERY: Duration = Duration::from_millis(300_000);
 
 /// Returns the environment variable `name` as a number, or `usual`.

@@ -57,7 +57,7 @@ pub fn reference(at: Placement) -> Place {
     }
 }
 
-/// Compares the SIRs of 4 000 random chains, relays at any ordered positions, with the reference: within 1e-6.
+/// Compares the SIRs of 4 000 random chains, relays at any ordered positions, with the reference. Within 1e-6.
 pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Link) {
     let mut worst = 0.0_f64;
     for _ in 0..4_000 {
@@ -100,7 +100,7 @@ pub struct Solved {
     pub sweeps: u32,
 }
 
-/// Solves a chain whose farthest positions are best, and compares it with the optimum: at most `allowed` short, never above.
+/// Solves a chain whose farthest positions are best, and compares it with the optimum. At most `allowed` short, never above.
 ///
 /// `None` if the SIR of every chain is 0, which the solver must report.
 pub fn optimum_is_found(
@@ -227,7 +227,7 @@ pub struct Reaches {
     pub infeasible: u32,
 }
 
-/// Compares `count` reaches with exact ones of targets a millionth lower and higher, and two f32 steps of tolerance.
+/// Compares `count` reaches with exact ones of targets a millionth lower and higher. The tolerance is two f32 steps.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,

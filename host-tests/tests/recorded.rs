@@ -88,7 +88,8 @@ fn the_recorded_places_reach_the_recorded_optimum() {
     }
 }
 
-/// Compares with a joint solver and with a general-purpose optimiser of all (x, y, h) with 24 starts, both in other programs.
+/// Compares with a joint solver and with a general-purpose optimiser of all (x, y, h). Both are in other programs; the latter
+/// has 24 starts.
 #[test]
 fn optima_of_independent_programs_are_recorded() {
     for (n, want) in [
@@ -126,7 +127,7 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks the 2 000 numbered optima, recorded without positions, by forty searches with another seed, whose positions are.
+/// Checks the 2 000 numbered optima, recorded without positions. Forty searches with another seed have positions.
 #[test]
 fn the_numbered_optima_were_found_again() {
     let stored = optima().unwrap();
@@ -168,7 +169,7 @@ fn the_numbered_scenarios_are_of_many_kinds() {
     }
 }
 
-/// Checks random moves of any size, of one relay or all: in the plane, with lateral room, with held relays, and in noise.
+/// Checks random moves of any size, of one relay or all. In the plane, with lateral room, with held relays, and in noise.
 #[test]
 fn no_move_is_better() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(35));
@@ -226,7 +227,7 @@ fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Compares with exact optima at given altitudes, for scenes without a separation: a common one, and three levels.
+/// Compares with exact optima at given altitudes, for scenes without a separation. A common one, and three levels.
 #[test]
 fn no_common_altitude_and_no_assignment_of_levels_is_better() {
     let (mut common, mut levelled, mut gained) = (0, 0, 0);

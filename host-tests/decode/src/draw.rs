@@ -1,4 +1,4 @@
-//! Random messages by the tables: the one generator of the wire tests, the fuzz targets and the dissector's test.
+//! Random messages by the tables. The one generator of the wire tests, the fuzz targets and the dissector's test.
 //!
 //! A message is valid, over the whole range of every field with frequent bounds, or arbitrary: well-formed with any numbers.
 #![expect(
@@ -19,7 +19,7 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("power_w", 0.1, 10.0),
     ("reach_m", 0.0, 1e3),
     ("slack_m", -1e3, 1e3),
-    ("stand_m", 0.0, 1e3),
+    ("required_x_m", 0.0, 1e3),
     ("x_m", 0.0, 1e3),
     ("target_m", 0.0, 1e3),
     ("y_m", -100.0, 100.0),
@@ -323,7 +323,7 @@ fn together<'f>(message: &str, fields: &mut Fields<'f>) {
                     *first = first.abs();
                 }
             });
-            if get(fields, "belief") != 4.0 {
+            if get(fields, "estimate") != 4.0 {
                 for name in [
                     "source_power_w",
                     "source_x_m",

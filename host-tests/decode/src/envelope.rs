@@ -33,7 +33,8 @@ pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Decodes `stuffed`, without its delimiter, by the definition of COBS; returns the bytes, and true if the last run is complete.
+/// Decodes `stuffed`, without its delimiter, by the definition of COBS. Returns the bytes, and true if the last run is
+/// complete.
 ///
 /// A published decoder would not do, because a truncated stream is checked up to the cut, too.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {

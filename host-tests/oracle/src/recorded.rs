@@ -1,4 +1,4 @@
-//! Recorded optima of the joint problem: positions, altitudes and sides that maximise the worst hop's SIR.
+//! Recorded optima of the joint problem. Positions, altitudes and sides that maximise the worst hop's SIR.
 //!
 //! `data/optima.jsonl` has one scene per line after its head: the parameters, the best SIR known, and the positions that reach it.
 //! The problem has many local optima and no proof of the best one, so the optima are those of a search with many starts, which is
@@ -47,7 +47,7 @@ pub struct Record {
     key: Vec<f32>,
 }
 
-/// One line of the file, in metres and watts.
+/// Line of the file, in metres and watts.
 #[derive(Deserialize)]
 struct Row {
     set: String,
@@ -138,7 +138,7 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a scene in f32, without the altitudes of `link`, which the joint problem ignores.
+/// Returns all parameters of a scene in f32. The altitudes of `link` are left out, because the joint problem ignores them.
 fn key(link: &Link, corridor: Corridor, held: &[Hold]) -> Vec<f32> {
     let common = [
         link.distance_m,

@@ -151,10 +151,12 @@ fn the_tty_is_set_to_the_speed_asked_for() {
     }
 }
 
+/// Start of a chain on one kind of media.
+type Media = fn(Noise) -> Chain;
+
 #[test]
 fn over_noisy_media_they_settle_at_the_same_places() {
     let expected = simulated(&Scenario::default(), 3);
-    type Media = fn(Noise) -> Chain;
     let kinds: [(Media, &[Noise]); 2] = [
         (
             |noise| Chain::on_wires(3, noise),

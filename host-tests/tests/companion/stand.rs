@@ -58,7 +58,7 @@ fn heard(scene: &Scene, relay: usize) -> String {
     lines
 }
 
-/// Writes a level again and again until the condition holds: a station reads a level only when its file has changed.
+/// Writes a level again and again until the condition holds. A station reads a level only when its file has changed.
 fn write_until(level: &str, power_w: f64, mut is_so: impl FnMut() -> bool) {
     let end = Instant::now() + LIMIT;
     while !is_so() {

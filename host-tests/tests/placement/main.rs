@@ -82,7 +82,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
     assert!(met > 5_000, "{met}");
 }
 
-/// Compares 1 to 50 relays with the optimum, D 10 m to 100 km, the interferer anywhere: identical, or with own powers.
+/// Compares 1 to 50 relays with the optimum, D 10 m to 100 km, the interferer anywhere. Identical, or with own powers.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let own_power = Style {

@@ -117,6 +117,9 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
     }
 }
 
+/// Change that makes settings invalid.
+type Change = fn(&mut Settings);
+
 #[test]
 fn what_a_relay_is_set_to_is_checked() {
     use uav_relay::SetupError;
@@ -137,7 +140,6 @@ fn what_a_relay_is_set_to_is_checked() {
         )
         .map(|_| ())
     };
-    type Change = fn(&mut Settings);
     let wrong: [(u16, Change, SetupError); 7] = [
         (0, |_| (), SetupError::Index),
         (4, |_| (), SetupError::Index),

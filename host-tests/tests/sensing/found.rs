@@ -44,7 +44,7 @@ const GUESS: Limits = &[
     (5, 0.0, 0.9),
 ];
 
-/// Checks unknown sources, few relays that fly to learn, a wrong guess, shadowed places and two sources.
+/// Checks unknown sources, few relays that fly to learn, a wrong guess, shadowed places, two sources.
 #[test]
 fn sources_are_found() {
     let rows: [(&str, &[u16], usize, Setups, Limits); 7] = [

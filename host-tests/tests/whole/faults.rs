@@ -107,7 +107,7 @@ fn a_relay_that_is_left_out_draws_no_other_away() {
     assert!(share > 0.98, "{share}");
 }
 
-/// Links that stay up for a little longer than the longest hold-down: one end is released before the other one, and the link is
+/// Links that stay up for a little longer than the longest hold-down. One end is released before the other one, and the link is
 /// lost again soon.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 

@@ -89,7 +89,7 @@ fn a_decision_of_the_flown_mission_is_taken_of_others_not() {
             // The relay still holds a newer mission than it flies.
             let out = after.sends_after(NOW + Duration::from_millis(1));
             let call = near(1, 5, &hello(met.base, 3, mission_id(&next), ASKS | FORMS));
-            let call = call.with(json!({ "newest_view": id(2, 1) }));
+            let call = call.with(json!({ "latest_view": id(2, 1) }));
             assert_eq!(out, [(3, call)]);
         }
     }
@@ -158,7 +158,7 @@ fn an_offer_that_answers_no_recent_hello_is_stale() {
         (first ^ 0x4000, 0, false),
     ] {
         let mut met = met.clone();
-        let offer = newer.with(json!({ "answer": answer }));
+        let offer = newer.with(json!({ "offer_number": answer }));
         let out = met.hears_as_it_is(0, after(ms), &offer);
         let expected = counts.then_some(mission_id(&newer));
         assert_eq!(met.held(), expected, "{answer} at {ms}");
@@ -173,7 +173,7 @@ fn an_offer_that_answers_no_recent_hello_is_stale() {
     for (ms, first_counts) in [(15_000, true), (30_000, false)] {
         later.hears_as_it_is(0, after(ms), &asks);
         let mut after_it = later.clone();
-        let offer = newer.with(json!({ "answer": first }));
+        let offer = newer.with(json!({ "offer_number": first }));
         after_it.hears_as_it_is(1, after(ms), &offer);
         assert_eq!(after_it.held().is_some(), first_counts, "at {ms}");
     }
@@ -181,6 +181,6 @@ fn an_offer_that_answers_no_recent_hello_is_stale() {
     told.hears(0, &newer);
     told.sends_after(NOW);
     let older = hello(met.base, 4, (met.base, 0), 0).with(json!({ "offer_number": 0xABCD }));
-    let answers = newer.with(json!({ "answer": 0xABCD }));
+    let answers = newer.with(json!({ "offer_number": 0xABCD }));
     assert_eq!(told.hears(1, &older), [(5, answers)]);
 }

@@ -24,13 +24,12 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
     // The view of that number proposed by relay 1; proposed numbers are above 0.
     let view = u32::from(number.max(1)) << 10 | 1;
     said.with(match said.name() {
-        "Claim" => json!({ "claim": number }),
-        "Busy" => json!({ "number": number }),
+        "Claim" | "Busy" => json!({ "number": number }),
         "Heartbeat" | "Level" => json!({ "mission": mission }),
         // A fence's number is that of its association, never 0.
-        "Fence" => json!({ "line": mission }),
+        "Fence" => json!({ "line_digest": mission }),
         "Offer" => json!({ "base": mission }),
-        "Hello" => json!({ "mission": mission, "newest_view": view }),
+        "Hello" => json!({ "mission": mission, "latest_view": view }),
         // The view has the loaded mission; no earlier view is known.
         "Proposal" => json!({
             "mission": mission, "version": 0, "proposed_view": view, "agreed_view": 0, "successor": null,
@@ -46,7 +45,7 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
                 "mission": mission, "version": 0, "proposed_view": view, "base_view": 0, "accepted": accepted,
             })
         }
-        _ => json!({ "number": number, "view": mission }),
+        _ => json!({ "number": number, "view_digest": mission }),
     })
 }
 
@@ -76,7 +75,7 @@ fn tamed(said: &Said) -> Said {
             let slack = said.list("slack_m").first().map(|slack| slack.abs());
             let commit = slack.map(|_| 0);
             said.with(
-                json!({ "slack_m": Vec::from_iter(slack), "commit": commit, "stand_m": null }),
+                json!({ "slack_m": Vec::from_iter(slack), "commit": commit, "required_x_m": null }),
             )
         }
         "Gather" => {
@@ -145,7 +144,7 @@ struct Flight {
     /// A message of each tag.
     kinds: Vec<Said>,
     ports: (Port, Port),
-    /// True once a pass may have been accepted, the number of the pass sent, and that of the last one accepted.
+    /// True once a pass may have been accepted. The number of the pass sent, and that of the last one accepted.
     begun: bool,
     pass: u16,
     last: u16,
@@ -153,7 +152,7 @@ struct Flight {
 }
 
 impl Flight {
-    /// Returns the messages of a step, each with its port: the step's own, and perhaps the answer to a pass.
+    /// Returns the messages of a step, each with its port. The step's own, and perhaps the answer to a pass.
     fn said(&mut self, step: &Step) -> Vec<(Port, Said)> {
         let (from, to) = self.ports;
         let tag = step.said.tag();
@@ -322,7 +321,7 @@ fn a_relays_frames_have_its_header_and_a_rising_counter() {
             };
             assert_eq!(plain, unsigned(header, said.body()), "frame {counter}");
             if said.is("Sweep") {
-                assert_eq!(said.number("view"), f64::from(head.mission));
+                assert_eq!(said.number("view_digest"), f64::from(head.mission));
             }
             counter += 1;
         }

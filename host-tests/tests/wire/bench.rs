@@ -1,4 +1,4 @@
-//! One relay without a key, the frames of its neighbours, and all that it sends.
+//! Relay without a key, the frames of its neighbours, and all that it sends.
 
 use std::iter;
 use std::ops::{Deref, DerefMut};

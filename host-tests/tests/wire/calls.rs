@@ -53,7 +53,7 @@ fn a_leader_without_quorum_proposes_again_ever_later() {
             let out = head.wakes();
             // Its neighbour answers; alone the leader would propose nothing.
             for (port, said) in out.iter().filter(|(_, said)| said.is("Heartbeat")) {
-                let asked = said.number("ask") as u16;
+                let asked = said.number("request") as u16;
                 head.hears(*port, &beat(mission, 0, asked));
             }
             if let Some(proposal) = out.into_iter().find(|(_, said)| said.is("Proposal")) {

@@ -24,14 +24,14 @@ fn hears(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, Said)> {
     bench.sends_with_claims()
 }
 
-/// Returns relay 4 of 8, its own sweep, and its claim number, with which it answers another frame with its number.
+/// Returns relay 4 of 8, its own sweep, and its claim number. It answers another frame with its number by that.
 fn relay_4(wiring: Wiring, port: Port) -> (Bench, Said, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;
     let sweep = one_of_each(FIRST, bench.mission)[0].clone();
     let out = hears(&mut bench, port, &between(4, 5, &sweep));
     assert_eq!(bench.events(), [], "it may be an echo");
-    let number = out[0].1.number("claim") as u32;
+    let number = out[0].1.number("number") as u32;
     assert_eq!(out, [(out[0].0, claim(number, 0, 0))]);
     assert!(number < 1 << 30);
     assert!(!bench.is_passive());

@@ -112,7 +112,7 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
                     // A missing member may hold the earlier view for as long.
                     let left = if votes == relays { 0 } else { 77 };
                     let expected = decision.with(json!({
-                        "base_view": id(8, 3), "base_relays": relays, "lease_left_ds": left,
+                        "base_view": id(8, 3), "base_relays": relays, "usable_in_ds": left,
                     }));
                     assert_eq!(decided, expected, "{votes} of {relays}, {proposer}");
                     assert_eq!(last.events(), [event]);
@@ -138,7 +138,7 @@ fn a_member_adds_its_vote() {
             json!(null)
         };
         let expected = decided.with(json!({
-            "accepted": accepted, "lease_left_ds": lease_left.min(RELIED),
+            "accepted": accepted, "usable_in_ds": lease_left.min(RELIED),
         }));
         assert_eq!(decided, expected, "11 of 20 or 10");
     }
@@ -183,14 +183,14 @@ fn a_leader_continues_after_an_earlier_view_is_decided() {
     head.ticks();
     let before = json!({ "view": id(1, 2), "relays": 7 });
     let decision =
-        refused(id(1, 1), of, 2, 8).with(json!({ "accepted": before, "lease_left_ds": 40 }));
+        refused(id(1, 1), of, 2, 8).with(json!({ "accepted": before, "usable_in_ds": 40 }));
     let mut out = head.hears(Port::Downstream, &decision);
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(head.counted(), ["received"]);
     // All have accepted the view, so its members decide on the next one; this relay does not vote.
     let next = proposed(id(2, 1), of, 1, 8).with(json!({
         "agreed_view": id(1, 2), "agreed_relays": 7, "votes": 0, "lease_left_ds": u16::MAX,
-        "rest_ds": u16::MAX, "proposer": false,
+        "earlier_lease_left_ds": u16::MAX, "proposer": false,
     }));
     out.extend(head.ticks());
     assert_eq!(out, [(Port::Downstream, next)]);

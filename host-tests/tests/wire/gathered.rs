@@ -48,7 +48,8 @@ fn fourth(differs: bool) -> Bench {
 fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Said {
     let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
     let seats: Vec<_> = indices.iter().map(seat).collect();
-    let fields = json!({ "number": number, "view": bench.mission, "after": after, "seats": seats });
+    let fields =
+        json!({ "number": number, "view_digest": bench.mission, "after": after, "seats": seats });
     Said::new(name, &fields)
 }
 
@@ -112,7 +113,8 @@ fn a_full_roster_is_continued_by_the_next_pass() {
     assert_eq!(bench.hears(UP, &next), [(DOWN, own)]);
 }
 
-/// Checks that the number alone does not identify a collection, and a relay that missed earlier ones, as after a reboot.
+/// Checks that the number alone does not identify a collection. Checks a relay that missed earlier ones, as after a reboot,
+/// too.
 #[test]
 fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
     let fresh = fourth(false);

@@ -49,7 +49,7 @@ pub(crate) fn source() -> MissionConfig {
 
 /// Returns a message of each tag, in their order, for the pass `number`; its digest is `mission`.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
-    let pass = json!({ "number": number, "view": mission });
+    let pass = json!({ "number": number, "view_digest": mission });
     let of = |name: &str, more: serde_json::Value| {
         let mut fields = pass.clone();
         let more = more.as_object().unwrap().clone();
@@ -71,18 +71,18 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     };
     // Two relays' measurements of a source that all estimate alike.
     let heard = json!({
-        "belief_number": 1, "belief": 4, "source_power_w": 62.5, "source_x_m": 600.0, "source_y_m": -250.0,
+        "estimate_number": 1, "estimate": 4, "source_power_w": 62.5, "source_x_m": 600.0, "source_y_m": -250.0,
         "source_at_rx_w": 1e-6, "sum_ab": [2, 0, 0, 0, 0, 0, 0, 0, 0, 0], "sum_av": [0, 0, 0, 0], "sum_vv": 0.5,
-        "places": 2, "measurements": 64, "age_s": 3, "rx_power_w": 1e-6, "rx_measurements": 32, "left_out": 0,
+        "places": 2, "measurements": 64, "age_s": 3, "rx_power_w": 1e-6, "rx_measurements": 32, "excluded": 0,
     });
     let token = json!({
         "x_m": 400.0, "altitude_m": 20.0, "power_w": 1.0, "turn": 2, "explore_m": 10.0, "columns": 0, "rows": 0,
         "sir": 1.0,
     });
-    let moved = json!({ "x_m": 600.0, "altitude_m": 20.0, "moved": true, "worst_sir": 1.0 });
-    let verdict = json!({ "own": false, "commit": 0, "slack_m": [1.0], "stand_m": null });
+    let moved = json!({ "x_m": 600.0, "altitude_m": 20.0, "any_moved": true, "worst_sir": 1.0 });
+    let verdict = json!({ "own": false, "commit": 0, "slack_m": [1.0], "required_x_m": null });
     let fence = json!({
-        "association": 1, "line": mission, "echo": 0, "fence": 1, "x_m": 400.0, "target_m": 400.0, "y_m": 1.0,
+        "association": 1, "line_digest": mission, "echo": 0, "number": 1, "x_m": 400.0, "target_m": 400.0, "y_m": 1.0,
         "altitude_m": 1.0, "apart_m": 1.0, "flags": 3,
     });
     let view = id(u32::from(number).max(1), 1);
@@ -114,7 +114,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
 
 /// Returns a heartbeat.
 pub(crate) fn beat(mission: u16, ask: u16, answer: u16) -> Said {
-    let fields = json!({ "mission": mission, "ask": ask, "answer": answer });
+    let fields = json!({ "mission": mission, "request": ask, "reply": answer });
     Said::new("Heartbeat", &fields)
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn level(mission: u16) -> Said {
 
 /// Returns a claim by a node that has received claim `other`.
 pub(crate) fn claim(number: u32, other: u32, flags: u8) -> Said {
-    let fields = json!({ "claim": number, "other_claim": other, "flags": flags });
+    let fields = json!({ "number": number, "other_number": other, "flags": flags });
     Said::new("Claim", &fields)
 }
 

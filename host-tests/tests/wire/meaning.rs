@@ -1,4 +1,4 @@
-//! Meaning of the fields: the crate's message with the values that a body has by the tables, independent of the crate's decoder.
+//! Meaning of the fields. The crate's message with the values that a body has by the tables, independent of the crate's decoder.
 
 use uav_relay::guard::Fence;
 use uav_relay::optimiser::PerTarget;
@@ -90,12 +90,12 @@ pub(crate) fn message(said: &Said) -> Message {
         "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
         "Verdict" => Message::Verdict(Answer {
             number: of.word("number"),
-            view_digest: of.word("view"),
+            view_digest: of.word("view_digest"),
             verdict: Verdict {
                 commit: of.has("commit").then(|| of.byte("commit")),
                 slacks: of.targets("slack_m"),
             },
-            required_x_m: of.has("stand_m").then(|| of.real("stand_m")),
+            required_x_m: of.has("required_x_m").then(|| of.real("required_x_m")),
             own: of.flag("own", 0),
         }),
         "Busy" => Message::Busy {
@@ -103,14 +103,14 @@ pub(crate) fn message(said: &Said) -> Message {
         },
         "Heartbeat" => Message::Heartbeat {
             mission: of.word("mission"),
-            request: of.word("ask"),
-            reply: of.word("answer"),
+            request: of.word("request"),
+            reply: of.word("reply"),
         },
         "Gather" => Message::Gather(roster(&of)),
         "Gathered" => Message::Gathered(roster(&of)),
         "Token" => Message::Token(Token {
             number: of.word("number"),
-            view_digest: of.word("view"),
+            view_digest: of.word("view_digest"),
             place: of.place(),
             power_w: of.real("power_w"),
             turn: match (of.byte("turn"), of.byte("columns")) {
@@ -128,19 +128,19 @@ pub(crate) fn message(said: &Said) -> Message {
         }),
         "Moved" => Message::Moved(Moved {
             number: of.word("number"),
-            view_digest: of.word("view"),
+            view_digest: of.word("view_digest"),
             place: of.place(),
-            any_moved: of.flag("moved", 0),
+            any_moved: of.flag("any_moved", 0),
             worst_sir: of.real("worst_sir"),
         }),
         "Hello" => Message::Hello(hello(&of)),
         "Proposal" | "Decision" => vote(said.name(), &of),
         "Fence" => Message::Fence {
-            line_digest: of.word("line"),
+            line_digest: of.word("line_digest"),
             fence: Fence {
                 association: of.word("association"),
                 echo: of.word("echo"),
-                number: of.word("fence"),
+                number: of.word("number"),
                 x_m: of.real("x_m"),
                 target_m: of.real("target_m"),
                 across: CrossSection {
@@ -153,16 +153,16 @@ pub(crate) fn message(said: &Said) -> Message {
         },
         "Offer" => Message::Offer {
             upload: upload(said, &of),
-            offer_number: of.word("answer"),
+            offer_number: of.word("offer_number"),
         },
         "Pulse" => Message::Pulse(Pulse {
             number: of.word("number"),
-            view_digest: of.word("view"),
+            view_digest: of.word("view_digest"),
             lease: of.word("lease_ds"),
         }),
         "Pulsed" => Message::Pulsed(Pulsed {
             number: of.word("number"),
-            view_digest: of.word("view"),
+            view_digest: of.word("view_digest"),
             done: of.flag("done", 0),
         }),
         "Sense" | "Sensed" => sense(said, &of),
@@ -171,8 +171,8 @@ pub(crate) fn message(said: &Said) -> Message {
             power_w: of.real("power_w"),
         },
         "Claim" => Message::Claim(Claim {
-            number: of.long("claim"),
-            other_number: of.long("other_claim"),
+            number: of.long("number"),
+            other_number: of.long("other_number"),
             passive: of.flag("flags", 0),
             echo: of.flag("flags", 1),
         }),
@@ -186,7 +186,7 @@ fn sweep(name: &str, of: &Of<'_>) -> Sweep {
     let chosen = name == "Aside";
     Sweep {
         number: of.word("number"),
-        view_digest: of.word("view"),
+        view_digest: of.word("view_digest"),
         // The anchor is negative in a plain pass.
         ladder: ladder.plainly(anchor < 0.0),
         relay: Station {
@@ -216,7 +216,7 @@ fn roster(of: &Of<'_>) -> Roster {
     };
     Roster {
         number: of.word("number"),
-        view_digest: of.word("view"),
+        view_digest: of.word("view_digest"),
         after: of.word("after"),
         seats: seats.iter().map(seat).collect(),
     }
@@ -225,11 +225,11 @@ fn roster(of: &Of<'_>) -> Roster {
 fn hello(of: &Of<'_>) -> Hello {
     Hello {
         mission: of.word("mission"),
-        latest_view: of.id("newest_view"),
+        latest_view: of.id("latest_view"),
         neighbour: of.word("neighbour"),
         behind: of.word("behind"),
         hears: of.byte("hears"),
-        latest_mission: of.mission_id("holds", "holds_version"),
+        latest_mission: of.mission_id("latest_mission", "latest_mission_version"),
         offer_number: of.word("offer_number"),
         requests_reply: of.flag("flags", 0),
         requests_view: of.flag("flags", 1),
@@ -250,10 +250,10 @@ fn vote(name: &str, of: &Of<'_>) -> Message {
             mission_id,
             proposed_view: view,
             place,
-            reached: of.word("there"),
+            reached: of.word("reached"),
             base: of.view("base_view", "base_relays"),
             accepted: accepted.map(|of| of.view("view", "relays")),
-            usable_in: of.word("lease_left_ds"),
+            usable_in: of.word("usable_in_ds"),
         });
     }
     let successor = of.group("successor");
@@ -266,7 +266,7 @@ fn vote(name: &str, of: &Of<'_>) -> Message {
             votes: of.word("votes"),
             proposer: of.flag("proposer", 0),
             lease_left: of.word("lease_left_ds"),
-            earlier_lease_left: of.word("rest_ds"),
+            earlier_lease_left: of.word("earlier_lease_left_ds"),
             successor: successor.map(|of| Successor {
                 proposal: of.id("proposal"),
                 view: of.view("view", "relays"),
@@ -339,7 +339,7 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
     let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {
         panic!("{message:?}");
     };
-    let belief = match of.byte("belief") {
+    let belief = match of.byte("estimate") {
         0 => Belief::Mission,
         1 => Belief::Unknown(Spread::Even),
         2 => Belief::Unknown(Spread::TowardTx),
@@ -365,8 +365,8 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
         excluded: off,
     } = heard;
     assert_eq!(*number, of.word("number"));
-    assert_eq!(*mission, of.word("view"));
-    let number = of.word("belief_number");
+    assert_eq!(*mission, of.word("view_digest"));
+    let number = of.word("estimate_number");
     assert_eq!(*told, Told { number, belief });
     // Only this shows that the sums are in order.
     assert_eq!(
@@ -378,7 +378,7 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
         level,
         ["rx_power_w", "rx_measurements"].map(|name| of.real(name))
     );
-    assert_eq!(*off, of.word("left_out"));
+    assert_eq!(*off, of.word("excluded"));
     assert_eq!(matches!(message, Message::Sense(_)), said.is("Sense"));
     message
 }

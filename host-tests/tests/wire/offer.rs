@@ -33,7 +33,7 @@ pub(crate) fn upload(version: u16, base: u16) -> Said {
         "mu_los": 7000.0, "mu_nlos": 900_000.5, "eta": 7000.25,
         "altitude_min_m": 20.0, "altitude_max_m": 300.0, "lateral_min_m": -60.0, "lateral_max_m": 40.5,
         "noise_w": 0.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
-        "rx_lat_e7": 0, "rx_lon_e7": 0, "rx_amsl_mm": 0, "answer": 0,
+        "rx_lat_e7": 0, "rx_lon_e7": 0, "rx_amsl_mm": 0, "offer_number": 0,
     });
     Said::new("Offer", &fields)
 }

@@ -21,7 +21,7 @@ use super::strategies::{bodies, headers, kinds, messages};
 proptest! {
     #![proptest_config(config(4000))]
 
-    /// Checks both codecs, and the overhead of a frame: header, CRC, a byte of stuffing and the only delimiter.
+    /// Checks both codecs, and the overhead of a frame. Header, CRC, a byte of stuffing and the only delimiter.
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
         let message = message(&said);

@@ -1,4 +1,4 @@
-//! Peers with the key, by the rules of `FORMAT.md`: neighbours or ground stations, and a relay that has met them.
+//! Peers with the key, by the rules of `FORMAT.md`. Neighbours or ground stations, and a relay that has met them.
 
 use std::ops::{Deref, DerefMut};
 
@@ -98,7 +98,7 @@ impl Met {
     pub(crate) fn hears(&mut self, peer: usize, said: &Said) -> Vec<(u16, Said)> {
         if said.is("Offer") {
             let answer = self.number(peer, NOW);
-            return self.hears_as_it_is(peer, NOW, &said.with(json!({ "answer": answer })));
+            return self.hears_as_it_is(peer, NOW, &said.with(json!({ "offer_number": answer })));
         }
         self.hears_as_it_is(peer, NOW, said)
     }

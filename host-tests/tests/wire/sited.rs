@@ -38,7 +38,7 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// Returns an upload of version 2 with sites a kilometre apart, the receiver's `east` units farther east.
+/// Returns an upload of version 2 with sites a kilometre apart. The receiver's is `east` units farther east.
 fn farther(base: u16, east: i32) -> (Said, [i32; 6]) {
     let mut sites = A_KILOMETRE;
     sites[4] += east;
@@ -76,7 +76,8 @@ fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
                 // The relay answers with a hello that names the refused mission.
                 assert_eq!(out.len(), 1, "{out:?}");
                 let said = &out[0].1;
-                let holds = ["holds", "holds_version"].map(|name| said.number(name) as u16);
+                let holds = ["latest_mission", "latest_mission_version"]
+                    .map(|name| said.number(name) as u16);
                 assert_eq!((holds[0], holds[1]), mission_id(&offer));
                 assert!(said.has(REFUSED) && !said.has(FLIES) && !said.has(WHOLE));
                 assert_eq!(met.held(), None);
@@ -154,7 +155,7 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_ne!(line, base);
     let stale = |met: &Met, line: u16| {
         let fence = one_of_each(1, line)[13].with(json!({
-            "association": 700, "fence": 0, "x_m": 300.0, "target_m": 310.0, "y_m": 0.0,
+            "association": 700, "number": 0, "x_m": 300.0, "target_m": 310.0, "y_m": 0.0,
             "altitude_m": 20.0, "apart_m": 0.0, "flags": 0,
         }));
         let mut after = met.clone();

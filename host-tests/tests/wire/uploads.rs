@@ -208,7 +208,7 @@ fn the_next_node_is_offered_the_mission_before_the_proposal() {
     met.sends_after(NOW);
     let proposal = |place| proposed(id(1, 1), of, place, 8);
     // The neighbour has sent no hello that an offer could answer, so it is asked for one.
-    let asks = near(0, 4, &hello(base, 5, of, ASKS)).with(json!({ "newest_view": id(1, 1) }));
+    let asks = near(0, 4, &hello(base, 5, of, ASKS)).with(json!({ "latest_view": id(1, 1) }));
     assert_eq!(met.hears(0, &proposal(3)), [(5, asks)]);
     assert_eq!(met.hears(1, &hello(base, 4, (base, 0), 0)), [(5, newer)]);
     // The offer is not repeated at once: a hello shows whether it has arrived.

@@ -32,7 +32,7 @@ pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, re
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
         "agreed_view": 0, "agreed_relays": relays, "votes": place.min(relays), "lease_left_ds": RELIED,
-        "rest_ds": 0, "proposer": true, "successor": null,
+        "earlier_lease_left_ds": 0, "proposer": true, "successor": null,
     });
     Said::new("Proposal", &fields)
 }
@@ -48,17 +48,17 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Sai
 pub(crate) fn refused(view: u32, (mission, version): (u16, u16), place: u16, there: u16) -> Said {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
-        "base_view": 0, "base_relays": 8, "accepted": null, "there": there, "lease_left_ds": 0,
+        "base_view": 0, "base_relays": 8, "accepted": null, "reached": there, "usable_in_ds": 0,
     });
     Said::new("Decision", &fields)
 }
 
-/// Returns the hello of a node that receives no others, knows only view 0 and holds the mission `holds` (digest, version).
+/// Returns the hello of a node that receives no others, and knows only view 0. Its mission is `holds` (digest, version).
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
     let (digest, version) = holds;
     let fields = json!({
-        "mission": mission, "neighbour": neighbour, "behind": 1, "newest_view": 0, "holds": digest,
-        "holds_version": version, "offer_number": 0, "hears": 0, "flags": flags,
+        "mission": mission, "neighbour": neighbour, "behind": 1, "latest_view": 0, "latest_mission": digest,
+        "latest_mission_version": version, "offer_number": 0, "hears": 0, "flags": flags,
     });
     Said::new("Hello", &fields)
 }
@@ -66,11 +66,11 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
 /// Returns the hello of a node that receives no others and holds and flies the loaded mission.
 pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> Said {
     let hello = hello(mission, neighbour, (mission, 0), flags | FLIES);
-    hello.with(json!({ "newest_view": newest }))
+    hello.with(json!({ "latest_view": newest }))
 }
 
-/// Sets the nodes that a hello's sender receives, bit 0 for the nearest, and the number of connected relays behind it, itself
-/// included.
+/// Sets the nodes that a hello's sender receives, and the number of connected relays behind it. Bit 0 is the nearest; it counts
+/// itself.
 pub(crate) fn near(hears: u8, behind: u16, hello: &Said) -> Said {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

@@ -335,7 +335,8 @@ impl Layers {
         }
     }
 
-    /// Returns true if a proposal from `side` leaves relays out that may link at any moment: its sender was linked a moment ago.
+    /// Returns true if a proposal from `side` leaves relays out that may link at any moment. Its sender was linked a moment
+    /// ago.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.place_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place

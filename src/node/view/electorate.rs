@@ -144,7 +144,7 @@ impl Electorate {
     ) -> bool {
         let mut asked = *self;
         let poll = asked.vote(node, proposal, None, held);
-        poll.is_some_and(|poll| decide(&poll, proposal, 1, all) == None)
+        poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
     /// Records the vote on `proposal`. If the list is full, its earlier half is kept: once relays have accepted a view, later

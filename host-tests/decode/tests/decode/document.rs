@@ -10,8 +10,8 @@ fn the_fields_of_the_first_example_stand_with_their_names() {
     let wanted = "\
 frame 1  Heartbeat  1 -> 2  network 7  counter 0  23 bytes
     mission            5a3c                      digest of the sender's mission as loaded before flight
-    ask                5                         number of the sender's request; 0 for none
-    answer             0                         number of the answered request; 0 for none";
+    request            5                         number of the sender's request; 0 for none
+    reply              0                         number of the answered request; 0 for none";
     assert_eq!(text, wanted);
 }
 

@@ -8,7 +8,8 @@ const STEPS: usize = 42;
 const PEAKS: usize = 4;
 
 impl Link {
-    /// Returns the best chain SIR (linear) over all ordered placements with the least separation, on refined nested grids.
+    /// Returns the best chain SIR (linear) over all ordered placements with the least separation. The grids are nested and
+    /// refined.
     ///
     /// 0 if there is none. `points` (>= 16) is the number of grid points per relay. Never more than the optimum except for rounding; the grid may
     /// miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.

@@ -28,7 +28,7 @@ impl Link {
         Some(x)
     }
 
-    /// Returns the best SIR (linear) of relays at their altitudes that keep the least separation, to 1e-13 relative.
+    /// Returns the best SIR (linear) of relays at their altitudes that keep the least separation. Accurate to 1e-13 relative.
     ///
     /// `None` as for [`Link::optimum`], or if the separation leaves no chain.
     pub fn optimum_apart(&self) -> Option<f64> {
@@ -44,7 +44,7 @@ impl Link {
         })
     }
 
-    /// Returns the reachable positions of every relay, with neighbours `apart_m` apart; `None` if `target` is missed.
+    /// Returns the reachable positions of every relay, with neighbours `apart_m` apart. `None` if `target` is missed.
     fn sets(&self, target: f64, apart_m: f64) -> Option<Vec<Vec<Interval>>> {
         let first = Hop::new(self, 1, 0.0)?;
         let turns = first.turns(0.0, self.distance_m);

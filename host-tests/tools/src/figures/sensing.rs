@@ -33,7 +33,7 @@ struct Found {
 
 /// Mean share of the optimum for one speed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-struct Followed {
+struct Tracked {
     relays: u16,
     speed_mps: f64,
     /// Mean ratio to the optimum at the same moment, for the chain that tracks the interferer.
@@ -73,12 +73,12 @@ fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
 }
 
 /// Returns the share by speed, in `scenes` scenes each.
-fn by_speed(scenes: u64) -> Result<Vec<Followed>, FigureError> {
+fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {
         for speed_mps in SPEEDS_MPS {
             let shares = moving_shares(scenes, relays, speed_mps)?;
-            rows.push(Followed {
+            rows.push(Tracked {
                 relays,
                 speed_mps,
                 followed_linear: mean(&shares.followed),
@@ -98,7 +98,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         let points = of.map(|row| (row.agreements as f64, 1.0 - row.median_linear));
         Line::new(what, Look::number(index), points)
     });
-    let speeds = |relays: u16, index: usize, name: &str, value: fn(&Followed) -> f64| {
+    let speeds = |relays: u16, index: usize, name: &str, value: fn(&Tracked) -> f64| {
         let of = followed.iter().filter(|row| row.relays == relays);
         let points = of.map(|row| (row.speed_mps, value(row)));
         Line::new(name, Look::number(index), points)

@@ -75,8 +75,8 @@ impl Chain {
     }
 }
 
-const fn granted(id: ViewId, relays: u16) -> Option<View> {
-    Some(View { id, relays })
+const fn granted(id: ViewId, relays: u16) -> View {
+    View { id, relays }
 }
 
 /// Checks all parts of all initial chains of up to seven relays.
@@ -90,9 +90,9 @@ fn more_than_half_decide_or_half_with_the_elder() {
             let outcome = Chain::of(relays).propose(&nodes, id(1, 1), 0);
             let there = count(&nodes);
             let most = 2 * there > relays || 2 * there == relays && nodes[0] == 1;
-            assert_eq!(outcome != None, most, "{nodes:?} of {relays}");
+            assert_eq!(outcome.is_some(), most, "{nodes:?} of {relays}");
             if most {
-                assert_eq!(outcome, granted(id(1, 1), there));
+                assert_eq!(outcome, Some(granted(id(1, 1), there)));
             }
             // Two parts of one chain never decide both.
             let rest = ((1 << relays) - 1) & !part;
@@ -111,10 +111,10 @@ fn more_than_half_decide_or_half_with_the_elder() {
 fn the_members_of_the_view_decide_and_not_those_who_are_there() {
     let mut chain = Chain::of(5);
     let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
-    assert_eq!(first, granted(id(1, 1), 3));
+    assert_eq!(first, Some(granted(id(1, 1), 3)));
     // Three of the five relays are polled, but only one of the three members of the view.
     let others = chain.propose(&[3, 4, 5], id(2, 3), 3);
-    assert_eq!(others, granted(id(1, 1), 3), "it may be agreed on");
+    assert_eq!(others, Some(granted(id(1, 1), 3)), "it may be agreed on");
     let next = chain.propose(&[3, 4, 5], id(3, 3), 3);
     assert_eq!(next, None);
     assert_eq!(
@@ -123,7 +123,7 @@ fn the_members_of_the_view_decide_and_not_those_who_are_there() {
     );
     // Two of the three members are polled.
     let members = chain.propose(&[1, 2], id(4, 1), 2);
-    assert_eq!(members, granted(id(4, 1), 2));
+    assert_eq!(members, Some(granted(id(4, 1), 2)));
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn of_a_split_view_the_half_of_its_proposer_goes_on() {
             electorate.commit();
         }
         let outcome = chain.propose(part, id(2, 1), 0);
-        assert_eq!(outcome != None, goes_on, "{part:?}");
+        assert_eq!(outcome.is_some(), goes_on, "{part:?}");
     }
 }
 
@@ -149,27 +149,45 @@ fn of_a_split_view_the_half_of_its_proposer_goes_on() {
 fn what_may_be_agreed_on_is_decided_on_again() {
     let mut chain = Chain::of(3);
     // Only the last relay has received the decision.
-    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
-    assert_eq!(chain.propose(&[2, 3], id(2, 2), 2), granted(id(1, 1), 3));
+    assert_eq!(
+        chain.propose(&[1, 2, 3], id(1, 1), 1),
+        Some(granted(id(1, 1), 3))
+    );
+    assert_eq!(
+        chain.propose(&[2, 3], id(2, 2), 2),
+        Some(granted(id(1, 1), 3))
+    );
     assert_eq!(
         chain.knows(2).0.id,
         id(1, 1),
         "all there have accepted it now"
     );
     // A relay that has voted for the view is a member, whether or not it has received the decision.
-    assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), granted(id(3, 2), 2));
+    assert_eq!(
+        chain.propose(&[2, 3], id(3, 2), 2),
+        Some(granted(id(3, 2), 2))
+    );
 }
 
 /// Checks that a view of all relays is accepted. Otherwise a chain with most relays restarted would never fly again.
 #[test]
 fn all_of_the_mission_are_a_view_whatever_they_remember() {
     let mut chain = Chain::of(3);
-    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), granted(id(1, 1), 3));
+    assert_eq!(
+        chain.propose(&[1, 2, 3], id(1, 1), 1),
+        Some(granted(id(1, 1), 3))
+    );
     for at in [0, 1] {
         chain.0[at] = Electorate::new(3, 1);
     }
-    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
-    assert_eq!(chain.propose(&[1, 2], id(3, 1), 2), granted(id(3, 1), 2));
+    assert_eq!(
+        chain.propose(&[1, 2, 3], id(2, 1), 3),
+        Some(granted(id(2, 1), 3))
+    );
+    assert_eq!(
+        chain.propose(&[1, 2], id(3, 1), 2),
+        Some(granted(id(3, 1), 2))
+    );
 }
 
 #[test]
@@ -205,7 +223,10 @@ fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
 #[test]
 fn a_promise_keeps_what_was_decided_before_from_being_accepted() {
     let mut chain = Chain::of(3);
-    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 0), granted(id(2, 1), 3));
+    assert_eq!(
+        chain.propose(&[1, 2, 3], id(2, 1), 0),
+        Some(granted(id(2, 1), 3))
+    );
     // The second relay has promised a later proposal and ignores earlier ones.
     chain.poll(&[2], id(3, 2));
     let view = View {
@@ -250,7 +271,10 @@ fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
 #[test]
 fn commit_is_of_what_was_accepted_last() {
     let mut chain = Chain::of(3);
-    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 2), granted(id(1, 1), 3));
+    assert_eq!(
+        chain.propose(&[1, 2, 3], id(1, 1), 2),
+        Some(granted(id(1, 1), 3))
+    );
     assert!(chain.0[1].awaits(id(1, 1)) && !chain.0[0].awaits(id(1, 1)));
     chain.0[0].commit();
     assert_eq!(
@@ -317,14 +341,26 @@ fn votes_are_remembered_until_what_came_of_them_is_known() {
 #[test]
 fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
     let mut chain = Chain::of(5);
-    assert_eq!(chain.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
+    assert_eq!(
+        chain.propose(&[3, 4, 5], id(1, 3), 3),
+        Some(granted(id(1, 3), 3))
+    );
     chain.0[2] = Electorate::new(5, 1);
-    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), granted(id(2, 1), 3));
+    assert_eq!(
+        chain.propose(&[1, 2, 3], id(2, 1), 3),
+        Some(granted(id(2, 1), 3))
+    );
     // The other two nodes are two of its three members.
     chain.0[3].commit();
-    assert_eq!(chain.propose(&[4, 5], id(3, 4), 2), granted(id(3, 4), 2));
+    assert_eq!(
+        chain.propose(&[4, 5], id(3, 4), 2),
+        Some(granted(id(3, 4), 2))
+    );
     // With its record the node would have reported that view.
     let mut kept = Chain::of(5);
-    assert_eq!(kept.propose(&[3, 4, 5], id(1, 3), 3), granted(id(1, 3), 3));
+    assert_eq!(
+        kept.propose(&[3, 4, 5], id(1, 3), 3),
+        Some(granted(id(1, 3), 3))
+    );
     assert_eq!(kept.propose(&[1, 2, 3], id(2, 1), 3), None);
 }
