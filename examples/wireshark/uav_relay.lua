@@ -89,7 +89,7 @@ local messages = {
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
         { name = "x_m", kind = "f32", unit = "m from Tx", text = "current x of the sender" },
         { name = "altitude_m", kind = "f32", unit = "m", text = "current altitude of the sender" },
-        { name = "any_moved", kind = "bool", unit = "", text = "true if the sender or any relay after it has moved" },
+        { name = "position_changed", kind = "bool", unit = "", text = "true if the sender or any relay after it has moved" },
         { name = "worst_sir", kind = "f32", unit = "linear SIR", text = "SIR of the worst hop after the sender" },
     } },
     [0x0a] = { name = "Hello", fields = {

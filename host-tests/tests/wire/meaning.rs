@@ -130,7 +130,7 @@ pub(crate) fn message(said: &Said) -> Message {
             number: of.word("number"),
             view_digest: of.word("view_digest"),
             place: of.place(),
-            any_moved: of.flag("any_moved", 0),
+            position_changed: of.flag("position_changed", 0),
             worst_sir: of.real("worst_sir"),
         }),
         "Hello" => Message::Hello(hello(&of)),

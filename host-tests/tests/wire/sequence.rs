@@ -120,7 +120,7 @@ fn a_token_is_forwarded_and_its_result_returned() {
     let moved = &out[0].1;
     assert!(moved.is("Moved") && moved.number("worst_sir") <= 1.0);
     assert_eq!(
-        (moved.number("number"), moved.number("any_moved")),
+        (moved.number("number"), moved.number("position_changed")),
         (second, 1.0)
     );
     assert_eq!(bench.counted(), ["received"]);

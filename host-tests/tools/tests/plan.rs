@@ -169,7 +169,7 @@ fn the_counts_of_the_reference_come_out_of_the_command() {
         // One fewer relay misses the target.
         let fewer = report["uavs"].as_u64().unwrap() - 1;
         if fewer > 0 {
-            let best = json(&format!("--scenario {path} --uavs {}", fewer));
+            let best = json(&format!("--scenario {path} --uavs {fewer}"));
             assert!(
                 number(&best["sir"]) < case.arg("gamma").unwrap(),
                 "{}",
@@ -233,10 +233,10 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
     let best = one["best_uavs"].as_u64().unwrap();
     assert!(best > 1, "{one}");
     assert!(number(&one["best_rate_bps"]) > number(&one["rate_bps"]));
-    let at_best = ask(&format!("--uavs {}", best));
+    let at_best = ask(&format!("--uavs {best}"));
     assert_eq!(at_best["rate_bps"], one["best_rate_bps"]);
     for beside in [best - 1, best + 1] {
-        let rate = number(&ask(&format!("--uavs {}", beside))["rate_bps"]);
+        let rate = number(&ask(&format!("--uavs {beside}"))["rate_bps"]);
         assert!(rate <= number(&one["best_rate_bps"]), "{beside}: {rate}");
     }
     // The fewest relays that meet the target, not the number with the largest rate.

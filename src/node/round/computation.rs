@@ -255,7 +255,7 @@ impl Computation {
                     number,
                     view_digest: mission,
                     place,
-                    any_moved: turn_pass.any,
+                    position_changed: turn_pass.any,
                     worst_sir: turn_pass.worst,
                 })
             }),

@@ -94,7 +94,7 @@ impl Computation {
             && self.state.is_awaited(moved.number)
             && context.is_between(moved.place)
         {
-            turn_pass.any |= moved.any_moved;
+            turn_pass.any |= moved.position_changed;
             self.after = Some(moved.place);
             return self.conclude_turn(context, moved.worst_sir);
         }

@@ -382,7 +382,7 @@ pub struct Moved {
     /// Current position of the sender.
     pub place: Placement,
     /// True if the sender or any relay after it has moved.
-    pub any_moved: bool,
+    pub position_changed: bool,
     /// SIR of the worst hop after the sender, linear.
     pub worst_sir: f32,
 }
@@ -392,7 +392,7 @@ impl Moved {
         let pass = PassId::new(self.number, self.view_digest);
         let at = PlaceBody::of(self.place);
         write(
-            &(tag::MOVED, pass, at, self.any_moved, self.worst_sir),
+            &(tag::MOVED, pass, at, self.position_changed, self.worst_sir),
             buffer,
         )
     }
@@ -403,7 +403,7 @@ impl Moved {
             number: pass.number(),
             view_digest: pass.digest(),
             place: at.checked().ok_or(MessageError::Value)?,
-            any_moved: any,
+            position_changed: any,
             worst_sir: sir_in_range(worst).ok_or(MessageError::Value)?,
         })
     }

@@ -149,7 +149,7 @@ fn with_tags_an_attacker_changes_nothing() {
 fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     let attacked = "--uavs 4 --forge 1000 --replay 100 --no-auth --json";
     // The chain may not settle; then the report has an error, and the exit status is 1.
-    let output = chain(&attacked);
+    let output = chain(attacked);
     assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(output.status.code() == Some(1), report["error"].is_string());
@@ -222,14 +222,14 @@ fn what_the_channel_cannot_carry_is_refused_before_flight() {
 #[test]
 fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
     let arguments = "--soak 200 --kill 4@20 --boot 4@60";
-    let report = json(&arguments);
+    let report = json(arguments);
     assert_eq!(report["virtual_s"], 200.0);
     let number = |key: &str| report[key].as_f64().unwrap();
     assert!((0.5..0.98).contains(&number("availability")), "{report}");
     assert!(number("longest_outage_s") > 5.0 && number("first_agreement_s") < 2.0);
     assert_eq!(report["most_flying"], 1);
     assert!(number("least_separation_m") > 0.0);
-    let text = String::from_utf8(chain(&arguments).stdout).unwrap();
+    let text = String::from_utf8(chain(arguments).stdout).unwrap();
     for line in [
         "air (csma, 115200 baud): load 0.",
         "availability: 0.",
@@ -321,7 +321,7 @@ fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
 #[test]
 fn a_lost_relay_does_not_count() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";
-    let report = json(&options);
+    let report = json(options);
     let of = |name: &str| report[name].as_f64().unwrap();
     assert_eq!(report["lost"][0]["index"].as_u64(), Some(4), "{report}");
     let [worst, true_sir, share] = ["sir", "true_sir", "share_of_optimum"].map(of);
@@ -332,7 +332,7 @@ fn a_lost_relay_does_not_count() {
     let five = json("--uavs 5");
     let optimum = five["sir"].as_f64().unwrap();
     assert!((of("optimum_sir") / optimum - 1.0).abs() < 1e-3, "{report}");
-    let table = String::from_utf8(chain(&options).stdout).unwrap();
+    let table = String::from_utf8(chain(options).stdout).unwrap();
     let line = table
         .lines()
         .find(|line| line.starts_with("true SIR "))

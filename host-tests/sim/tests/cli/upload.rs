@@ -44,7 +44,7 @@ fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it()
         "--upload-from rx",
         "--wires",
         "--wires --upload-from rx",
-        &loss,
+        loss,
         &format!("{loss} --upload-from rx --wires"),
     ] {
         let report = json(&format!("--upload {MOVED} {more}"));
@@ -68,7 +68,7 @@ fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it()
         let times = ["offered_s", "formed_s", "converged_s"].map(|key| one[key].as_f64().unwrap());
         assert!(times.is_sorted() && times[2] < 60.0, "{times:?}");
         assert!(one["sweeps"].as_u64().unwrap() >= 2, "{one}");
-        let ground = if more.contains(&"rx") { 9 } else { 0 };
+        let ground = if more.contains("rx") { 9 } else { 0 };
         let moments = report["timeline"].as_array().unwrap();
         let offered = moments.iter().find(|moment| moment["what"] == "offered");
         assert_eq!(offered.unwrap()["relay"].as_u64(), Some(ground));
