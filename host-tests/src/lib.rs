@@ -2,7 +2,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
-//! | [`bench`] | relays and ground stations in virtual time, whose frames a test can see, delay, change and drop |
+//! | [`mod@bench`] | relays and ground stations in virtual time, whose frames a test can see, delay, change and drop |
 //! | [`fixtures`], [`flights`] | missions, relays, and simulated flights that several tests use |
 //! | [`ledger`] | random schedules of faults for simulated chains, and the judgement of their results |
 //! | [`placing`] | random scenes of placements, and chains that place themselves |

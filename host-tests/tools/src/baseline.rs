@@ -6,7 +6,7 @@
 //! | [`blind_places`] | maximise the weakest received signal, without interference |
 //! | [`equal_places`] | equal spacing |
 //!
-//! Each is scored in f64 by [`Scene`](uav_relay_scenario::scene::Scene): the SIR of the worst hop.
+//! Each is scored in f64 by [`Scene`]: the SIR of the worst hop.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
