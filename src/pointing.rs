@@ -70,7 +70,9 @@ impl Bearing {
         )
     }
 
-    /// Returns the bearing of the mission's interferer, on the ground, seen from `from`. For steering a null toward it.
+    /// Returns azimuth, elevation and distance of the mission's interferer as seen from `from`.
+    ///
+    /// The interferer is on the ground. A directional antenna can steer a null toward it.
     ///
     /// `None` if the relay is at the interferer's position, or the interference has no position.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {

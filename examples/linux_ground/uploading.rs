@@ -40,7 +40,9 @@ pub(crate) type Over = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Time since when a relay is known to hold an upload with unknown values.
+    /// Question to the chain for the mission that it flies.
+    ///
+    /// With the time when a relay first reported an upload without its values.
     Asking(Option<Instant>),
     Confirming,
     Uploading,

@@ -44,12 +44,12 @@ pub enum AxisError {
     Rx(Geodetic),
     /// The sites are less than 10 m apart.
     TooShort {
-        /// The distance, m.
+        /// Length of the chord between the sites, m.
         distance_m: f64,
     },
     /// The sites are more than 100 km apart.
     TooLong {
-        /// Length of the chord, m.
+        /// Length of the chord between the sites, m.
         distance_m: f64,
     },
 }

@@ -118,7 +118,9 @@ pub struct Guard {
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
-    /// True while this relay requests a halt. It is out of order with a neighbour, or not in order for some reminders.
+    /// True while this relay requests a halt of the chain.
+    ///
+    /// It is out of order with a neighbour, or several reminders in a row found it without an order.
     disorder: bool,
     /// Reminders in a row without order.
     waits: u8,

@@ -228,9 +228,10 @@ impl MissionUpdate {
         }
     }
 
-    /// Returns the pending offer to the neighbour `to` at `side`, and marks it as sent. The neighbour `holds` an older or unknown
-    /// mission. The number is that of the hello that it answers; `None` if a hello has to be requested first, because the last
-    /// one is older than half of `dead_after`.
+    /// Returns the pending offer to the neighbour `to` at `side`, and marks it as sent.
+    ///
+    /// `holds` is that neighbour's mission, older than this relay's, or unknown. The returned number is that of the hello that the
+    /// offer answers; `None` if a hello has to be requested first, because the last one is older than half of `dead_after`.
     pub(crate) fn poll_offer(
         &mut self,
         (side, to): (Side, u16),

@@ -30,7 +30,7 @@ const POINTS_AT_ONCE: usize = 128;
 pub struct Behind {
     /// Cross-section and power.
     pub relay: Station,
-    /// Upsilon measured there, 1/W, if the relay uses that instead of the agreed field. Not used toward Rx.
+    /// Upsilon measured at this relay, 1/W; `None` for that of the agreed field. Only passes toward Tx use it.
     pub measured_per_w: Option<f32>,
 }
 

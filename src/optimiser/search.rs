@@ -331,7 +331,8 @@ impl Search {
 
     /// Continues after `target` was refused.
     ///
-    /// First a plain pass finds a target that is certain; the interval between that and the refused one is then bisected.
+    /// First a plain pass, in which no relay holds back, finds a target that no relay can refuse. The interval up to the refused
+    /// target is then bisected.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.

@@ -83,7 +83,9 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// Creates a relay that is switched on at `now`; relay 1 (in a field relay N) starts by itself.
+    /// Creates a relay that is switched on at `now`.
+    ///
+    /// The leader starts the first search by itself: relay 1, or relay N with an interference field.
     ///
     /// `seed` must differ between boards, even if their image and configuration are the same, and should differ between starts:
     /// use a chip's unique number, a random number generator, or the noise of RAM after power-up. It lets two relays with the

@@ -374,8 +374,10 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
 /// Half width of the search area for sources, in units of D / 2. From D before Tx to D beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
-/// Grid steps from the middle to the edge, of the first grid and of the finer ones.
+/// Grid steps from the middle to the edge of the first grid.
 const COARSE: i8 = 8;
+
+/// Grid steps from the middle to the edge of each finer grid.
 const FINE: i8 = 2;
 
 /// Number of finer grids, with steps of 0.4 times those of the previous one.

@@ -201,8 +201,9 @@ impl Session {
         }
     }
 
-    /// Schedules such a handshake to a silent node, unless that node restarted with a used nonce. Shown its own nonce, such a
-    /// node would continue as its earlier start, and use nonces and counters twice.
+    /// Schedules a handshake that requests a reply to a silent node, unless it restarted with a used nonce.
+    ///
+    /// A reply that contains its nonce would let that node continue as its earlier start, and use nonces and counters twice.
     pub(crate) fn ask_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;

@@ -87,7 +87,7 @@ impl Sites {
 pub struct Secret {
     /// Key of the network, not all 0.
     pub key: [u8; 32],
-    /// Smallest epoch, 1 to 4294967294.
+    /// Smallest epoch to sign with after a start, 1 to 4294967294.
     pub epoch: u32,
 }
 

@@ -316,6 +316,12 @@ fn together<'f>(message: &str, fields: &mut Fields<'f>) {
             } else if base == view {
                 fields.set("base_view", Value::View(0));
             }
+            let proposed = get(fields, "proposed_view");
+            if let Some(Value::Group(mut of)) = fields.get("accepted").cloned() {
+                let least = Numbers(&of).get("view").min(proposed);
+                of.set("view", Value::View(least as u32));
+                fields.set("accepted", Value::Group(of));
+            }
         }
         "Sense" | "Sensed" => {
             list(fields, "sum_ab", |sums| {

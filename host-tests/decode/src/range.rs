@@ -165,7 +165,14 @@ fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
                 ),
             ]
         }
-        "Decision" => &[("base_view", get("base_view") < get("proposed_view"))],
+        "Decision" => {
+            let view = get("proposed_view");
+            let accepted = numbers.group("accepted");
+            &[
+                ("base_view", get("base_view") < view),
+                ("accepted", accepted.is_none_or(|of| of.get("view") <= view)),
+            ]
+        }
         "Sense" | "Sensed" => {
             let source = [
                 "source_power_w",

@@ -75,7 +75,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// Returns the mission of a reference link in a field, with identical relays. `None` if a relay would reject its numbers.
+/// Returns the mission of a link in an interference field, with identical relays. `None` if a relay would reject its numbers.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link

@@ -200,7 +200,9 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table that serde rejects after [`table`] has accepted it. The key table and the types differ.
+/// Creates the error for a table that [`table`] accepts and serde rejects.
+///
+/// This is a fault of the program: the key table and the types differ.
 pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

@@ -68,6 +68,8 @@ pub enum Problem {
     EmptyList,
     /// `[field]` and `[[interferer]]` are both given.
     TwoInterferences,
+    /// `[listen]` and `[field]` are both given.
+    MeasuredField,
     /// Neither `[field]` nor `[[interferer]]` is given.
     NoInterference,
     /// A relay is described twice.
@@ -103,6 +105,7 @@ impl fmt::Display for Problem {
             Self::OutOfRange => "is out of range",
             Self::EmptyList => "has no entry",
             Self::TwoInterferences => "contradicts [[interferer]]",
+            Self::MeasuredField => "contradicts [field]",
             Self::NoInterference => "is missing, and so is field",
             Self::DuplicateRelay => "is already used",
             Self::NothingDiffers => "has no effect",

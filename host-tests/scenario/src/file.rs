@@ -263,7 +263,7 @@ fn interference(
             file,
             "listen",
             Some("[listen] beside a [field]".to_owned()),
-            Problem::TwoInterferences,
+            Problem::MeasuredField,
             "[listen] alone or beside [[interferer]]".to_owned(),
         )),
         (None, None) => Err(mistake(

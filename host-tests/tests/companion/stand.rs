@@ -193,7 +193,7 @@ fn options_of_a_station_that_are_wrong_are_named() {
     }
 }
 
-/// Checks that a station uploads a mission, reports the result and stays on duty.
+/// Checks that `linux_ground --stand` uploads a mission, reports the result and goes on.
 #[test]
 fn a_station_that_stands_uploads_and_stands_on() {
     let chain = Chain::with_ground(1, QUIET);

@@ -213,8 +213,8 @@ fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
     drop(second);
     let line = first.line("cannot be written: ");
     assert!(line.contains("file: --view-file /"), "{line}");
+    // The lease may expire before the neighbour counts as lost, so "lost" and "back" need not be reported.
     second = start(2);
-    first.line("back: relay 2");
     second.line("setpoint: ");
     std::thread::sleep(Duration::from_millis(2_500));
     let more = first.lines_with("cannot be written");

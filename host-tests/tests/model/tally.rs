@@ -11,7 +11,7 @@ use super::scenario::{Kind, Scenario};
 pub(crate) struct Tally {
     counts: BTreeMap<&'static str, u64>,
     most: BTreeMap<&'static str, u64>,
-    /// Times to agreement by kind and by whether frames are signed.
+    /// Longest time to agreement, µs, by kind and by whether frames are signed.
     took_us: BTreeMap<(Kind, bool), u64>,
     sequences: BTreeMap<(Kind, bool), u64>,
 }

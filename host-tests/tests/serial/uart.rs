@@ -51,7 +51,7 @@ impl Uart {
         bench.bytes.push((start, start + self.byte_time));
     }
 
-    /// Reads take time, but there are never bytes to read.
+    /// Simulates a read, which takes time and returns no byte.
     fn look(&self) {
         self.bench.borrow_mut().clock += self.lag;
     }

@@ -35,7 +35,7 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
             "mission": mission, "version": 0, "proposed_view": view, "agreed_view": 0, "successor": null,
         }),
         "Decision" => {
-            // A relay that accepted a view later than its proposal would send proposals that are out of range.
+            // An accepted view is at most the proposed one.
             let mut accepted = json!(said.fields())["accepted"].take();
             if let Some(accepted) = accepted.as_object_mut() {
                 let least = view.min(accepted["view"].as_u64().unwrap() as u32);

@@ -178,17 +178,17 @@ fn a_leader_continues_after_an_earlier_view_is_decided() {
     let of = (head.mission, 0);
     head.hears(
         Port::Downstream,
-        &a_hello(0, head.mission, 1, FORMS | READY),
+        &a_hello(id(1, 2), head.mission, 1, FORMS | READY),
     );
     head.ticks();
     let before = json!({ "view": id(1, 2), "relays": 7 });
     let decision =
-        refused(id(1, 1), of, 2, 8).with(json!({ "accepted": before, "usable_in_ds": 40 }));
+        refused(id(2, 1), of, 2, 8).with(json!({ "accepted": before, "usable_in_ds": 40 }));
     let mut out = head.hears(Port::Downstream, &decision);
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(head.counted(), ["received"]);
     // All have accepted the view, so its members decide on the next one; this relay does not vote.
-    let next = proposed(id(2, 1), of, 1, 8).with(json!({
+    let next = proposed(id(3, 1), of, 1, 8).with(json!({
         "agreed_view": id(1, 2), "agreed_relays": 7, "votes": 0, "lease_left_ds": u16::MAX,
         "earlier_lease_left_ds": u16::MAX, "proposer": false,
     }));

@@ -108,7 +108,7 @@ impl Hops<'_> {
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
     }
 
-    /// Returns the horizontal length of a hop between the ground and the relays' altitude, m.
+    /// Returns the horizontal length, m, of a first or last hop that receives `signal_w`.
     fn outer(&self, power_w: f64, signal_w: f64) -> f64 {
         let height = self.relay.altitude_m;
         let squared = power_w / (self.scene.eta * signal_w) - height * height;

@@ -276,7 +276,8 @@ pub fn uf2(pieces: &[Piece], family: Family) -> Result<Vec<u8>, String> {
             }
         }
     }
-    let count = u32::try_from(pages.len()).map_err(|_| "more pages than a UF2 file has")?;
+    let count = u32::try_from(pages.len())
+        .map_err(|_| "the image has more pages than a UF2 file can hold")?;
     let mut file = Vec::new();
     for (number, (address, page)) in (0..).zip(&pages) {
         let [first, second] = MAGIC;

@@ -61,7 +61,7 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 ///
 /// # Contract
 /// - *Inputs* take anything, never fail and do a bounded amount of work.
-/// - *Time* is an argument. After a backward step of the caller's clock timers go on as if no time had passed between the two calls.
+/// - *Time* is an argument. A backward step of the caller's clock counts as no time between the two calls.
 /// - After every input call [`exchange`](Self::exchange), then [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event) until
 ///   each returns `None`; then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte. `exchange` calls
 ///   [`handle_timeout`](Self::handle_timeout), and the other inputs and outputs that concern the relay.

@@ -76,7 +76,7 @@ pub(crate) struct Neighbour {
     near: Option<Instant>,
     /// Nodes that were heard recently.
     pub(super) hearing: Hearing,
-    /// Consecutive reports of each node that it does not hear this relay.
+    /// Number of reports in a row, for each node, that it does not hear this relay.
     pub(super) unheard: ConsecutiveCounts,
     /// Nodes reported as found since another node was linked or lost: bit 0 is the nearest one.
     found: u8,

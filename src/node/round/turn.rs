@@ -200,7 +200,9 @@ impl TurnPass {
         self.search.is_some()
     }
 
-    /// Continues the search by at most `budget` evaluations and a row. Ready with the better position, if any.
+    /// Continues the search for at most `budget` evaluations and the rest of a grid row.
+    ///
+    /// Ready with the better position, if any.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);

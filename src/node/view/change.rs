@@ -160,13 +160,11 @@ impl ViewChange {
             Message::Proposal(proposal) if proposal.place < all => {
                 self.on_proposal(context, proposal)
             }
-            // The decided view follows its base, and this relay has made no later proposal.
+            // The decided view follows its base.
             Message::Decision(decision)
-                if decision.accepted.is_none_or(|view| {
-                    let is_own = view.id.proposer() == context.member.node;
-                    let is_known = !is_own || view.id <= decision.proposed_view;
-                    decision.base.id < view.id && is_known && view.relays <= all
-                }) =>
+                if decision
+                    .accepted
+                    .is_none_or(|view| decision.base.id < view.id && view.relays <= all) =>
             {
                 self.on_decision(context, decision)
             }

@@ -73,7 +73,7 @@ pub(crate) struct Ascent {
     excess: f32,
     /// Limit of the slack that counts, in units of D; it is reduced where slack would outweigh a penalty.
     spare: f32,
-    /// Penalty of the nominal chain, m.
+    /// Penalty of the nominal chain for relays too near the interferer, in metres of slack.
     pub(crate) penalty: f32,
     distance_m: f32,
     /// Derivative of the slack by ln gamma, m.

@@ -77,7 +77,7 @@ use crate::sir::{self, Sender};
 pub enum EdgeCoordinate {
     /// x, along the line from Tx to Rx.
     Along = 4,
-    /// y, across it.
+    /// y, across the line.
     Across = 5,
     /// Altitude.
     Upward = 6,

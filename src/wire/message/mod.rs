@@ -90,7 +90,7 @@ pub enum Message {
     Proposal(Proposal),
     /// Reply to a proposal: the decision on it.
     Decision(Decision),
-    /// Either direction: fence between two neighbours.
+    /// Either direction: limit along the line (fence) that keeps two neighbours apart.
     Fence {
         /// Digest of the sender's mission as loaded before flight, combined with its upload's sites. See
         /// [`digest`](super::digest::digest).

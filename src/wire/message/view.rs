@@ -241,6 +241,7 @@ impl Decision {
         let (mission_id, proposal, place) = call
             .checked()
             .filter(|(_, proposal, _)| known && base.id < *proposal)
+            .filter(|(_, proposal, _)| view.is_none_or(|view| view.id <= *proposal))
             .ok_or(MessageError::Value)?;
         Ok(Self {
             mission_id,

@@ -176,7 +176,8 @@ impl<'a> Prepared<'a> {
 
     /// Returns the SIR of every hop from Tx to Rx, linear, with the true interference at `then`.
     ///
-    /// `places` has the relays' indices (from 1) and positions in the order of the chain. Uploads are not considered.
+    /// `places` has the relays' indices (from 1) and positions in the order of the chain. The mission is the one
+    /// loaded at the start, even after an upload.
     pub fn sirs_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let mission = self.options.listening.moved(self.told, then);
         let usual = mission.config().common;

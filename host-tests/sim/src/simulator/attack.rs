@@ -357,7 +357,7 @@ fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u
     sealed(plain)
 }
 
-/// Returns the first handshake of a relay with another key; empty if it has no neighbour.
+/// Returns the first handshake of a relay with another key; empty in a chain of one relay.
 fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>, SetupError> {
     let settings = Settings {
         wiring: Wiring::Shared,

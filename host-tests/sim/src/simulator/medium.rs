@@ -190,7 +190,7 @@ impl Medium {
     fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let until = now + self.link.line_time(TURNAROUND);
         if let Some(radio) = self.radios.get_mut(node) {
-            radio.state = State::TimelineEvent { until };
+            radio.state = State::Turnaround { until };
             agenda.push((until, AirEvent::Begin(node)));
         }
         for frame in &mut self.on_air {
@@ -208,7 +208,7 @@ impl Medium {
         let Some(radio) = self.radios.get_mut(node) else {
             return;
         };
-        if radio.state != (State::TimelineEvent { until: now }) {
+        if radio.state != (State::Turnaround { until: now }) {
             return;
         }
         let frame = radio.queue.pop_front().unwrap_or_default();
@@ -345,8 +345,8 @@ enum State {
     Idle,
     /// Receiving until the back-off ends; `exponent` is the back-off exponent.
     Waiting { until: Instant, exponent: u32 },
-    /// TimelineEvent from receiving to sending.
-    TimelineEvent { until: Instant },
+    /// Turnaround from receiving to sending.
+    Turnaround { until: Instant },
     /// Sending.
     Sending,
 }
@@ -361,7 +361,7 @@ struct Radio {
 impl Radio {
     /// Returns true while the radio cannot receive.
     fn is_deaf(&self) -> bool {
-        matches!(self.state, State::TimelineEvent { .. } | State::Sending)
+        matches!(self.state, State::Turnaround { .. } | State::Sending)
     }
 
     /// Returns the number of frames held, including the one being sent.

@@ -160,7 +160,7 @@ fn too_fast(rates: &RateReport) -> String {
         format!("no number of relays from 1 to {tried}")
     };
     format!(
-        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. PlanRequest for less, or for more \
+        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. Ask for less, or for more \
          with a larger --bandwidth-hz",
         rates.best
     )

@@ -41,7 +41,9 @@ impl NotDrawn {
 /// Draws `chart` as SVG; `title` is for screen readers.
 pub fn draw(chart: &Chart, title: &str) -> Result<String, NotDrawn> {
     if !chart.is_drawable() {
-        return Err(NotDrawn("a number does not belong on its axis".to_owned()));
+        return Err(NotDrawn(
+            "a value is not finite, or not above 0 on a logarithmic axis".to_owned(),
+        ));
     }
     let entries = entries(chart);
     let columns = columns(&entries);
