@@ -150,6 +150,12 @@ pub(crate) fn all() -> Vec<Step> {
         ));
     }
     steps.push(step(
+        "the packaged crate, target",
+        format!(
+            "cargo package -p uav-relay --locked --allow-dirty --target {TARGET} --target-dir target/packaged"
+        ),
+    ));
+    steps.push(step(
         "packages: licences, sources, duplicates",
         "cargo run --quiet --package uav-relay-xtask --bin packages",
     ));
