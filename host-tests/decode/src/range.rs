@@ -166,11 +166,11 @@ fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
             ]
         }
         "Decision" => {
-            let view = get("proposed_view");
-            let accepted = numbers.group("accepted");
+            let (view, accepted) = (get("proposed_view"), numbers.group("accepted"));
+            let is_known = accepted.is_none_or(|of| of.get("view") <= view);
             &[
                 ("base_view", get("base_view") < view),
-                ("accepted", accepted.is_none_or(|of| of.get("view") <= view)),
+                ("accepted", is_known),
             ]
         }
         "Sense" | "Sensed" => {
