@@ -153,16 +153,14 @@ fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
         }
         "Proposal" => {
             let view = get("proposed_view");
-            let successor = numbers.group("successor");
+            let decided = |of: Numbers<'_, '_>| {
+                of.get("proposal") < view && of.get("view") <= of.get("proposal")
+            };
+            let successor = numbers.group("successor").is_none_or(decided);
             &[
                 ("agreed_view", get("agreed_view") < view),
                 ("votes", get("votes") <= get("agreed_relays")),
-                (
-                    "successor",
-                    successor.is_none_or(|of| {
-                        of.get("proposal") < view && of.get("view") <= of.get("proposal")
-                    }),
-                ),
+                ("successor", successor),
             ]
         }
         "Decision" => {
