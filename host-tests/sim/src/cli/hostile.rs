@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
 use uav_relay::{Duration, GuardConfig, Instant, Sites, Wiring};
 
-use super::options::{instant, span};
+use super::time::{instant, span};
 use super::upload::Uploads;
 use crate::command::{Failure, carries, number, whole};
 use crate::report::seconds;

@@ -10,6 +10,7 @@
 mod hostile;
 mod options;
 mod prepared;
+mod time;
 mod upload;
 
 pub use options::{Method, Options};

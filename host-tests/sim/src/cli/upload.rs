@@ -10,7 +10,7 @@ use uav_relay::{
 };
 use uav_relay_scenario::number::narrow;
 
-use super::options::instant;
+use super::time::instant;
 
 /// Command-line options for uploads.
 #[derive(Args, Debug)]

@@ -9,7 +9,7 @@ use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Scenario, mission};
 
 use super::attack::AttackReport;
-use super::hops::{RelayReport, db, hop_sirs};
+use super::hops::{LostReport, RelayReport, db, hop_sirs};
 use super::sensing::SensingReport;
 use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
 use super::{hops, timeline};
@@ -314,27 +314,6 @@ impl ChainReport {
             _ => self.uavs.to_string(),
         }
     }
-}
-
-/// Relay that is no longer in the chain.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct LostReport {
-    /// Relay number in the mission, from 1.
-    pub index: u16,
-    /// Last setpoint: distance from the transmitter, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub x_m: Option<f64>,
-    /// Last setpoint: distance from the line, m, positive to the right.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub y_m: Option<f64>,
-    /// Last setpoint: altitude, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub h_m: Option<f64>,
-    /// Last version of the relay's mission; absent without uploads.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub version: Option<u16>,
-    /// Reason: `silent`; `apart` (alive, cannot reach the others); `no quorum` (alive, no chain is left).
-    pub why: &'static str,
 }
 
 /// Returns the relays of the chain at the end of the run, with their numbers from 1, in order from Tx.

@@ -7,8 +7,6 @@ use uav_relay::place::Station;
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Mission, Placement, Profile};
 
-use super::chain::LostReport;
-
 /// Position and SIR of a relay.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RelayReport {
@@ -27,6 +25,27 @@ pub struct RelayReport {
     /// Version of the relay's mission, 0 for the original one; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
+}
+
+/// Relay that is no longer in the chain.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct LostReport {
+    /// Relay number in the mission, from 1.
+    pub index: u16,
+    /// Last setpoint: distance from the transmitter, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_m: Option<f64>,
+    /// Last setpoint: distance from the line, m, positive to the right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y_m: Option<f64>,
+    /// Last setpoint: altitude, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub h_m: Option<f64>,
+    /// Last version of the relay's mission; absent without uploads.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+    /// Reason: `silent`; `apart` (alive, cannot reach the others); `no quorum` (alive, no chain is left).
+    pub why: &'static str,
 }
 
 /// Converts a linear power ratio to dB.
