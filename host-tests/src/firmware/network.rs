@@ -61,19 +61,20 @@ pub fn radio(drones: usize, range: usize) -> Hearers {
 }
 
 impl Network {
-    /// Connects `ports` through `medium`.
+    /// Connects `ports` through `medium`. Frames that a drone has completed before are discarded.
     ///
     /// # Errors
     /// A socket can not be shared between two threads.
     pub fn connect(
         ports: Vec<UnixStream>,
         hearers: Hearers,
-        medium: Medium,
+        mut medium: Medium,
     ) -> std::io::Result<Self> {
         let (stop, heard) = channel();
         for (sender, port) in ports.iter().enumerate() {
             port.set_write_timeout(Some(PATIENCE))?;
             set_socket_send_buffer_size(port, WAITING)?;
+            medium.send(Instant::now(), sender, &begun(port)?, &[]);
             let (port, out) = (port.try_clone()?, stop.clone());
             std::thread::spawn(move || listen(port, sender, &out));
         }
@@ -103,6 +104,20 @@ impl Drop for Network {
             _ = carrier.join();
         }
     }
+}
+
+/// Reads what has arrived at a port, and returns the bytes of the frame that is not complete.
+fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    port.set_nonblocking(true)?;
+    let read = port.read_to_end(&mut bytes);
+    port.set_nonblocking(false)?;
+    match read {
+        Err(error) if error.kind() != std::io::ErrorKind::WouldBlock => return Err(error),
+        _ => {}
+    }
+    let complete = bytes.iter().rposition(|byte| *byte == 0);
+    Ok(bytes.split_off(complete.map_or(0, |at| at + 1)))
 }
 
 /// Forwards bytes from a port until the drone closes its end.
@@ -162,6 +177,24 @@ mod tests {
     use super::{Network, radio};
     use crate::firmware::medium::Medium;
     use uav_relay_sim::simulator::faults::{Faults, LinkSpec};
+
+    #[test]
+    fn a_frame_begun_before_is_carried_whole() {
+        let (mut ends, mut ports) = (Vec::new(), Vec::new());
+        for _ in 0..2 {
+            let (end, port) = UnixStream::pair().unwrap();
+            end.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+            ends.push(end);
+            ports.push(port);
+        }
+        let medium = Medium::new(2, LinkSpec::default(), Faults::default(), 1, Instant::now());
+        ends[0].write_all(&[9, 9, 0, 1, 2]).unwrap();
+        let _network = Network::connect(ports, radio(2, 1), medium).unwrap();
+        ends[0].write_all(&[3, 0]).unwrap();
+        let mut heard = [0; 4];
+        ends[1].read_exact(&mut heard).unwrap();
+        assert_eq!(heard, [1, 2, 3, 0]);
+    }
 
     #[test]
     fn a_port_that_nobody_reads_holds_up_no_other() {

@@ -40,23 +40,43 @@ pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
         .collect()
 }
 
+/// Maximum number of flights until one has no damaged frame. The emulator is not real time, so that a byte is lost now and then on a
+/// busy host; a fault of the port driver shows in every flight.
+const FLIGHTS: usize = 3;
+
 #[test]
 fn five_settle_where_the_simulated_chain_does() {
     let flight = paper(5);
-    let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
-    assert_eq!(fleet.places(), simulated(&flight));
-    for drone in 1..=5 {
-        // The emulator has no clock tree: the firmware keeps running on the HSI.
-        let begins = ["started: unknown", "clock 16 MHz, no PLL"];
-        let begins = begins.map(str::to_owned).into_iter();
-        let begins = begins.chain([format!("relay {drone} of 5, network 7")]);
-        let said = fleet.of_drone(drone).map(|line| line.text.clone());
-        assert!(said.take(3).eq(begins));
-        let counters = fleet.counters(drone);
-        for name in ["crc", "truncated", "malformed", "misaddressed"] {
-            assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
+    let mut damaged = Vec::new();
+    for _ in 0..FLIGHTS {
+        let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
+        assert_eq!(fleet.places(), simulated(&flight));
+        let before = damaged.len();
+        for drone in 1..=5 {
+            // The emulator has no clock tree: the firmware keeps running on the HSI.
+            let begins = ["started: unknown", "clock 16 MHz, no PLL"];
+            let begins = begins.map(str::to_owned).into_iter();
+            let begins = begins.chain([format!("relay {drone} of 5, network 7")]);
+            let said = fleet.of_drone(drone).map(|line| line.text.clone());
+            assert!(said.take(3).eq(begins));
+            let counters = fleet.counters(drone);
+            for name in ["malformed", "misaddressed"] {
+                assert_eq!(counters.counter(name), Some(0), "{}", counters.text);
+            }
+            let lost = ["crc", "truncated"].map(|name| counters.counter(name));
+            if lost != [Some(0); 2] {
+                fleet.wait("counters of both links", |lines| {
+                    let mine = lines.iter().filter(|line| line.drone == drone);
+                    mine.filter(|line| line.text.starts_with("link ")).count() == 2
+                });
+                damaged.extend(fleet.of_drone(drone).cloned());
+            }
+        }
+        if damaged.len() == before {
+            return;
         }
     }
+    panic!("damaged frames in each of {FLIGHTS} flights: {damaged:#?}");
 }
 
 #[test]
