@@ -1,4 +1,4 @@
-//! Time of recovery from a loss, by chain length and relay. Prints the table of `host-tests/RESULTS.md`.
+//! Time of recovery from a loss, by chain length and relay. Prints the table of `examples/RESULTS.md`.
 
 use host_tests::fixtures::mission;
 use uav_relay::Instant;

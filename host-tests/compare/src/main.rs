@@ -81,7 +81,7 @@ fn run(options: &Options) -> Result<String, Failure> {
 
 /// Marks around the table in RESULTS.md.
 const MARKS: [&str; 2] = [
-    "<!-- cargo compare --into host-tests/RESULTS.md -->\n",
+    "<!-- cargo compare --into examples/RESULTS.md -->\n",
     "<!-- end of that -->\n",
 ];
 

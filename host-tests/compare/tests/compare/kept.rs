@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn the_results_have_the_run_that_is_kept() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = std::fs::read_to_string(root.join("../RESULTS.md")).unwrap();
+    let readme = std::fs::read_to_string(root.join("../../examples/RESULTS.md")).unwrap();
     let folder = TempDir::new().unwrap();
     let copy = folder.path().join("RESULTS.md");
     // The copy has no table.

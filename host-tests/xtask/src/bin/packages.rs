@@ -1,4 +1,5 @@
-//! Checks the workspace's dependencies. Licences, a single registry, and no duplicate versions in the library; run by `cargo ci`.
+//! Checks the workspace's dependencies and the packaged crate. Licences, a single registry, no duplicate versions in the library, and
+//! no link of the README to a file that the package lacks; run by `cargo ci`.
 //!
 //! Advisories are not checked, because they change without a commit and have to be fetched.
 
@@ -95,10 +96,42 @@ fn elsewhere(lock: &str) -> Vec<String> {
         .collect()
 }
 
+/// Returns the files of this repository that `page` links to, without their anchors.
+fn links(page: &str) -> impl Iterator<Item = &str> {
+    let targets = page.split("](").skip(1);
+    let targets = targets.filter_map(|rest| rest.split([')', '#']).next());
+    targets.filter(|target| !target.is_empty() && !target.contains("://"))
+}
+
+/// Returns the links of the README to files that the packaged crate lacks.
+fn broken_links() -> Result<Vec<String>, String> {
+    let output = Command::new("cargo")
+        .args([
+            "package",
+            "--list",
+            "--locked",
+            "--allow-dirty",
+            "--package=uav-relay",
+        ])
+        .output()
+        .map_err(|error| format!("cargo: {error}"))?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    let list = String::from_utf8_lossy(&output.stdout).into_owned();
+    let files: BTreeSet<&str> = list.lines().collect();
+    let readme =
+        std::fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
+    let broken = links(&readme).filter(|target| !files.contains(target));
+    Ok(broken
+        .map(|target| format!("README.md links to {target}, which the packaged crate lacks"))
+        .collect())
+}
+
 fn refused() -> Result<Vec<String>, String> {
     let lock =
         std::fs::read_to_string("Cargo.lock").map_err(|error| format!("Cargo.lock: {error}"))?;
-    Ok([licences()?, twice()?, elsewhere(&lock)].concat())
+    Ok([licences()?, twice()?, elsewhere(&lock), broken_links()?].concat())
 }
 
 fn main() -> ExitCode {
@@ -122,7 +155,13 @@ fn main() -> ExitCode {
 
 #[cfg(test)]
 mod tests {
-    use super::{elsewhere, is_allowed};
+    use super::{elsewhere, is_allowed, links};
+
+    #[test]
+    fn links_are_those_to_files() {
+        let page = "[a](A.md#b) ![p](x/p.svg) [web](https://a.org) [own](#part) (no link)";
+        assert!(links(page).eq(["A.md", "x/p.svg"]));
+    }
 
     #[test]
     fn what_is_not_of_the_registry_is_named() {

@@ -156,7 +156,7 @@ pub(crate) fn all() -> Vec<Step> {
         ),
     ));
     steps.push(step(
-        "packages: licences, sources, duplicates",
+        "packages: licences, sources, duplicates, links",
         "cargo run --quiet --package uav-relay-xtask --bin packages",
     ));
     steps.extend(nightly());

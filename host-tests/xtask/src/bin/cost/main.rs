@@ -12,7 +12,7 @@ use std::process::{Command, ExitCode};
 
 use uav_relay_xtask::toolchain::spaced;
 
-const USAGE: &str = "cargo cost [--write]: what the firmware costs\n\n  --write  README.md and host-tests/RESULTS.md say from now on what was measured";
+const USAGE: &str = "cargo cost [--write]: what the firmware costs\n\n  --write  README.md and examples/RESULTS.md say from now on what was measured";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -169,7 +169,7 @@ fn milliseconds(instructions: u64) -> String {
 }
 
 pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
-    let results = with(root, "host-tests/RESULTS.md", |text| {
+    let results = with(root, "examples/RESULTS.md", |text| {
         let begin = text.find(HEAD)?;
         let after = text.get(begin..)?;
         let end = begin + after.find("\n\n")? + 1;
@@ -189,7 +189,7 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
 
 /// Returns true if the documents are of this compiler and emulator, on which costs depend.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
-    let results = std::fs::read_to_string(root.join("host-tests/RESULTS.md"));
+    let results = std::fs::read_to_string(root.join("examples/RESULTS.md"));
     results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))
 }
 
