@@ -62,7 +62,8 @@ fn lines_that_are_no_position_are_counted_and_said_once() {
     let files = Files::new();
     let fifo = files.fifo("positions");
     let mut relay = Relay::start(&format!("--index 1 --of 1 --positions {fifo}"));
-    relay.line("guarded: ");
+    // With its place known before the position, the first setpoint is the position.
+    relay.line("converged: ");
     let long = "1 ".repeat(10_000);
     write(
         &fifo,

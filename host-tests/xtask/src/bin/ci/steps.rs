@@ -111,10 +111,7 @@ pub(crate) fn quick() -> Vec<Step> {
 pub(crate) fn all() -> Vec<Step> {
     let mut steps = first();
     steps.extend(clippy());
-    steps.push(step(
-        "tests",
-        "cargo test --workspace --no-fail-fast --locked",
-    ));
+    steps.extend(workspace_tests());
     steps.push(step(
         "the commands of the pages",
         "cargo run --quiet --package uav-relay-xtask --bin pages",
@@ -161,6 +158,56 @@ pub(crate) fn all() -> Vec<Step> {
     ));
     steps.extend(nightly());
     steps
+}
+
+/// Integration test whose processes mostly wait for the wall clock.
+const WAITING_TEST: &str = "companion";
+
+/// Number of these tests at a time; more than the cores, because a companion uses a few per cent of one.
+const WAITING_TESTS: &str = "6";
+
+/// Returns the steps that run the tests of the whole workspace: those of other packages, those of chains, those that wait.
+fn workspace_tests() -> Vec<Step> {
+    let chains: Vec<String> = integration_tests()
+        .into_iter()
+        .filter(|test| test != WAITING_TEST)
+        .map(|test| format!(" --test {test}"))
+        .collect();
+    vec![
+        step(
+            "tests",
+            "cargo test --workspace --exclude host-tests --no-fail-fast --locked",
+        ),
+        step(
+            "tests of chains",
+            format!(
+                "cargo test -p host-tests --no-fail-fast --locked --lib{}",
+                chains.concat()
+            ),
+        ),
+        Step {
+            environment: &[("RUST_TEST_THREADS", WAITING_TESTS)],
+            ..step(
+                "tests of companions",
+                format!("cargo test -p host-tests --no-fail-fast --locked --test {WAITING_TEST}"),
+            )
+        },
+    ]
+}
+
+/// Returns the names of the integration tests of `host-tests`, sorted.
+fn integration_tests() -> Vec<String> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests");
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.path())
+        .filter(|path| {
+            path.extension().is_some_and(|end| end == "rs") || path.join("main.rs").is_file()
+        })
+        .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
+        .collect();
+    names.sort();
+    names
 }
 
 fn first() -> Vec<Step> {
@@ -300,4 +347,20 @@ fn nightly() -> Vec<Step> {
         )
     });
     steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{WAITING_TEST, integration_tests};
+
+    #[test]
+    fn every_integration_test_is_listed_once() {
+        let mut all = integration_tests();
+        for name in [WAITING_TEST, "chain", "qemu", "wire"] {
+            assert!(all.iter().any(|test| test == name), "{name} of {all:?}");
+        }
+        let count = all.len();
+        all.dedup();
+        assert_eq!(all.len(), count);
+    }
 }
