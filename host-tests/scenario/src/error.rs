@@ -78,8 +78,10 @@ pub enum Problem {
     NothingDiffers,
     /// The distance contradicts that of the sites.
     OtherDistance,
-    /// The positions are not in increasing order.
+    /// The values are not in increasing order.
     Unsorted,
+    /// The bandwidths of the link and of the noise differ.
+    OtherBandwidth,
 }
 
 impl fmt::Display for Problem {
@@ -110,6 +112,7 @@ impl fmt::Display for Problem {
             Self::DuplicateRelay => "is already used",
             Self::NothingDiffers => "has no effect",
             Self::OtherDistance => "contradicts [site]",
+            Self::OtherBandwidth => "contradicts noise.bandwidth_hz",
             Self::Unsorted => "is not in increasing order",
         })
     }

@@ -10,6 +10,7 @@ use uav_relay::{Geodetic, Placement};
 use super::check::{mistake, unread};
 use super::error::{Problem, ScenarioError};
 use super::keys::number;
+use super::link::{Access, Link, RateModel, RateStep};
 use super::number::{factor, watts};
 use super::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, Planned,
@@ -30,6 +31,7 @@ pub(super) struct RawFile {
     relay: Vec<RawRelay>,
     #[serde(default)]
     noise: RawNoise,
+    link: Option<RawDataLink>,
     field: Option<RawField>,
     site: Option<RawSites>,
     listen: Option<RawListen>,
@@ -80,6 +82,16 @@ struct RawNoise {
     bandwidth_hz: Option<f64>,
     figure_db: Option<f64>,
     power_dbm: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawDataLink {
+    #[serde(default)]
+    access: Access,
+    bandwidth_hz: Option<f64>,
+    gap_db: Option<f64>,
+    steps: Option<Vec<RateStep>>,
 }
 
 #[derive(Deserialize)]
@@ -193,6 +205,10 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
             relative_error: raw.relative_error,
         }),
         noise: noise(&raw.noise, &powers),
+        link: raw
+            .link
+            .map(|link| data_link(file, link, raw.noise.bandwidth_hz))
+            .transpose()?,
         relays: relays(file, raw.relay, powers.uav_gain_dbi)?,
         plan: raw.plan.map(|plan| planned(file, plan)).transpose()?,
     })
@@ -206,6 +222,61 @@ fn noise(raw: &RawNoise, powers: &Powers) -> Noise {
         power_dbm: raw.power_dbm,
         gains_dbi: [powers.uav_gain_dbi, powers.rx_gain_dbi],
     }
+}
+
+fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link, ScenarioError> {
+    // A noise bandwidth of 0 means that there is no noise.
+    if let (Some(own), Some(noise)) = (raw.bandwidth_hz, noise_hz.filter(|hz| *hz > 0.0))
+        && own.total_cmp(&noise).is_ne()
+    {
+        return Err(mistake(
+            file,
+            "link.bandwidth_hz",
+            Some(number(own)),
+            Problem::OtherBandwidth,
+            format!(
+                "{} Hz (noise.bandwidth_hz), or one of the two keys",
+                number(noise)
+            ),
+        ));
+    }
+    let steps = raw.steps.unwrap_or_default();
+    for (index, (before, here)) in (1..).zip(steps.iter().zip(steps.iter().skip(1))) {
+        let pairs = [
+            ("sinr_db", before.sinr_db, here.sinr_db, "90 dB"),
+            (
+                "bits_per_hz",
+                before.bits_per_hz,
+                here.bits_per_hz,
+                "100 bit/s/Hz",
+            ),
+        ];
+        for (key, before, here, most) in pairs {
+            if here <= before {
+                return Err(mistake(
+                    file,
+                    &format!("link.steps[{index}].{key}"),
+                    Some(number(here)),
+                    Problem::Unsorted,
+                    format!(
+                        "above {} (the {key} of the entry before it) to {most}",
+                        number(before)
+                    ),
+                ));
+            }
+        }
+    }
+    Ok(Link {
+        access: raw.access,
+        bandwidth_hz: raw.bandwidth_hz,
+        model: if steps.is_empty() {
+            RateModel::Shannon {
+                gap_db: raw.gap_db.unwrap_or_default(),
+            }
+        } else {
+            RateModel::Steps(steps)
+        },
+    })
 }
 
 fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {

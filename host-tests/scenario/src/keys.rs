@@ -8,6 +8,7 @@ use Rule::{Choice, LinkOrNumber, Number, Text, Whole};
 use toml::Table;
 
 use super::endpoint::FORM;
+use super::link::Access;
 use super::spec::PlannedMethod;
 
 /// Range of numbers; both ends are included, except a low end that is `open`.
@@ -125,6 +126,7 @@ pub(super) const FILE: Keys = &[
     optional("relay", Rule::Tables(RELAY, 0)),
     optional("field", Rule::Table(FIELD)),
     optional("noise", Rule::Table(NOISE)),
+    optional("link", Rule::Table(LINK)),
     optional("site", Rule::Table(SITES)),
     optional("listen", Rule::Table(LISTEN)),
     optional("plan", Rule::Table(PLAN)),
@@ -199,6 +201,24 @@ const NOISE: Keys = &[
     ),
     without(&["power_dbm"], "figure_db", Number(range(0.0, 60.0, "dB"))),
     optional("power_dbm", Number(range(-200.0, 0.0, "dBm"))),
+];
+
+const LINK: Keys = &[
+    optional("access", Choice(Access::NAMES)),
+    optional("bandwidth_hz", Number(range(1.0, 1e12, "Hz"))),
+    without(&["steps"], "gap_db", Number(range(0.0, 30.0, "dB"))),
+    optional("steps", Rule::Tables(RATE_STEP, 1)),
+];
+
+const RATE_STEP: Keys = &[
+    required("sinr_db", Number(range(-60.0, 90.0, "dB"))),
+    required(
+        "bits_per_hz",
+        Number(Range {
+            unit: "bit/s/Hz",
+            ..above(0.0, 100.0)
+        }),
+    ),
 ];
 
 const INTERFERER: Keys = &[

@@ -22,6 +22,7 @@ mod file;
 pub mod hypothetical;
 pub mod key;
 mod keys;
+pub mod link;
 pub mod mission;
 pub mod number;
 pub mod scene;

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Listen};
 
+use super::link::Link;
 use super::number::{factor, narrow, watts};
 
 /// Parameters of a flight, in SI units. x is along the line from Tx (x = 0) to Rx, y to its right as seen from above.
@@ -41,6 +42,8 @@ pub struct Scenario {
     pub listen: Option<ListenSpec>,
     /// Receiver noise.
     pub noise: Noise,
+    /// Data link, if the file has one.
+    pub link: Option<Link>,
     /// Differences of single relays, by index (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
     /// Plan, if the file has one.
@@ -254,6 +257,7 @@ impl Default for Scenario {
             }]),
             listen: None,
             noise: Noise::default(),
+            link: None,
             relays: BTreeMap::new(),
             plan: None,
         }
@@ -261,6 +265,12 @@ impl Default for Scenario {
 }
 
 impl Scenario {
+    /// Returns the bandwidth of the data link, Hz: that of `[link]`, or else that of `[noise]`; `None` without either.
+    pub fn bandwidth_hz(&self) -> Option<f64> {
+        let own = self.link.as_ref().and_then(|link| link.bandwidth_hz);
+        own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))
+    }
+
     /// Returns true if the interference is given; it may be missing if the relays locate the interferer.
     pub fn knows_interference(&self) -> bool {
         !matches!(&self.interference, Interference::Sources(sources) if sources.is_empty())

@@ -71,6 +71,7 @@ pub(crate) fn scenario(
     let scenario = Scenario {
         line: None,
         listen: None,
+        link: None,
         plan: None,
         distance_m: d,
         altitude_m,

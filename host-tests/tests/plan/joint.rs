@@ -72,6 +72,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     Scenario {
         line: None,
         listen: None,
+        link: None,
         plan: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,

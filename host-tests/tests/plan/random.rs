@@ -78,6 +78,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
     Scenario {
         line: None,
         listen: None,
+        link: None,
         plan: None,
         distance_m: d,
         altitude_m,

@@ -46,6 +46,7 @@ fn a_file_with_every_key_means_what_it_says() {
     let expected = Scenario {
         line: None,
         listen: None,
+        link: None,
         plan: None,
         distance_m: 1500.0,
         altitude_m: 25.0,

@@ -33,6 +33,8 @@ fn every_table_refuses_unknown_keys_and_lists_its_own() {
         in_field("[field]\nmax = 1\n"),
         in_field("[field]\ni_max_w = 1\nbeta = [{ gamma = 1 }]\n"),
         small("[noise]\nfloor_dbm = -100\n"),
+        small("[link]\nrate = 3\n"),
+        small("[link]\nsteps = [{ sinr = 3 }]\n"),
         // Keys that are nearly right, and one that is not.
         small("").replace("distance_m", "distnce_m"),
         small("").replace("[geometry]", "[geometri]"),
@@ -73,6 +75,35 @@ fn keys_that_contradict_each_other_are_refused() {
         field("0"),
         field("0.0"),
     ]));
+}
+
+#[test]
+fn a_data_link_that_cannot_be_is_refused() {
+    let steps = |second: &str| {
+        small(&format!(
+            "[link]\nsteps = [{{ sinr_db = 2, bits_per_hz = 0.5 }}, {second}]\n"
+        ))
+    };
+    insta::assert_snapshot!(refusals(&[
+        small("[link]\naccess = \"fdma\"\n"),
+        small("[link]\nbandwidth_hz = 0\n"),
+        small("[link]\nbandwidth_hz = 1e7\n[noise]\nbandwidth_hz = 2e7\n"),
+        small("[link]\ngap_db = -1\n"),
+        small("[link]\nsteps = []\n"),
+        small("[link]\ngap_db = 3\nsteps = [{ sinr_db = 2, bits_per_hz = 0.5 }]\n"),
+        steps("{ sinr_db = 2, bits_per_hz = 1 }"),
+        steps("{ sinr_db = 5, bits_per_hz = 0.5 }"),
+        steps("{ sinr_db = 5, bits_per_hz = 0 }"),
+        steps("{ sinr_db = nan, bits_per_hz = 1 }"),
+    ]));
+    // Without noise its bandwidth may be 0.
+    let silent = parse(&small(
+        "[link]\nbandwidth_hz = 1e7\n[noise]\nbandwidth_hz = 0\n",
+    ))
+    .unwrap();
+    assert_eq!(silent.bandwidth_hz(), Some(1e7));
+    let of_noise = parse(&small("[link]\n[noise]\nbandwidth_hz = 2e7\n")).unwrap();
+    assert_eq!(of_noise.bandwidth_hz(), Some(2e7));
 }
 
 #[test]

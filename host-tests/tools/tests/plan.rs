@@ -199,7 +199,7 @@ fn rates_are_divided_by_the_slots() {
         "data rate: 1.57",
         "e6 bit/s: 13 hops share one frequency in 13 equal time slots, and the worst hop carries ",
         "largest data rate: 1 relay carries 6.58",
-        "e6 bit/s; no other number carries more\n",
+        "e6 bit/s, more than 12 relays do; no other number carries more\n",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
@@ -218,7 +218,7 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
     for part in [
         "--target-rate-bps 20000000.0: no number of relays carries it: all hops share one frequency in equal time slots",
         "1 relay carries 6.58",
-        "--bandwidth-hz",
+        "a larger bandwidth than 10000000.0 Hz",
     ] {
         assert!(line.contains(part), "{part}: {line}");
     }
@@ -246,6 +246,106 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
     assert!(uavs > 1 && uavs <= best, "{met}");
     let fewer = ask(&format!("--uavs {}", uavs - 1));
     assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
+}
+
+/// Chain in noise with `[link]` and `more`.
+fn linked(more: &str) -> tempfile::NamedTempFile {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let text = "[geometry]\ndistance_m = 10000\naltitude_m = 20\n[power]\ntx_w = 1\nuav_w = 1\n[channel]\nexcess_loss_los_db = 30\n\
+                excess_loss_nlos_db = 50\n[noise]\nbandwidth_hz = 1e7\n[[interferer]]\npower_w = 1e-6\nx_m = 5000\ny_m = 1e6\n[link]\n";
+    std::fs::write(&file, format!("{text}{more}")).unwrap();
+    file
+}
+
+#[test]
+fn a_frequency_for_each_hop_carries_the_rate_of_the_worst_hop() {
+    let file = linked("access = \"channels\"\ngap_db = 3\n");
+    let path = file.path().to_str().unwrap();
+    let mut before = 0.0;
+    for relays in [1, 4, 16] {
+        let report = json(&format!("--scenario {path} --uavs {relays}"));
+        let sir = number(&report["sir"]);
+        let expected = 1e7 * (1.0 + sir / 10_f64.powf(0.3)).log2();
+        let rate = number(&report["rate_bps"]);
+        assert!((rate / expected - 1.0).abs() < 1e-12, "{report}");
+        assert_eq!(report["slots"].as_u64(), Some(1));
+        assert_eq!(report["access"].as_str(), Some("channels"));
+        assert!(rate > before, "{relays}");
+        before = rate;
+    }
+    let output = plan(&format!("--scenario {path} --uavs 4"));
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        table.contains("bit/s: 5 hops have a frequency each, and the worst hop carries "),
+        "{table}"
+    );
+}
+
+#[test]
+fn steps_of_a_radio_are_met_by_the_fewest_relays() {
+    let steps = "steps = [{ sinr_db = -5, bits_per_hz = 0.2 }, { sinr_db = 5, bits_per_hz = 1 }]\n";
+    let file = linked(&format!("access = \"channels\"\n{steps}"));
+    let path = file.path().to_str().unwrap();
+    let met = json(&format!("--scenario {path} --target-rate-bps 9e6 --rates"));
+    let uavs = met["uavs"].as_u64().unwrap();
+    assert!(
+        number(&met["sir_db"]) >= 5.0 && (number(&met["rate_bps"]) - 1e7).abs() < 1e-6,
+        "{met}"
+    );
+    let fewer = json(&format!("--scenario {path} --uavs {}", uavs - 1));
+    assert!(number(&fewer["sir_db"]) < 5.0, "{fewer}");
+    assert!((number(&fewer["rate_bps"]) - 2e6).abs() < 1e-6, "{fewer}");
+    // The largest step is reached: no other number carries more.
+    assert_eq!(met["best_uavs"].as_u64(), Some(uavs), "{met}");
+    assert_eq!(met["best_is_proven"].as_bool(), Some(true), "{met}");
+    let rates = met["rates"].as_array().unwrap();
+    assert_eq!(rates.len() as u64, uavs);
+    for (relays, rate) in (1..).zip(rates) {
+        assert_eq!(rate["uavs"].as_u64(), Some(relays));
+    }
+    // One frequency divides the steps by the slots.
+    let slots = linked(steps);
+    let path = slots.path().to_str().unwrap();
+    let shared = json(&format!("--scenario {path} --uavs {uavs}"));
+    let expected = 1e7 / (number(&shared["uavs"]) + 1.0);
+    assert!(
+        (number(&shared["rate_bps"]) / expected - 1.0).abs() < 1e-12,
+        "{shared}"
+    );
+    // Below the first step no data passes.
+    let high = linked("steps = [{ sinr_db = 80, bits_per_hz = 1 }]\n");
+    let output = plan(&format!("--scenario {} --uavs 2", high.path().display()));
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(table.contains("largest data rate: 0 bit/s: the worst hop of any number of relays is below the first of link.steps\n"), "{table}");
+}
+
+#[test]
+fn a_rate_needs_one_bandwidth() {
+    let (status, line) = refusal("--target-rate-bps 5");
+    assert_eq!(status, 2, "{line}");
+    let allowed = "the bandwidth is missing; allowed: --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz";
+    assert!(
+        line.contains(&format!("--target-rate-bps 5.0: {allowed}")),
+        "{line}"
+    );
+    let (_, line) = refusal("--uavs 2 --rates");
+    assert!(line.contains(&format!("--rates: {allowed}")), "{line}");
+    let file = linked("");
+    let noise = json(&format!("--scenario {} --uavs 1", file.path().display()));
+    assert!(
+        (number(&noise["bandwidth_hz"]) - 1e7).abs() < 1e-6,
+        "{noise}"
+    );
+    let own = linked("bandwidth_hz = 1e7\n");
+    let (status, line) = refusal(&format!(
+        "--uavs 1 --bandwidth-hz 2e7 --scenario {}",
+        own.path().display()
+    ));
+    assert_eq!(status, 2, "{line}");
+    assert!(
+        line.contains("--bandwidth-hz 20000000.0: contradicts link.bandwidth_hz = 10000000.0 of "),
+        "{line}"
+    );
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
 use uav_relay_scenario::deployment::{Companion, Deployment, agree};
+use uav_relay_scenario::link::Access;
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_sim::svg::{Picture, room};
@@ -12,9 +13,9 @@ use uav_relay_sim::{command, svg};
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
 use uav_relay_tools::plan::map::{Map, geojson, kml};
-use uav_relay_tools::plan::rate::Rates;
+use uav_relay_tools::plan::rate::{Radio, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
-use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why, rate};
+use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
 
 fn main() -> ExitCode {
@@ -42,9 +43,16 @@ fn run(options: &Options) -> Result<(), Failure> {
         x_m: options.x_m,
         tolerance: options.tolerance,
     };
-    let planned = match options.target_rate() {
-        Some(target) => by_rate(&scenario, &ask, target),
-        None => plain(&scenario, &ask, options.bandwidth_hz),
+    let radio = radio(options, &scenario)?;
+    let planned = match (options.wanted.target_rate_bps, &radio) {
+        (Some(target_bps), Some(radio)) => by_rate(&scenario, &ask, radio, target_bps),
+        (_, radio) => plain(&scenario, &ask, radio.as_ref()),
+    };
+    let listed = |mut rates: RateReport| {
+        if !options.rates {
+            rates.rates.clear();
+        }
+        rates
     };
     match planned {
         Ok(Planned {
@@ -61,7 +69,8 @@ fn run(options: &Options) -> Result<(), Failure> {
             }
             write_map(options, &scenario, &plan)?;
             let next = write_out(options, &scenario, &plan, number)?;
-            let asked = match options.target_rate() {
+            let rates = rates.map(listed);
+            let asked = match options.wanted.target_rate_bps {
                 // The SIR that a rate needs was not itself requested.
                 Some(_) => Number::Of(uavs),
                 None => number,
@@ -80,6 +89,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         Ok(Planned {
             plan: None, rates, ..
         }) => {
+            let rates = rates.map(listed);
             let error = rates.as_ref().map(too_fast).unwrap_or_default();
             let why = Why::Plain(error);
             let report = PlanReport::unmet(&why, None, Number::Of(0), options.unit());
@@ -113,17 +123,45 @@ struct Planned {
     rates: Option<RateReport>,
 }
 
-/// Plans for a number of relays or an SIR, with data rates if a bandwidth is given.
-fn plain(
-    scenario: &Scenario,
-    ask: &PlanRequest,
-    bandwidth_hz: Option<f64>,
-) -> Result<Planned, NoPlan> {
+/// Returns the data link if data rates are requested, by an option or by `[link]` in the file.
+fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failure> {
+    let target_bps = options.wanted.target_rate_bps;
+    let is_asked = options.rates || target_bps.is_some() || options.bandwidth_hz.is_some();
+    if !is_asked && scenario.link.is_none() {
+        return Ok(None);
+    }
+    let of_file = scenario.link.as_ref().and_then(|link| link.bandwidth_hz);
+    if let (Some(own), Some(file)) = (options.bandwidth_hz, of_file)
+        && own.total_cmp(&file).is_ne()
+    {
+        return Err(Failure::input(format!(
+            "--bandwidth-hz {own:?}: contradicts link.bandwidth_hz = {file:?} of {}; allowed: one of the two",
+            options.file()
+        )));
+    }
+    let Some(bandwidth_hz) = options.bandwidth_hz.or_else(|| scenario.bandwidth_hz()) else {
+        let asked = match (target_bps, options.rates) {
+            (Some(target_bps), _) => format!("--target-rate-bps {target_bps:?}"),
+            (None, true) => "--rates".to_owned(),
+            (None, false) => format!("{}: link", options.file()),
+        };
+        return Err(Failure::input(format!(
+            "{asked}: the bandwidth is missing; allowed: --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz"
+        )));
+    };
+    Ok(Some(Radio {
+        link: scenario.link.clone().unwrap_or_default(),
+        bandwidth_hz,
+    }))
+}
+
+/// Plans for a number of relays or an SIR, with data rates over `radio` if there is one.
+fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Result<Planned, NoPlan> {
     let plan = plan::plan(scenario, ask)?;
-    let rates = match bandwidth_hz {
-        Some(bandwidth_hz) => {
-            let Rates { best, .. } = Rates::new(scenario, ask, bandwidth_hz, None)?;
-            Some(RateReport::new(Some(&plan), bandwidth_hz, None, best))
+    let rates = match radio {
+        Some(radio) => {
+            let Rates { best, all, .. } = Rates::new(scenario, ask, radio, None)?;
+            Some(RateReport::new(Some(&plan), radio, None, best, all))
         }
         None => None,
     };
@@ -137,13 +175,15 @@ fn plain(
 fn by_rate(
     scenario: &Scenario,
     ask: &PlanRequest,
-    (target_bps, bandwidth_hz): (f64, f64),
+    radio: &Radio,
+    target_bps: f64,
 ) -> Result<Planned, NoPlan> {
-    let Rates { best, meeting } = Rates::new(scenario, ask, bandwidth_hz, Some(target_bps))?;
-    let rates = RateReport::new(meeting.as_ref(), bandwidth_hz, Some(target_bps), best);
+    let Rates { best, all, meeting } = Rates::new(scenario, ask, radio, Some(target_bps))?;
+    let rates = RateReport::new(meeting.as_ref(), radio, Some(target_bps), best, all);
     let relays = meeting.as_ref().map_or(0, |plan| plan.places.len());
-    let slots = rate::slots(u16::try_from(relays).unwrap_or(u16::MAX));
-    let needed = rate::sir_for_hop(bandwidth_hz, target_bps * f64::from(slots));
+    let relays = u16::try_from(relays).unwrap_or(u16::MAX);
+    // A chain that carries the rate has the SIR for it.
+    let needed = radio.sir_for(relays, target_bps).unwrap_or(f64::INFINITY);
     Ok(Planned {
         plan: meeting,
         number: Number::Meeting(needed),
@@ -159,10 +199,16 @@ fn too_fast(rates: &RateReport) -> String {
     } else {
         format!("no number of relays from 1 to {tried}")
     };
+    let shared = if rates.access == Access::Slots.name() {
+        "all hops share one frequency in equal time slots"
+    } else {
+        "every hop has a frequency of its own"
+    };
     format!(
-        "--target-rate-bps {target_bps:?}: {among} carries it: all hops share one frequency in equal time slots; {}. Ask for less, or for more \
-         with a larger --bandwidth-hz",
-        rates.best
+        "--target-rate-bps {target_bps:?}: {among} carries it: {shared}; {}. Ask for less, or for more with a larger bandwidth than \
+         {:?} Hz",
+        rates.largest(),
+        rates.bandwidth_hz
     )
 }
 
@@ -216,10 +262,14 @@ struct Options {
     /// Required place of the only relay, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
     #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
     x_m: Option<f64>,
-    /// Bandwidth of the one frequency that all hops share, hertz, 1 to 1e12. Adds the data rate: log2(1 + SIR) bit/s per hertz of
-    /// the worst hop, divided by the N + 1 time slots; and the number of relays with the largest data rate
+    /// Bandwidth of one frequency, hertz, 1 to 1e12; by default link.bandwidth_hz, or else noise.bandwidth_hz. Adds the data rate:
+    /// that of the worst hop by the rate model of [link], by default log2(1 + SIR) bit/s per hertz, divided by the N + 1 time slots
+    /// unless link.access is "channels"; and the number of relays with the largest data rate
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
     bandwidth_hz: Option<f64>,
+    /// List the data rate of 1, 2, 3 and more relays, up to the number where no larger one can carry more. Needs a bandwidth
+    #[arg(long)]
+    rates: bool,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1
     #[arg(long, value_name = "T", default_value_t = 1e-4, value_parser = |text: &str| number(text, 1e-6, 0.1))]
     tolerance: f64,
@@ -257,8 +307,8 @@ struct Wanted {
     /// --target-sir in dB, -90 to 90
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = |text: &str| number(text, -90.0, 90.0))]
     target_sir_db: Option<f64>,
-    /// Find the fewest relays that carry this data rate, bit/s, 1e-9 to 1e15. All hops share one frequency. Needs --bandwidth-hz
-    #[arg(long, value_name = "R", requires = "bandwidth_hz", value_parser = |text: &str| number(text, 1e-9, 1e15))]
+    /// Find the fewest relays that carry this data rate, bit/s, 1e-9 to 1e15. Needs a bandwidth
+    #[arg(long, value_name = "R", value_parser = |text: &str| number(text, 1e-9, 1e15))]
     target_rate_bps: Option<f64>,
 }
 
@@ -291,12 +341,7 @@ impl Options {
         }
     }
 
-    /// Returns the requested data rate, bit/s, and the bandwidth, hertz.
-    fn target_rate(&self) -> Option<(f64, f64)> {
-        self.wanted.target_rate_bps.zip(self.bandwidth_hz)
-    }
-
-    /// Returns the requested number of relays; for a data rate see [`target_rate`](Self::target_rate).
+    /// Returns the requested number of relays; 1 if a data rate is requested.
     fn number(&self) -> Number {
         let wanted = &self.wanted;
         match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {
@@ -326,7 +371,7 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
                 .to_owned(),
         );
     }
-    if options.target_rate().is_none()
+    if options.wanted.target_rate_bps.is_none()
         && let Number::Of(relays) = options.number()
     {
         sections(options, relays)?;

@@ -1,10 +1,11 @@
-//! Data rates of a chain whose hops share one frequency in equal time slots.
+//! Data rates of a chain over the number of relays.
 //!
-//! The paper assumes one frequency, so each hop sends in one of N + 1 slots. N relays carry B log2(1 + SIR) / (N + 1), with the
-//! SIR of the worst hop: more relays raise the SIR but shorten the slots. Slots fitted to the hops, spatial reuse and separate
-//! frequencies per hop are not modelled.
+//! The paper assumes one frequency, so each hop sends in one of N + 1 slots: more relays raise the SIR of the worst hop but shorten
+//! the slots. With a frequency for each hop only the SIR counts. Slots fitted to the hops, and frequencies that several hops use at
+//! the same time, are not modelled.
 
 use serde::Serialize;
+use uav_relay_scenario::link::Link;
 use uav_relay_scenario::{Interference, Scenario};
 
 use super::{NoPlan, Number, Plan, PlanRequest};
@@ -15,24 +16,44 @@ const MOST_FAST: u16 = 200;
 /// Largest number of relays tried where a plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Returns the number of slots of a chain of `relays` relays: one per hop.
-pub const fn slots(relays: u16) -> u32 {
-    relays as u32 + 1
+/// Data link of a chain and the bandwidth of one frequency.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Radio {
+    /// Access and spectral efficiency.
+    pub link: Link,
+    /// Bandwidth, Hz.
+    pub bandwidth_hz: f64,
 }
 
-/// Returns the data rate of a hop while it sends, bit/s: Shannon's, with the interference as noise. `sir` is linear.
-pub fn hop_bps(bandwidth_hz: f64, sir: f64) -> f64 {
-    bandwidth_hz * sir.ln_1p() / std::f64::consts::LN_2
+impl Radio {
+    /// Returns the number of time slots of a chain of `relays` relays.
+    pub const fn slots(&self, relays: u16) -> u32 {
+        self.link.access.slots(relays)
+    }
+
+    /// Returns the data rate of a hop while it sends, bit/s; the interference counts as noise. `sir` is linear.
+    pub fn hop_bps(&self, sir: f64) -> f64 {
+        self.link.hop_bps(self.bandwidth_hz, sir)
+    }
+
+    /// Returns the data rate of a chain of `relays` relays, bit/s; `sir` is that of the worst hop, linear.
+    pub fn chain_bps(&self, relays: u16, sir: f64) -> f64 {
+        self.link.chain_bps(self.bandwidth_hz, relays, sir)
+    }
+
+    /// Returns the SIR (linear) of the worst hop with which `relays` relays carry a data rate; `None` if no step carries it.
+    pub fn sir_for(&self, relays: u16, rate_bps: f64) -> Option<f64> {
+        self.link.sinr_for(self.bandwidth_hz, relays, rate_bps)
+    }
 }
 
-/// Returns the SIR (linear) needed for a data rate over a bandwidth; the inverse of [`hop_bps`].
-pub fn sir_for_hop(bandwidth_hz: f64, rate_bps: f64) -> f64 {
-    (rate_bps / bandwidth_hz * std::f64::consts::LN_2).exp_m1()
-}
-
-/// Returns the data rate of a chain of `relays` relays, bit/s; `sir` is that of the worst hop, linear.
-pub fn chain_bps(bandwidth_hz: f64, relays: u16, sir: f64) -> f64 {
-    hop_bps(bandwidth_hz, sir) / f64::from(slots(relays))
+/// Data rate of one number of relays.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct RateOf {
+    /// Number of relays.
+    pub uavs: u16,
+    /// Data rate of the chain, bit/s.
+    pub rate_bps: f64,
 }
 
 /// The number of relays with the largest data rate among those tried.
@@ -44,7 +65,7 @@ pub struct BestRate {
     pub best_rate_bps: f64,
     /// Numbers tried: 1 to this one.
     pub tried_uavs: u16,
-    /// True if no larger number can carry more: the SIR at the receiver is bounded, and the slots shorten.
+    /// True if no larger number can carry more, because the SIR at the receiver is bounded.
     pub best_is_proven: bool,
 }
 
@@ -53,6 +74,8 @@ pub struct BestRate {
 pub struct Rates {
     /// The number of relays with the largest data rate.
     pub best: BestRate,
+    /// Data rates of all numbers tried.
+    pub all: Vec<RateOf>,
     /// Plan with the fewest relays that carry the target, if one is given and can be met.
     pub meeting: Option<Plan>,
 }
@@ -64,17 +87,19 @@ impl Rates {
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
-        bandwidth_hz: f64,
+        radio: &Radio,
         target_bps: Option<f64>,
     ) -> Result<Self, NoPlan> {
         let most = most_tried(scenario, ask);
         let mut best: Option<BestRate> = None;
+        let mut all = Vec::new();
         let mut meeting = None;
         let mut refused = None;
         let mut bound_bps = f64::INFINITY;
         for relays in 1..=most {
             if let Some(best) = &mut best {
-                best.best_is_proven = bound_bps / f64::from(slots(relays)) <= best.best_rate_bps;
+                best.best_is_proven =
+                    bound_bps / f64::from(radio.slots(relays)) <= best.best_rate_bps;
                 if best.best_is_proven {
                     break;
                 }
@@ -92,9 +117,13 @@ impl Rates {
                 }
             };
             if relays == 1 {
-                bound_bps = hop_bps(bandwidth_hz, most_at_receiver(scenario, &plan));
+                bound_bps = radio.hop_bps(most_at_receiver(scenario, &plan));
             }
-            let rate_bps = chain_bps(bandwidth_hz, relays, plan.sir());
+            let rate_bps = radio.chain_bps(relays, plan.sir());
+            all.push(RateOf {
+                uavs: relays,
+                rate_bps,
+            });
             if best.is_none_or(|best| rate_bps > best.best_rate_bps) {
                 best = Some(BestRate {
                     best_uavs: relays,
@@ -110,7 +139,7 @@ impl Rates {
             }
         }
         match (best, refused) {
-            (Some(best), _) => Ok(Self { best, meeting }),
+            (Some(best), _) => Ok(Self { best, all, meeting }),
             (None, Some(none)) => Err(none),
             (None, None) => Err(NoPlan::Unmet(super::Why::default(), None)),
         }

@@ -7,8 +7,8 @@ use serde::Serialize;
 use uav_relay_scenario::Noise;
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
-use super::rate::BestRate;
-use super::{Number, Plan, Unit, Why, rate};
+use super::rate::{BestRate, Radio, RateOf};
+use super::{Number, Plan, Unit, Why};
 
 /// The hypothetical interferer that replaces several.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -36,41 +36,57 @@ pub struct HypotheticalReport {
     pub gain: Option<f64>,
 }
 
-/// Data rates of a chain whose hops share one frequency in equal time slots.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+/// Data rates of a chain.
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
     /// Data rate of the chain, bit/s: that of the worst hop over the number of slots. Absent without a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<f64>,
-    /// Data rate of the worst hop while it sends, bit/s: bandwidth x log2(1 + SIR).
+    /// Data rate of the worst hop while it sends, bit/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<f64>,
-    /// Number of time slots: one per hop.
+    /// Number of time slots: one per hop on one frequency, 1 with a frequency for each hop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
+    /// How the hops share the radio, as in the file.
+    pub access: &'static str,
+    /// Bandwidth of one frequency, Hz.
+    pub bandwidth_hz: f64,
     /// Target, bit/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_rate_bps: Option<f64>,
     /// The number of relays with the largest data rate.
     #[serde(flatten)]
     pub best: BestRate,
+    /// Data rates of all numbers tried, if they are requested.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rates: Vec<RateOf>,
+    /// Number of relays of the plan; 0 without a plan.
+    #[serde(skip)]
+    relays: u16,
 }
 
 impl RateReport {
-    /// Creates the report of `plan` over `bandwidth_hz`; without a plan it has only the largest rate.
+    /// Creates the report of `plan`; without a plan it has only the largest rate. `rates` are those to list.
     pub fn new(
         plan: Option<&Plan>,
-        bandwidth_hz: f64,
+        radio: &Radio,
         target_rate_bps: Option<f64>,
         best: BestRate,
+        rates: Vec<RateOf>,
     ) -> Self {
-        let relays = |plan: &Plan| u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+        let relays = plan.map(|plan| u16::try_from(plan.places.len()).unwrap_or(u16::MAX));
+        let relays = relays.unwrap_or(0);
         Self {
-            rate_bps: plan.map(|plan| rate::chain_bps(bandwidth_hz, relays(plan), plan.sir())),
-            hop_rate_bps: plan.map(|plan| rate::hop_bps(bandwidth_hz, plan.sir())),
-            slots: plan.map(|plan| rate::slots(relays(plan))),
+            rate_bps: plan.map(|plan| radio.chain_bps(relays, plan.sir())),
+            hop_rate_bps: plan.map(|plan| radio.hop_bps(plan.sir())),
+            slots: plan.map(|_| radio.slots(relays)),
+            access: radio.link.access.name(),
+            bandwidth_hz: radio.bandwidth_hz,
             target_rate_bps,
             best,
+            rates,
+            relays,
         }
     }
 
@@ -78,10 +94,15 @@ impl RateReport {
         if let (Some(rate_bps), Some(hop_bps), Some(slots)) =
             (self.rate_bps, self.hop_rate_bps, self.slots)
         {
+            let hops = u32::from(self.relays) + 1;
+            let shared = if slots > 1 {
+                format!("{hops} hops share one frequency in {slots} equal time slots, and ")
+            } else {
+                format!("{hops} hops have a frequency each, and ")
+            };
             _ = writeln!(
                 text,
-                "data rate: {rate_bps:.6e} bit/s: {slots} hops share one frequency in {slots} equal time slots, and the worst hop carries \
-                 {hop_bps:.6e} bit/s while it sends"
+                "data rate: {rate_bps:.6e} bit/s: {shared}the worst hop carries {hop_bps:.6e} bit/s while it sends"
             );
         }
         if let Some(target_bps) = self.target_rate_bps {
@@ -90,32 +111,59 @@ impl RateReport {
                 "target: {target_bps:.6e} bit/s; no fewer relays carry it"
             );
         }
-        _ = writeln!(text, "{}", self.best);
+        let mut before_bps = f64::NAN;
+        for RateOf { uavs, rate_bps } in &self.rates {
+            // With steps many numbers have the same rate; the first one is listed.
+            if rate_bps.total_cmp(&before_bps).is_ne() {
+                let (relays, verb) = relays_carry(*uavs);
+                _ = writeln!(text, "{uavs:5} {relays} {verb} {rate_bps:.6e} bit/s");
+            }
+            before_bps = *rate_bps;
+        }
+        _ = writeln!(text, "{}", self.largest());
     }
-}
 
-impl fmt::Display for BestRate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
+    /// Returns the sentence on the largest data rate.
+    pub fn largest(&self) -> String {
+        let BestRate {
             best_uavs,
             best_rate_bps,
             tried_uavs,
             best_is_proven,
-        } = self;
-        let (relays, verb) = if *best_uavs == 1 {
-            ("relay", "carries")
-        } else {
-            ("relays", "carry")
-        };
-        write!(
-            f,
-            "largest data rate: {best_uavs} {relays} {verb} {best_rate_bps:.6e} bit/s"
-        )?;
-        if *best_is_proven {
-            f.write_str("; no other number carries more")
-        } else {
-            write!(f, ", of 1 to {tried_uavs} relays")
+        } = self.best;
+        if !(best_rate_bps > 0.0) {
+            let any = if best_is_proven {
+                "any number of".to_owned()
+            } else {
+                format!("1 to {tried_uavs}")
+            };
+            return format!(
+                "largest data rate: 0 bit/s: the worst hop of {any} relays is below the first of link.steps"
+            );
         }
+        let (relays, verb) = relays_carry(best_uavs);
+        let other = self.relays;
+        let fewer = if best_uavs < other {
+            format!(", more than {other} relays do")
+        } else {
+            String::new()
+        };
+        let among = if best_is_proven {
+            "; no other number carries more".to_owned()
+        } else {
+            format!(", of 1 to {tried_uavs} relays")
+        };
+        format!(
+            "largest data rate: {best_uavs} {relays} {verb} {best_rate_bps:.6e} bit/s{fewer}{among}"
+        )
+    }
+}
+
+const fn relays_carry(number: u16) -> (&'static str, &'static str) {
+    if number == 1 {
+        ("relay", "carries")
+    } else {
+        ("relays", "carry")
     }
 }
 
