@@ -11,11 +11,11 @@ use serde::Deserialize;
 
 use crate::number::factor;
 
-/// How the hops share the radio.
+/// Access of the hops to the radio.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Access {
-    /// One frequency, and one of N + 1 equal time slots for each hop.
+    /// A single frequency, with one of N + 1 equal time slots for each hop.
     #[default]
     Slots,
     /// A frequency for each hop.
@@ -100,7 +100,7 @@ impl RateModel {
 /// Data link of a scenario.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Link {
-    /// How the hops share the radio.
+    /// Access of the hops to the radio.
     pub access: Access,
     /// Bandwidth of one frequency, Hz, 1 to 1e12; `None` for that of the noise.
     pub bandwidth_hz: Option<f64>,
@@ -119,7 +119,9 @@ impl Link {
         bandwidth_hz * self.model.bits_per_hz(sinr)
     }
 
-    /// Returns the SINR (linear) of the worst hop that a chain needs for a data rate; `None` if no step carries it.
+    /// Returns the SINR (linear) that every hop needs for a data rate of the chain.
+    ///
+    /// `None` if no step carries it.
     pub fn sinr_for(&self, bandwidth_hz: f64, relays: u16, rate_bps: f64) -> Option<f64> {
         let hop_bps = rate_bps * f64::from(self.access.slots(relays));
         self.model.sinr_for(hop_bps / bandwidth_hz)

@@ -265,7 +265,9 @@ impl Default for Scenario {
 }
 
 impl Scenario {
-    /// Returns the bandwidth of the data link, Hz: that of `[link]`, or else that of `[noise]`; `None` without either.
+    /// Returns the bandwidth of the data link, Hz.
+    ///
+    /// It is that of `[link]`, or else that of `[noise]`; `None` without either.
     pub fn bandwidth_hz(&self) -> Option<f64> {
         let own = self.link.as_ref().and_then(|link| link.bandwidth_hz);
         own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))

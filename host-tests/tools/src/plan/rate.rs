@@ -41,7 +41,9 @@ impl Radio {
         self.link.chain_bps(self.bandwidth_hz, relays, sir)
     }
 
-    /// Returns the SIR (linear) of the worst hop with which `relays` relays carry a data rate; `None` if no step carries it.
+    /// Returns the SIR (linear) that every hop of `relays` relays needs for a data rate.
+    ///
+    /// `None` if no step carries it.
     pub fn sir_for(&self, relays: u16, rate_bps: f64) -> Option<f64> {
         self.link.sinr_for(self.bandwidth_hz, relays, rate_bps)
     }

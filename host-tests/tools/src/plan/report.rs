@@ -48,7 +48,7 @@ pub struct RateReport {
     /// Number of time slots: one per hop on one frequency, 1 with a frequency for each hop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
-    /// How the hops share the radio, as in the file.
+    /// Access of the hops to the radio, as in the file.
     pub access: &'static str,
     /// Bandwidth of one frequency, Hz.
     pub bandwidth_hz: f64,

@@ -163,10 +163,12 @@ pub(crate) fn all() -> Vec<Step> {
 /// Integration test whose processes mostly wait for the wall clock.
 const WAITING_TEST: &str = "companion";
 
-/// Number of these tests at a time; more than the cores, because a companion uses a few per cent of one.
+/// Number of these tests at a time.
+///
+/// It exceeds the number of cores, because a companion uses a few per cent of one.
 const WAITING_TESTS: &str = "6";
 
-/// Returns the steps that run the tests of the whole workspace: those of other packages, those of chains, those that wait.
+/// Returns the steps that run all tests of the workspace.
 fn workspace_tests() -> Vec<Step> {
     let chains: Vec<String> = integration_tests()
         .into_iter()
