@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use host_tests::bench::{Bench, between_neighbours};
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
@@ -19,6 +20,9 @@ const LIMIT_MS: u64 = 2_000;
 /// Time limit for two setpoints at duplicates that receive each other, ms. A settled chain sends few frames.
 const HEARD_MS: u64 = 10_000;
 
+/// Time limit as above, ms, on a channel that loses frames: handshakes of settled chains may be lost.
+const HEARD_LOSSY_MS: u64 = 20_000;
+
 /// Time limit for duplicates that do not receive each other, ms: several claims in a row may be lost.
 const HIDDEN_MS: u64 = 40_000;
 
@@ -27,6 +31,10 @@ const FLIES_MS: u64 = 60_000;
 
 /// Time of observation after the second duplicate was switched on, ms.
 const WATCHED_MS: u64 = 100_000;
+
+/// Time at which two settled chains come into range of each other, ms, and time of observation from then on.
+const MEETING_MS: u64 = 200_000;
+const MET_MS: u64 = 60_000;
 
 /// Medium between the duplicates and the other relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -222,4 +230,144 @@ fn of_two_with_one_index_on_links_one_has_a_setpoint() {
 #[test]
 fn of_two_hidden_ones_with_one_index_one_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
+}
+
+/// Two chains with a common index on a shared channel, each with half of the other relays, which come into range once both hold.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    relays: u16,
+    twice: u16,
+    loss: f64,
+    /// Epochs of the duplicates.
+    epochs: [u32; 2],
+    /// True if only the duplicates receive each other, false if all relays do.
+    only_duplicates: bool,
+    seed: u64,
+}
+
+impl Meeting {
+    fn of(seed: u64, loss: f64) -> Self {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        // Only with an odd number of relays both chains have a quorum. Every index in turn.
+        let lines = [3, 5, 7].map(|relays| (1..=relays).map(move |twice| (relays, twice)));
+        let lines: Vec<(u16, u16)> = lines.into_iter().flatten().collect();
+        let (relays, twice) = lines[usize::try_from(seed).unwrap() % lines.len()];
+        Self {
+            relays,
+            twice,
+            loss,
+            epochs: [[5, 5], [5, 6], [6, 5]][rng.random_range(0..3)],
+            only_duplicates: rng.random(),
+            seed,
+        }
+    }
+
+    /// Returns the indices in the chain of the first duplicate, without its own.
+    fn first_chain(&self, rng: &mut ChaCha8Rng) -> Vec<u16> {
+        let mut others: Vec<u16> = (1..=self.relays).collect();
+        others.retain(|index| *index != self.twice);
+        // Neighbours are at most four indices apart.
+        let links = |chain: &[u16]| {
+            let mut chain = [chain, &[self.twice]].concat();
+            chain.sort_unstable();
+            chain.windows(2).all(|pair| pair[1] - pair[0] <= 4)
+        };
+        loop {
+            others.shuffle(rng);
+            let (first, second) = others.split_at(others.len() / 2);
+            if links(first) && links(second) {
+                return first.to_vec();
+            }
+        }
+    }
+
+    /// Returns the longest time with two setpoints from the meeting on, ms, and the number of setpoints in the end.
+    fn fly(self) -> (u64, usize) {
+        let rng = &mut ChaCha8Rng::seed_from_u64(self.seed);
+        let chain = self.first_chain(rng);
+        let mission = mission(self.relays);
+        let mut relay = |index, epoch| {
+            let identity = Identity { network: 7, index };
+            let settings = Settings {
+                wiring: Wiring::Shared,
+                auth: Some(Auth {
+                    key: Key::new([7; 32]),
+                    epoch,
+                }),
+                ..Settings::default()
+            };
+            Relay::new(mission, identity, settings, rng.random(), Instant::ZERO).unwrap()
+        };
+        let relays = (1..=self.relays)
+            .map(|index| relay(index, self.epochs[0]))
+            .collect();
+        let copy = relay(self.twice, self.epochs[1]);
+        let mut bench = Bench::new(relays, Instant::ZERO);
+        bench.latency = Duration::from_millis(STEP_MS);
+        bench.route = Box::new(|_, port, _| Some(port));
+        let meeting = Instant::from_millis(MEETING_MS + STEP_MS * rng.random_range(0..1_000));
+        let duplicates = [self.twice, self.relays + 1].map(usize::from);
+        let mut losses = ChaCha8Rng::seed_from_u64(self.seed);
+        bench.fate = Box::new(move |frame| {
+            let is_first = |node| {
+                node == duplicates[0] || chain.iter().any(|index| usize::from(*index) == node)
+            };
+            let ends = [frame.from, frame.to];
+            let meets = !self.only_duplicates || ends.iter().all(|end| duplicates.contains(end));
+            let in_range =
+                is_first(frame.from) == is_first(frame.to) || frame.at >= meeting && meets;
+            in_range && !losses.random_bool(self.loss)
+        });
+        bench.switch_on(copy);
+        bench.run(meeting);
+        let flying = |bench: &Bench| {
+            let has = |node: &&usize| bench.relays[**node - 1].setpoint().is_some();
+            duplicates.iter().filter(has).count()
+        };
+        assert_eq!(flying(&bench), 2, "both chains hold: {self:?}");
+        let (mut run, mut longest) = (0, 0);
+        for _ in 0..MET_MS / STEP_MS {
+            bench.run_for(Duration::from_millis(STEP_MS));
+            run = if flying(&bench) == 2 {
+                run + STEP_MS
+            } else {
+                0
+            };
+            longest = longest.max(run);
+        }
+        let taken = Event::DuplicateIndex { node: self.twice };
+        let reported = |node: &usize| bench.has_raised(node - 1, taken);
+        assert!(duplicates.iter().any(reported), "{self:?}");
+        (longest, flying(&bench))
+    }
+}
+
+/// Checks that handshakes go with lease renewals. Two settled chains send no others, and no other frame makes a duplicate passive.
+#[test]
+fn of_two_settled_chains_with_one_index_one_loses_it() {
+    let mut faults = Vec::new();
+    for (loss, limit_ms) in [(0.0, HEARD_MS), (0.3, HEARD_LOSSY_MS)] {
+        let mut longest = Vec::new();
+        for seed in 0..number("COUNT", 45) {
+            let meeting = Meeting::of(seed, loss);
+            let (both, flying) = meeting.fly();
+            if both > limit_ms || flying != 1 {
+                faults.push((meeting, both, flying));
+            }
+            longest.push(both);
+        }
+        longest.sort_unstable();
+        println!(
+            "two settled chains that meet, loss {loss}: two setpoints for {} ms (half of {}), {} ms at most",
+            longest[longest.len() / 2],
+            longest.len(),
+            longest[longest.len() - 1]
+        );
+    }
+    assert!(
+        faults.is_empty(),
+        "{} of them: {:#?}",
+        faults.len(),
+        &faults[..faults.len().min(4)]
+    );
 }

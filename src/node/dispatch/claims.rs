@@ -104,16 +104,19 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns true if a handshake accompanies `message`: on a shared channel, once per lease renewal.
+    /// Returns true if a handshake accompanies `message`: on a shared channel, with every second lease renewal.
     ///
-    /// Another relay with this number then detects this one even if the chain sends nothing else.
+    /// Another relay with this number then detects this one even if the chain sends nothing else. On a lossy channel renewals are
+    /// retransmitted, each time with a handshake: one with every renewal would delay the chain's recovery.
     pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
-        let once = match message {
-            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
-            Message::Pulsed(pulsed) => pulsed.done,
-            _ => false,
+        let renewal = match message {
+            Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {
+                pulse.number
+            }
+            Message::Pulsed(pulsed) if pulsed.done => pulsed.number,
+            _ => return false,
         };
-        once && self.member.settings.wiring == Wiring::Shared
+        renewal % 2 == 0 && self.member.settings.wiring == Wiring::Shared
     }
 
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
