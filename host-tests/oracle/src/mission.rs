@@ -61,6 +61,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
         distance_m: link.distance_m,
         min_separation_m: link.min_separation_m,
         tx_w: link.tx_w,
+        rx_w: link.tx_w,
         sources: vec![Source {
             power_w: link.interferer_w,
             x_m: link.x_i,

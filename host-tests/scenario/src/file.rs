@@ -195,6 +195,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         lateral_max_m: geometry.lateral_max_m,
         min_separation_m: geometry.min_separation_m,
         tx_w: powers.tx_w,
+        rx_w: powers.rx_w,
         uav_w: powers.uav_w,
         channel: channel(file, &raw.channel)?,
         interference,
@@ -555,11 +556,14 @@ pub(super) struct RawPower {
     uav_w: Option<f64>,
     uav_dbm: Option<f64>,
     uav_gain_dbi: Option<f64>,
+    rx_w: Option<f64>,
+    rx_dbm: Option<f64>,
     rx_gain_dbi: Option<f64>,
 }
 
 pub(super) struct Powers {
     pub(super) tx_w: f64,
+    pub(super) rx_w: f64,
     pub(super) uav_w: f64,
     pub(super) uav_gain_dbi: f64,
     pub(super) rx_gain_dbi: f64,
@@ -631,8 +635,17 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
         eirp: ("", None),
         gain: ("uav_gain_dbi", raw.uav_gain_dbi),
     };
+    let rx = Said {
+        table,
+        in_w: ("rx_w", raw.rx_w),
+        in_dbm: ("rx_dbm", raw.rx_dbm),
+        eirp: ("", None),
+        gain: ("rx_gain_dbi", raw.rx_gain_dbi),
+    };
+    let tx_w = tx.of_ours(file)?.unwrap_or_default();
     Ok(Powers {
-        tx_w: tx.of_ours(file)?.unwrap_or_default(),
+        tx_w,
+        rx_w: rx.of_ours(file)?.unwrap_or(tx_w),
         uav_w: uav.of_ours(file)?.unwrap_or_default(),
         uav_gain_dbi: raw.uav_gain_dbi.unwrap_or_default(),
         rx_gain_dbi: raw.rx_gain_dbi.unwrap_or_default(),

@@ -183,6 +183,8 @@ const POWERS: Keys = &[
     unless(&["uav_dbm"], "uav_w", Number(POWER)),
     optional("uav_dbm", Number(POWER_DBM)),
     optional("uav_gain_dbi", Number(GAIN)),
+    without(&["rx_dbm"], "rx_w", Number(POWER)),
+    optional("rx_dbm", Number(POWER_DBM)),
     optional("rx_gain_dbi", Number(GAIN)),
 ];
 

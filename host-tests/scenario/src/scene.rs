@@ -50,6 +50,8 @@ pub struct Scene {
     pub min_separation_m: f64,
     /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,
+    /// Transmit power of Rx on the way back, W, > 0.
+    pub rx_w: f64,
     /// Interferers; at least one.
     pub sources: Vec<Source>,
     /// Path-loss factor between two relays, 1/m^2, > 0.
@@ -116,6 +118,7 @@ impl Scene {
             distance_m: scenario.distance_m,
             min_separation_m: scenario.min_separation_m,
             tx_w: scenario.tx_w,
+            rx_w: scenario.rx_w,
             sources: sources.clone(),
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
@@ -171,6 +174,32 @@ impl Scene {
         if let (Some(&last), Some(relay)) = (places.last(), self.relays.last()) {
             sirs.push(self.sir_at_rx(last, relay));
         }
+        sirs
+    }
+
+    /// Returns the SIR (linear) of the N + 1 hops on the way back from Rx to Tx.
+    ///
+    /// Hop k is sent by node k and received by node k - 1, where node 0 is Tx and node N + 1 is Rx. The interference is that at its
+    /// receiver. Empty and infinite as [`Scene::hop_sirs`].
+    pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
+        let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
+            return Vec::new();
+        };
+        if places.len() != self.relays.len() {
+            return Vec::new();
+        }
+        let Place { x, y, h } = first.into();
+        let signal = received_w(relay.power_w, self.eta, x, y, h);
+        let mut sirs = vec![signal / (self.interference_on_ground_w(0.0) + self.noise_w)];
+        let senders = places.iter().zip(&self.relays).skip(1);
+        let senders = senders.map(|(&at, relay)| self.sender(at, relay));
+        let rx = Sender {
+            at: Place::from((self.distance_m, 0.0)),
+            power_w: self.rx_w,
+            factor: self.eta,
+        };
+        let hops = places.iter().zip(senders.chain([rx]));
+        sirs.extend(hops.map(|(&at, sender)| self.sir_at(sender, at)));
         sirs
     }
 

@@ -32,6 +32,8 @@ pub struct Scenario {
     pub min_separation_m: f64,
     /// EIRP of the transmitter (power and antenna gain), W, 1e-6 to 1e6.
     pub tx_w: f64,
+    /// EIRP of the receiver on the way back to Tx, W, 1e-6 to 1e6; `tx_w` by default.
+    pub rx_w: f64,
     /// EIRP of relays without a power of their own, W, 1e-6 to 1e6.
     pub uav_w: f64,
     /// Radio channel.
@@ -248,6 +250,7 @@ impl Default for Scenario {
             lateral_max_m: 0.0,
             min_separation_m: 4.0,
             tx_w: 80.0,
+            rx_w: 80.0,
             uav_w: 1.0,
             channel: ChannelSpec::default(),
             interference: Interference::Sources(vec![Source {

@@ -32,7 +32,7 @@ const FLIES_MS: u64 = 60_000;
 /// Time of observation after the second duplicate was switched on, ms.
 const WATCHED_MS: u64 = 100_000;
 
-/// Time at which two settled chains come into range of each other, ms, and time of observation from then on.
+/// Time at which two settled chains come into range, ms, and time of observation after it.
 const MEETING_MS: u64 = 200_000;
 const MET_MS: u64 = 60_000;
 
@@ -232,7 +232,9 @@ fn of_two_hidden_ones_with_one_index_one_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
-/// Two chains with a common index on a shared channel, each with half of the other relays, which come into range once both hold.
+/// Two chains with a common index on a shared channel, each with half of the other relays.
+///
+/// They come into range once both hold.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
     relays: u16,
@@ -281,7 +283,7 @@ impl Meeting {
         }
     }
 
-    /// Returns the longest time with two setpoints from the meeting on, ms, and the number of setpoints in the end.
+    /// Returns the longest time with two setpoints, ms, and the number of setpoints in the end.
     fn fly(self) -> (u64, usize) {
         let rng = &mut ChaCha8Rng::seed_from_u64(self.seed);
         let chain = self.first_chain(rng);

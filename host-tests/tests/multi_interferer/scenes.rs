@@ -81,6 +81,7 @@ pub(crate) fn scenario(
         lateral_max_m: 0.0,
         min_separation_m,
         tx_w: uav_w * log_uniform(rng, 0.3, 100.0),
+        rx_w: uav_w,
         uav_w,
         channel: ChannelSpec {
             excess_loss_nlos_db: rng.random_range(0.1..=21.0),

@@ -82,6 +82,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
         lateral_max_m: corridor.right_m,
         min_separation_m: link.min_separation_m,
         tx_w: link.tx_w,
+        rx_w: link.tx_w,
         uav_w: link.relays[0].power_w,
         channel: ChannelSpec {
             carrier_hz: waves * LIGHT_M_PER_S / (4.0 * std::f64::consts::PI),

@@ -92,6 +92,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
             round(d * log_uniform(rng, 1e-4, 0.05))
         },
         tx_w: round(link.tx_w),
+        rx_w: round(link.tx_w),
         uav_w: round(link.relays[0].power_w),
         channel: ChannelSpec {
             air_ground: AirGround::Weight(rng.random_range(0.0..=1.0)),

@@ -81,6 +81,8 @@ fn power_rows() -> Vec<Row> {
         row("power.uav_w", power("tx_w = 1\nuav_w = @"), POWERS),
         row("power.uav_dbm", power("tx_w = 1\nuav_dbm = @"), POWERS_DBM),
         row("power.uav_gain_dbi", both("uav_gain_dbi"), GAINS),
+        row("power.rx_w", both("rx_w"), POWERS),
+        row("power.rx_dbm", both("rx_dbm"), POWERS_DBM),
         row("power.rx_gain_dbi", both("rx_gain_dbi"), GAINS),
     ]
 }
@@ -279,6 +281,7 @@ fn every_required_key_is_missed() {
         "lateral_max_m",
         "min_separation_m",
         "channel.",
+        "rx_w",
         "relay[1].a",
         "relay[1].p",
         "_dbm",

@@ -56,6 +56,7 @@ fn a_file_with_every_key_means_what_it_says() {
         lateral_max_m: 45.0,
         min_separation_m: 4.5,
         tx_w: 80.0,
+        rx_w: 80.0,
         uav_w: 2.0,
         channel: ChannelSpec {
             carrier_hz: 2.4e9,

@@ -104,7 +104,9 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns true if a handshake accompanies `message`: on a shared channel, with every second lease renewal.
+    /// Returns true if a handshake accompanies `message`.
+    ///
+    /// It does with every second lease renewal, on a shared channel.
     ///
     /// Another relay with this number then detects this one even if the chain sends nothing else. On a lossy channel renewals are
     /// retransmitted, each time with a handshake: one with every renewal would delay the chain's recovery.

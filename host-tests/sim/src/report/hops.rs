@@ -22,6 +22,11 @@ pub struct RelayReport {
     pub sir: f64,
     /// SIR of the hop that ends at the relay, dB.
     pub sir_db: f64,
+    /// SIR of the same hop on the way back, at the node before this relay, linear.
+    ///
+    /// Absent if it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir_back: Option<f64>,
     /// Version of the relay's mission, 0 for the original one; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
@@ -89,6 +94,7 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
             h_m: f64::from(place.altitude_m),
             sir,
             sir_db: db(sir),
+            sir_back: None,
             version: None,
         })
         .collect()

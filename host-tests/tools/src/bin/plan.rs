@@ -78,6 +78,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             show(
                 options,
                 &PlanReport::new(&plan, asked, options.unit())
+                    .with_way_back(&scenario, &plan)
                     .with_rates(rates)
                     .in_noise(&scenario.noise),
             )?;

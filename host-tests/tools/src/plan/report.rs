@@ -4,7 +4,9 @@ use std::fmt;
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay_scenario::Noise;
+use uav_relay::Placement;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Noise, Scenario};
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
 use super::rate::{BestRate, Radio, RateOf};
@@ -167,8 +169,44 @@ const fn relays_carry(number: u16) -> (&'static str, &'static str) {
     }
 }
 
+/// SIR on the way back from Rx to Tx. The positions are not chosen for it.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct WayBack {
+    /// SIR at the last relay of the hop from Rx, linear.
+    pub rx_sir_back: f64,
+    /// SIR of the worst hop, linear.
+    pub worst_back: f64,
+    /// SIR of the worst hop, dB.
+    pub worst_back_db: f64,
+    /// Node that receives the worst hop: 0 for Tx, otherwise the relay.
+    #[serde(skip)]
+    hop: usize,
+    /// Number of relays.
+    #[serde(skip)]
+    relays: u16,
+}
+
+impl WayBack {
+    fn describe(&self, unit: Unit) -> String {
+        let receiver = match self.hop {
+            0 => "Tx".to_owned(),
+            relay => format!("relay {relay}"),
+        };
+        let sender = if self.hop == usize::from(self.relays) {
+            "Rx".to_owned()
+        } else {
+            format!("relay {}", self.hop + 1)
+        };
+        format!(
+            "way back: worst hop {}, from {sender} to {receiver}",
+            unit.both(self.worst_back)
+        )
+    }
+}
+
 /// Limits of the model.
-const NOT_MODELLED: &str = "not modelled: terrain and obstacles, and the link from Rx back to Tx";
+const NOT_MODELLED: &str =
+    "not modelled: terrain and obstacles; not optimised: the way back from Rx to Tx";
 
 /// Result of `cargo plan`.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
@@ -191,6 +229,9 @@ pub struct PlanReport {
     /// SIR of the worst hop, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
+    /// SIR on the way back; absent in a field.
+    #[serde(flatten)]
+    pub way_back: Option<WayBack>,
     /// Data rates over the given bandwidth.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub rates: Option<RateReport>,
@@ -281,6 +322,7 @@ impl PlanReport {
             sir: Some(sir),
             sir_db: Some(db(sir)),
             rates: None,
+            way_back: None,
             target_sir,
             target_sir_db: target_sir.map(db),
             most_sir: plan.most,
@@ -318,6 +360,33 @@ impl PlanReport {
         }
     }
 
+    /// Adds the SIR of every hop on the way back from Rx to Tx, if the interference at Tx is known.
+    #[must_use]
+    pub fn with_way_back(mut self, scenario: &Scenario, plan: &Plan) -> Self {
+        let places: Vec<Placement> = plan.places.iter().map(|(place, _)| *place).collect();
+        let relays = u16::try_from(places.len()).unwrap_or(u16::MAX);
+        let Some(scene) = Scene::new(scenario, relays) else {
+            return self;
+        };
+        let sirs = scene.hop_sirs_back(&places);
+        for (relay, sir) in self.relays.iter_mut().zip(&sirs) {
+            relay.sir_back = Some(*sir);
+        }
+        let worst = sirs
+            .iter()
+            .copied()
+            .enumerate()
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        self.way_back = worst.zip(sirs.last()).map(|((hop, sir), rx_sir)| WayBack {
+            rx_sir_back: *rx_sir,
+            worst_back: sir,
+            worst_back_db: db(sir),
+            hop,
+            relays,
+        });
+        self
+    }
+
     /// Adds data rates.
     #[must_use]
     pub fn with_rates(self, rates: Option<RateReport>) -> Self {
@@ -350,6 +419,9 @@ impl PlanReport {
         if let (Some(case), Some(words)) = (self.case, &self.case_words) {
             let theorem = self.how.unwrap_or_default();
             _ = writeln!(text, "{words} ({theorem}, case {case})");
+        }
+        if let Some(way_back) = &self.way_back {
+            _ = writeln!(text, "{}", way_back.describe(unit));
         }
         if let Some(rates) = &self.rates {
             rates.describe(&mut text);
