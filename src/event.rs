@@ -73,7 +73,7 @@ pub enum Event {
     /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired: the relay holds its position and requests a new view. It is no longer certain that all relays of
+    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all relays of
     /// the view use the last agreement. Raised once until a view is agreed on.
     LeaseLapsed,
     /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its positions.

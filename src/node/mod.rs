@@ -1,7 +1,7 @@
 //! Protocol of one relay, in terms of messages and times, without bytes.
 //!
-//! Each of the five layers is a state machine with a state table and the same verbs: `handle` takes a message, `take_...` returns
-//! a pending message, `handle_timeout` and `next_timeout` handle timers. Layers do not call each other: each receives a `context`
+//! Each of the five layers is a state machine with a state table and the same verbs: `handle` processes a message, `poll_...`
+//! returns a pending message, `handle_timeout` and `next_timeout` handle timers. Layers do not call each other: each receives a `context`
 //! and returns effects, which `dispatch` applies to the others.
 //!
 //! | layer | content |

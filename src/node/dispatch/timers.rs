@@ -78,8 +78,9 @@ impl Node {
         let node = neighbour.node();
         let ended = neighbour.has_no_peer();
         let dead = layers.lease.span(settings);
-        let many = settings.wiring == Wiring::Shared && layers.lease.is_open();
-        let asking = many.then(|| patient_tick(settings, self.member.all));
+        // Until the first lease many relays may search on the channel at the same time.
+        let is_crowded = settings.wiring == Wiring::Shared && layers.lease.is_open();
+        let asking = is_crowded.then(|| patient_tick(settings, self.member.all));
         let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
         let ends = neighbour.has_no_peer() && !ended;
         self.steering

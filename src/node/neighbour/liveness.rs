@@ -74,7 +74,8 @@ pub(crate) struct Liveness {
     asked: [Instant; OPEN],
     /// Number of questions since the last sign of life.
     unanswered: u16,
-    /// Recent maximum of `unanswered` at an answer.
+    /// Recent maximum of `unanswered` at an answer. It starts at [`QUESTIONS`], so that a channel that is not known yet counts as a
+    /// bad one, and decays with each answer.
     longest: u16,
 }
 

@@ -52,8 +52,7 @@ impl Hello {
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes the fields in their order on the wire. Mission, neighbour, `behind`, newest view, digest and version of `holds`,
-    /// nonce, `hears`, and flags from bit 0: `ask`, `form`, `fresh`, `ready`, `flies`, `whole`, `refused`.
+    /// Encodes the fields in the order of FORMAT.md, with seven flags in one byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
             requests_reply: ask,
