@@ -264,7 +264,7 @@ struct Options {
     #[arg(long, value_name = "X", allow_negative_numbers = true, conflicts_with = "altitude", value_parser = along)]
     x_m: Option<f64>,
     /// Bandwidth of one frequency, hertz, 1 to 1e12. The default is link.bandwidth_hz, or else noise.bandwidth_hz. Adds the data rate:
-    /// that of the worst hop by the rate model of [link], by default log2(1 + SIR) bit/s per hertz, divided by the N + 1 time slots
+    /// that of the worst hop by the rate model of the scenario (link), by default log2(1 + SIR) bit/s per hertz, divided by the N + 1 time slots
     /// unless link.access is "channels"; and the number of relays with the largest data rate
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
     bandwidth_hz: Option<f64>,
