@@ -108,29 +108,9 @@ pub struct Link {
     pub model: RateModel,
 }
 
-impl Link {
-    /// Returns the data rate of a chain over `bandwidth_hz`, bit/s. `sinr` is that of the worst hop, linear.
-    pub fn chain_bps(&self, bandwidth_hz: f64, relays: u16, sinr: f64) -> f64 {
-        self.hop_bps(bandwidth_hz, sinr) / f64::from(self.access.slots(relays))
-    }
-
-    /// Returns the data rate of a hop while it sends, bit/s. `sinr` is linear.
-    pub fn hop_bps(&self, bandwidth_hz: f64, sinr: f64) -> f64 {
-        bandwidth_hz * self.model.bits_per_hz(sinr)
-    }
-
-    /// Returns the SINR (linear) that every hop needs for a data rate of the chain.
-    ///
-    /// `None` if no step carries it.
-    pub fn sinr_for(&self, bandwidth_hz: f64, relays: u16, rate_bps: f64) -> Option<f64> {
-        let hop_bps = rate_bps * f64::from(self.access.slots(relays));
-        self.model.sinr_for(hop_bps / bandwidth_hz)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Access, Link, RateModel, RateStep};
+    use super::{RateModel, RateStep};
 
     fn steps() -> RateModel {
         RateModel::Steps(vec![
@@ -172,19 +152,5 @@ mod tests {
         assert_eq!(model.sinr_for(0.1), Some(1.0));
         assert_eq!(model.sinr_for(0.6), Some(10.0));
         assert_eq!(model.sinr_for(2.1), None);
-    }
-
-    #[test]
-    fn hops_with_frequencies_of_their_own_share_no_time() {
-        let link = |access| Link {
-            access,
-            model: steps(),
-            ..Link::default()
-        };
-        let rate = |access| link(access).chain_bps(1e6, 4, 20.0);
-        assert!((rate(Access::Slots) - 4e5).abs() < 1e-6);
-        assert!((rate(Access::Channels) - 2e6).abs() < 1e-6);
-        assert_eq!(link(Access::Slots).sinr_for(1e6, 4, 4e5), Some(10.0));
-        assert_eq!(link(Access::Slots).sinr_for(1e6, 4, 4.1e5), None);
     }
 }

@@ -33,19 +33,20 @@ impl Radio {
 
     /// Returns the data rate of a hop while it sends, bit/s; the interference counts as noise. `sir` is linear.
     pub fn hop_bps(&self, sir: f64) -> f64 {
-        self.link.hop_bps(self.bandwidth_hz, sir)
+        self.bandwidth_hz * self.link.model.bits_per_hz(sir)
     }
 
     /// Returns the data rate of a chain of `relays` relays, bit/s; `sir` is that of the worst hop, linear.
     pub fn chain_bps(&self, relays: u16, sir: f64) -> f64 {
-        self.link.chain_bps(self.bandwidth_hz, relays, sir)
+        self.hop_bps(sir) / f64::from(self.slots(relays))
     }
 
     /// Returns the SIR (linear) that every hop of `relays` relays needs for a data rate.
     ///
     /// `None` if no step carries it.
     pub fn sir_for(&self, relays: u16, rate_bps: f64) -> Option<f64> {
-        self.link.sinr_for(self.bandwidth_hz, relays, rate_bps)
+        let hop_bps = rate_bps * f64::from(self.slots(relays));
+        self.link.model.sinr_for(hop_bps / self.bandwidth_hz)
     }
 }
 
@@ -181,4 +182,32 @@ fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
         .filter_map(|own| own.power_w)
         .fold(scenario.uav_w, f64::max);
     sir * squared / (lowest * lowest) * largest_w / f64::from(profile.power_w)
+}
+
+#[cfg(test)]
+mod tests {
+    use uav_relay_scenario::link::{Access, Link, RateModel, RateStep};
+
+    use super::Radio;
+
+    #[test]
+    fn hops_with_frequencies_of_their_own_share_no_time() {
+        let steps = [(0.0, 0.5), (10.0, 2.0)].map(|(sinr_db, bits_per_hz)| RateStep {
+            sinr_db,
+            bits_per_hz,
+        });
+        let radio = |access| Radio {
+            link: Link {
+                access,
+                bandwidth_hz: None,
+                model: RateModel::Steps(steps.to_vec()),
+            },
+            bandwidth_hz: 1e6,
+        };
+        let rate = |access| radio(access).chain_bps(4, 20.0);
+        assert!((rate(Access::Slots) - 4e5).abs() < 1e-6);
+        assert!((rate(Access::Channels) - 2e6).abs() < 1e-6);
+        assert_eq!(radio(Access::Slots).sir_for(4, 4e5), Some(10.0));
+        assert_eq!(radio(Access::Slots).sir_for(4, 4.1e5), None);
+    }
 }

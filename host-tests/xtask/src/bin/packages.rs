@@ -36,16 +36,9 @@ fn is_allowed(expression: &str) -> bool {
 /// Allowed duplicates: embedded-hal 1.0 needs the older defmt, a re-export of the newer one.
 const TWICE: [&str; 1] = ["defmt"];
 
-/// Returns the output of `cargo tree` for the locked packages, with every target and feature.
-fn tree(arguments: &[&str]) -> Result<String, String> {
+/// Returns the output of `cargo`.
+fn cargo(arguments: &[&str]) -> Result<String, String> {
     let output = Command::new("cargo")
-        .args([
-            "tree",
-            "--locked",
-            "--target=all",
-            "--all-features",
-            "--prefix=none",
-        ])
         .args(arguments)
         .output()
         .map_err(|error| format!("cargo: {error}"))?;
@@ -54,6 +47,18 @@ fn tree(arguments: &[&str]) -> Result<String, String> {
     } else {
         Err(String::from_utf8_lossy(&output.stderr).into_owned())
     }
+}
+
+/// Returns the output of `cargo tree` for the locked packages, with every target and feature.
+fn tree(arguments: &[&str]) -> Result<String, String> {
+    let common = [
+        "tree",
+        "--locked",
+        "--target=all",
+        "--all-features",
+        "--prefix=none",
+    ];
+    cargo(&[&common, arguments].concat())
 }
 
 fn licences() -> Result<Vec<String>, String> {
@@ -105,20 +110,13 @@ fn links(page: &str) -> impl Iterator<Item = &str> {
 
 /// Returns the links of the README to files that the packaged crate lacks.
 fn broken_links() -> Result<Vec<String>, String> {
-    let output = Command::new("cargo")
-        .args([
-            "package",
-            "--list",
-            "--locked",
-            "--allow-dirty",
-            "--package=uav-relay",
-        ])
-        .output()
-        .map_err(|error| format!("cargo: {error}"))?;
-    if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
-    }
-    let list = String::from_utf8_lossy(&output.stdout).into_owned();
+    let list = cargo(&[
+        "package",
+        "--list",
+        "--locked",
+        "--allow-dirty",
+        "--package=uav-relay",
+    ])?;
     let files: BTreeSet<&str> = list.lines().collect();
     let readme =
         std::fs::read_to_string("README.md").map_err(|error| format!("README.md: {error}"))?;
