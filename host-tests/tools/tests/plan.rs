@@ -628,7 +628,7 @@ fn a_map_has_rounded_numbers_with_units_in_their_names() {
     assert!(numbers > 20, "{text}");
 }
 
-/// Returns the paper's scenario with extra lines in `[power]`.
+/// Returns the paper's scenario followed by the lines or tables of `sections`.
 fn with(sections: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let text = std::fs::read_to_string(example("scenario.toml")).unwrap();
