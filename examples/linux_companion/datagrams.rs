@@ -135,7 +135,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that a refusal of an earlier datagram loses neither the next sent nor the next received datagram.
+    /// Checks that the refusal of a datagram loses neither the next sent nor the next received datagram.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

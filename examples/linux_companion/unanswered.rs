@@ -18,7 +18,7 @@ pub(crate) enum Answer {
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Best kind of data received, and the time since it has been received; `None` once the autopilot is found.
+    /// Best kind of data received, and the time of its first receipt. `None` once the autopilot is found.
     newest: Option<(Answer, Instant)>,
     told: Option<Answer>,
 }
@@ -31,7 +31,7 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the best kind of data received, `None` for an autopilot; returns a fault to report, once for each kind.
+    /// Handles the best kind of data received, `None` for an autopilot. Returns a fault to report, once for each kind.
     pub(crate) fn look(&mut self, now: Instant, heard: Option<Answer>) -> Option<Answer> {
         let (answer, since) = self.newest?;
         let Some(heard) = heard else {

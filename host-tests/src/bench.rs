@@ -119,7 +119,7 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Delivers the next frame that has arrived, or advances to the next timer or arrival, at most to `until`.
+    /// Delivers the next frame that has arrived, or advances to the next timer or arrival. Stops at `until`.
     ///
     /// Then all nodes handle their timers and send. Returns false at `until`.
     ///

@@ -195,7 +195,7 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles a retransmission of the current message by the previous relay, `path` hops from the initiator.
+    /// Handles a retransmission of the current message by the previous relay. The initiator is `path` hops away.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {

@@ -68,7 +68,7 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if its sender is passive.
     pub(crate) passive: bool,
-    /// True if the claim was sent after this relay's start: it names this relay's claim, or a key proves it.
+    /// True if the claim was sent after this relay's start, as this relay's claim in it or a key proves.
     pub(crate) is_current: bool,
 }
 

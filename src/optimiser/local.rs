@@ -238,7 +238,7 @@ impl LocalSearch {
         Some(u16::from(HALVINGS) + 4)
     }
 
-    /// Searches a row for the x at which both hops have equal SIRs; returns the best worst-hop SIR of the row.
+    /// Searches a row for the x at which both hops have equal SIRs. Returns the best worst-hop SIR of the row.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;

@@ -126,7 +126,7 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 /// Mean square relative error above which the measurements contradict an estimate.
 const CONTRADICTED: f64 = 0.25;
 
-/// Contradiction limit for the mission's interference, relative to the expected variance of a measurement.
+/// Contradiction limit for the mission's interference, relative to the variance of a measurement.
 const GUESSED: f64 = 16.0;
 
 /// Information at the time at which an estimate was adopted.
@@ -136,7 +136,7 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Expected mean square relative error of the estimate.
     chance: f64,
-    /// Number of refinements for the same interferer; for a moving interferer only refinements by more information.
+    /// Number of refinements for the same interferer. For a moving interferer, only refinements by more information.
     refined: u8,
     track: Track,
 }

@@ -372,7 +372,7 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the area searched for sources, in units of D / 2: from D before Tx to D beyond Rx, and 1.5 D to each side.
+/// Half width of the area searched for sources, in units of D / 2. It reaches D before Tx and beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
 /// Grid steps from the middle to the edge of the first grid.

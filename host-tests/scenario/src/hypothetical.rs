@@ -545,7 +545,7 @@ struct Corner {
     value: f64,
 }
 
-/// Returns the best point found by the simplex method from `start` with initial `steps`; never a worse one than `start`.
+/// Returns the best point found by the simplex method from `start` with initial `steps`. It is never worse than `start`.
 ///
 /// Ends when the values at the corners agree to `tolerance` (relative), or after `most` steps of at most four evaluations.
 fn minimise(

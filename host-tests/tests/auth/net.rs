@@ -69,7 +69,7 @@ pub(crate) struct Net {
     pub(crate) genuine: Vec<u32>,
     /// Lives of both ends of each link (from, to) on which a message was accepted last.
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// For each link, the sender's life that the receiver learned last, and the receiver's life at that time.
+    /// Last life of the sender that the receiver learned, and the receiver's life at that time, by link.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
     /// Frames signed before their sender knew of the receiver's last start.
     outdated: BTreeSet<usize>,

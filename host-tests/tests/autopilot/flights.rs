@@ -363,7 +363,7 @@ impl Flight {
     }
 }
 
-/// Returns the violations in a flight, the number of engagements, and true if the flight used the asynchronous runner.
+/// Returns the violations in a flight, and the number of engagements. The last value is true for the asynchronous runner.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

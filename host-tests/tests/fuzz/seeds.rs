@@ -116,7 +116,7 @@ fn chain() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns seeds of the relay target: frames of relays in a simulated chain, and operations on one relay.
+/// Returns seeds of the relay target: frames of a chain's relays, and operations on one relay.
 fn relay() -> Vec<Vec<u8>> {
     let mut seeds = Vec::new();
     for mission in missions() {

@@ -27,7 +27,7 @@ pub(crate) enum Operation {
     Tick,
     /// The clock advances by this many ms: every timer is served in time, and no frames arrive.
     Wait(u16),
-    /// The clock advances by this many ms while all main loops are suspended, so that timers are served late.
+    /// The clock advances by this many ms while all main loops are suspended: timers are served late.
     Sleep(u16),
     /// The clock advances by this many ms without faults: frames arrive in order.
     Flow(u16),

@@ -4,7 +4,7 @@ use host_tests::bench::Bench;
 use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Event, Identity, Instant, Mission, Phase, Placement, Relay, Settings};
 
-/// Starts the relays of `mission` with settings by index, from 1; `None` if a relay refuses its settings.
+/// Starts the relays of `mission` with settings by index, from 1. `None` if a relay refuses its settings.
 pub(crate) fn line(
     mission: Mission,
     now: Instant,

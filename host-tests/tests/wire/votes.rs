@@ -27,7 +27,7 @@ pub(crate) fn mark(view: u32) -> u16 {
 /// Time for which a booted relay may be relied on, in tenths of a second: `dead_after`.
 pub(crate) const RELIED: u16 = 150;
 
-/// Returns the proposal of `view` forwarded at `place`, with the votes of all booted relays up to `place`.
+/// Returns the proposal of `view` forwarded at `place`, with the votes of booted relays up to `place`.
 pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, relays: u16) -> Said {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,

@@ -120,7 +120,7 @@ impl Node {
         there && (far.is_two_way(distance, now, settings) || far.joins_with(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay; `far` is the opposite side.
+    /// Returns the number of relays that a neighbour reaches through this relay. `far` is the opposite side.
     fn behind(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.

@@ -309,7 +309,7 @@ impl Node {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` at the port `through`: an index received at both ports is a duplicate.
+    /// Handles a frame of node `from` at port `through`: an index received at both ports is a duplicate.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

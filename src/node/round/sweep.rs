@@ -243,7 +243,7 @@ impl SweepPass {
         self.done
     }
 
-    /// Accepts a verdict if this relay meets its target and has a position for it; returns true if accepted.
+    /// Accepts a verdict if this relay meets its target and has a position for it. Returns true if accepted.
     pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &Answer) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);

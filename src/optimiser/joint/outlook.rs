@@ -20,7 +20,7 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative by the logarithm of the target, m.
     pub(crate) by_target: f32,
-    /// Expected gain of slack by the steps of all later relays, m; the part proportional to the step's fraction.
+    /// Expected gain of slack by steps of later relays, m: the part proportional to the step's fraction.
     pub(crate) linear: f32,
     /// Part of the expected gain that is proportional to the square of the fraction, m.
     pub(crate) square: f32,

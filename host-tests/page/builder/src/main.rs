@@ -48,7 +48,7 @@ Usage: cargo page
 It has no options but -h, --help; the target folder is that of CARGO_TARGET_DIR, else `target`
 ";
 
-/// Returns the text to print for command line arguments, and true for valid ones; `None` without arguments.
+/// Returns the text to print for command line arguments, and true for valid arguments. `None` without arguments.
 fn answer(arguments: &[String]) -> Option<(String, bool)> {
     match arguments {
         [] => None,

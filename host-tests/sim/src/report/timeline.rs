@@ -476,7 +476,7 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
         .find(|moment| moment.what == TimelineEvent::Offered(version))
 }
 
-/// Returns the time of the first event that removed the relays `lost` or brought back the relays `back`.
+/// Returns the time of the first event that removed relays of `lost` or brought back relays of `back`.
 fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {

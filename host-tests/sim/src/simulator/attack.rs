@@ -327,7 +327,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     frame.get(..len).unwrap_or_default().to_vec()
 }
 
-/// Returns a forged upload with a newer version and another interferer; `None` in a field, without uploads.
+/// Returns a forged upload with a newer version and another interferer. `None` in a field, which has no uploads.
 fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     let config = mission.config();
     let at = mission.interferer()?;

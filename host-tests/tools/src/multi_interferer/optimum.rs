@@ -341,7 +341,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns `wish` if `holds` is true at it; otherwise the last point from `sure` toward `wish` at which it is true.
+/// Returns the last point from `sure` toward `wish` at which `holds` is true. `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(wish) {
         wish

@@ -89,7 +89,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         site::tail(self.mission, power_w, room, target, at)
     }
 
-    /// Returns the highest possible target of the chain, in ln gamma: the smaller bound of the first and the last hop.
+    /// Returns the highest possible target of the chain, in ln gamma. It is the smaller bound of the first and the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;
