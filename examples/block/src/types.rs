@@ -64,7 +64,7 @@ impl Config {
 /// Line and speed of a drone with an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sites {
-    /// Sites of transmitter and receiver: latitude and longitude, 1e-7 degrees, and height of the ground, mm.
+    /// Sites of transmitter and receiver: latitude and longitude, 1e-7 degrees, and ground height, mm.
     pub ends: [[i32; 3]; 2],
     /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default.
     pub speed_m_s: f32,

@@ -66,7 +66,7 @@ fn whole((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
-/// Returns the former or estimated interferers to draw: those not hidden by a present interferer's marker.
+/// Returns the former or estimated interferers to draw: those not hidden by a present interferer.
 fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));
