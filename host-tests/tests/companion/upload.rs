@@ -63,7 +63,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
             assert!(!relay.has_said("uploaded: ") && !relay.has_said("adopted: "));
         }
         let line = ground(&chain.files, "2", &ends).refused(1);
-        let held = "--version 2: must be within 4 to 65535, the relays hold version 3";
+        let held = "--version 2: must be within 4 to 65535, because the relays have version 3";
         assert_eq!(line, held);
     }
 }
