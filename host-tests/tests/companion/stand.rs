@@ -225,7 +225,9 @@ fn a_station_that_stands_uploads_and_stands_on() {
 
     let (mut second, ..) = station("1", "second");
     second.line("back: relay 1 and this station receive each other");
-    second.line("not flown: --version 1: must be within 3 to 65535, because the relays have version 2");
+    second.line(
+        "not flown: --version 1: must be within 3 to 65535, because the relays have version 2",
+    );
     second.signal(Signal::TERM);
     assert_eq!(second.end().status, Some(0), "it stood on");
 }
