@@ -260,7 +260,7 @@ impl Profile {
     /// Returns a relay with this profile right above the line.
     pub const fn on_line(self) -> Station {
         Station {
-            at: CrossSection::on_line(self.altitude_m),
+            cross_section: CrossSection::on_line(self.altitude_m),
             power_w: self.power_w,
         }
     }
@@ -741,7 +741,7 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Gains for an unknown interferer with relays of `power_w`. SIR = (D / d)^2 on every hop, so equal hops are best.
+/// Returns the gains for an unknown interferer with relays of `power_w`. They give SIR = (D / d)^2 on every hop, so equal hops are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -81,7 +81,7 @@ use crate::sir::{Sender, in_noise, square};
 /// Required position of the previous relay of the pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Stand {
+pub enum RequiredPosition {
     /// Reach of that relay; or Tx or Rx, which do not move.
     AtReach,
     /// x, m.
@@ -153,7 +153,7 @@ impl Hop {
         at: CrossSection,
         end_m: f32,
     ) -> Self {
-        let (from, aside) = (sender.at, interferer.y_m);
+        let (from, aside) = (sender.cross_section, interferer.y_m);
         let climb = at.altitude_m - from.altitude_m;
         Self {
             sender,
@@ -170,7 +170,7 @@ impl Hop {
         }
     }
 
-    /// Returns the same hop if not relay `index` but those after it hold back to leave themselves room.
+    /// Returns this hop for a chain in which the relays after `index` hold back, instead of relay `index`.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -287,12 +287,17 @@ impl Hop {
     /// Returns the required position of the sender, with the receiver at `place`. The sender's reach for `target` is `from_m`.
     ///
     /// It is the closest allowed position, which has the best SIR; `None` if there is none.
-    pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
+    pub fn required_position(
+        &self,
+        target: f32,
+        from_m: f32,
+        place: f32,
+    ) -> Option<RequiredPosition> {
         if self
             .reach(target, from_m)
             .is_some_and(|reach| place >= reach)
         {
-            return Some(Stand::AtReach);
+            return Some(RequiredPosition::AtReach);
         }
         let heard = square(self.interferer_x_m - place) + self.aside_squared;
         let heard = in_noise(heard, self.noise);
@@ -301,9 +306,9 @@ impl Hop {
             let needed = ratio * (square(place - from) + self.across_squared);
             let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
             met.then_some(if from < from_m {
-                Stand::At(from)
+                RequiredPosition::At(from)
             } else {
-                Stand::AtReach
+                RequiredPosition::AtReach
             })
         };
         if self.from_tx {
@@ -391,7 +396,7 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 /// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
 /// that it is smooth in the target for the root search.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
-    let across = square(relay.at.y_m) + square(relay.at.altitude_m);
+    let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }

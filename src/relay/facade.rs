@@ -12,7 +12,7 @@ use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::place::Placement;
 use crate::relay::frames;
-use crate::sensing::belief::Told;
+use crate::sensing::estimate::NumberedEstimate;
 use crate::sensing::fit::Unfit;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
@@ -542,7 +542,7 @@ impl Relay {
     }
 
     /// Returns the estimate of the interference and its number. The mission's until the chain has estimated another.
-    pub fn belief(&self) -> Told {
+    pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
 

@@ -37,7 +37,7 @@ pub struct Deframer {
     len: usize,
     /// Remaining bytes of the current COBS run; 0 if a code byte is next.
     run: u8,
-    /// True if a zero follows the current run, unless the frame ends there.
+    /// True if the decoder has to insert a zero after the current run, unless the frame ends.
     zero_after: bool,
     oversized: bool,
 }

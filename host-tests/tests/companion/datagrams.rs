@@ -54,7 +54,7 @@ impl Ports {
     }
 }
 
-/// Checks that companion and autopilot receive each other.
+/// Checks that the companion and its autopilot receive each other's messages.
 fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
     relay.line("autopilot: found a PX4");
     relay.line("autopilot: on the ground, or not armed");

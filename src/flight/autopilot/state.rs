@@ -23,7 +23,6 @@ use crate::flight::autopilot::vehicle::Kind;
 
 /// Control state of the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// No autopilot is received.
     #[default]
@@ -85,7 +84,6 @@ impl State {
 
 /// Flight mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FlightMode {
     /// OFFBOARD or GUIDED: the relay sets the target.
@@ -131,7 +129,6 @@ impl FlightMode {
 
 /// Reason for which the relay no longer controls the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ReleaseCause {
     /// Another mode was chosen, by the pilot or by a ground station.
@@ -146,7 +143,6 @@ pub enum ReleaseCause {
 
 /// Release of control: its cause, and the present mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Release {
     /// Cause of the release.
     pub cause: ReleaseCause,
@@ -178,7 +174,6 @@ impl Release {
 
 /// Reason for which the pilot cannot engage the drone, or for which the granted mode was not used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WaitReason {
     /// The autopilot is in its failsafe. It ends when the pilot chooses a mode.

@@ -17,7 +17,6 @@ const IN_A_ROW: u8 = 3;
 
 /// Mismatch between the signatures of an autopilot and of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Mistrust {
     /// Signed autopilot, link without a key, no request answered. The autopilot seems to ignore unsigned frames.

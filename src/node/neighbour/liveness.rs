@@ -134,7 +134,7 @@ impl Liveness {
         self.met && !self.lost
     }
 
-    /// Returns true if the neighbour is lost, and nothing has been received from it since.
+    /// Returns true if the neighbour is lost and has not been received again.
     pub(crate) const fn is_silent(&self) -> bool {
         self.lost && !self.met
     }
@@ -185,7 +185,7 @@ impl Liveness {
         self.asked.get(usize::from(before)).copied()
     }
 
-    /// Excuses the silence so far; returns true if the neighbour is not lost.
+    /// Restarts the measurement of the neighbour's silence; returns true if the neighbour is not lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.heard = now;

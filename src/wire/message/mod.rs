@@ -76,7 +76,7 @@ pub enum Message {
     Sense(Heard),
     /// Reply to a sensing pass: measurements of the relays from the sender on.
     Sensed(Heard),
-    /// Onward message: token of Algorithm 2.
+    /// Onward message: turn of the relays in Algorithm 2.
     Token(Token),
     /// Reply to a token: its result.
     Moved(Moved),
@@ -102,7 +102,7 @@ pub enum Message {
     Offer {
         /// Uploaded mission.
         upload: Upload,
-        /// Number of the destination's hello that it answers, 0 for none.
+        /// Number of the destination's hello that the offer answers, 0 for none.
         offer_number: u16,
     },
     /// Ground to relay: interference level at that end of the chain.

@@ -317,7 +317,7 @@ fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 
-/// The SIR and the optimum are those of the remaining relays.
+/// Checks that SIR and optimum of a report are computed for the remaining relays only.
 #[test]
 fn a_lost_relay_does_not_count() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";
