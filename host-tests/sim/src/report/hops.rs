@@ -26,6 +26,7 @@ pub struct RelayReport {
     ///
     /// Absent if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub sir_back: Option<f64>,
     /// Version of the relay's mission, 0 for the loaded mission; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
