@@ -77,7 +77,7 @@ impl Deframer {
         None
     }
 
-    /// Decodes the first bytes of `bytes` up to the end of the current COBS run, and returns the rest, from a delimiter or code byte on.
+    /// Decodes the bytes up to the end of the current COBS run or a delimiter, and returns the rest.
     ///
     /// Equivalent to [`push`](Self::push) for each of them, in a quarter of the instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
