@@ -272,6 +272,7 @@ impl Own {
     }
 
     /// Returns true if the setpoint across the line is the agreed one.
+    #[inline(never)] // called from several places
     pub(super) fn has_agreed_cross_section(&self) -> bool {
         self.target
             .is_none_or(|target| target.cross_section() == self.cross_section())

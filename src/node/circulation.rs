@@ -187,6 +187,7 @@ impl Circulation {
         self.stop(Stage::Cancelled);
     }
 
+    #[inline(never)] // called from many places
     const fn stop(&mut self, stage: Stage) {
         self.stage = stage;
         self.is_forward_due = false;

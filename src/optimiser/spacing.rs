@@ -261,7 +261,7 @@ impl Hop {
         let nearest = self.least_step + 2.0 * f32::EPSILON * near;
         let needed = ratio * (square(nearest) + self.across_squared);
         // s / (1 + nu s) >= needed has no solution if the signal is below the noise.
-        let left = 1.0 - self.noise * needed;
+        let left = 1.0 - self.nu() * needed;
         if !(left > 0.0) {
             return None;
         }
@@ -300,7 +300,7 @@ impl Hop {
             return Some(RequiredPosition::AtReach);
         }
         let heard = square(self.interferer_x_m - place) + self.aside_squared;
-        let heard = in_noise(heard, self.noise);
+        let heard = in_noise(heard, self.nu());
         let ratio = self.sender.gain.ratio(target);
         let at = |from: f32| {
             let needed = ratio * (square(place - from) + self.across_squared);
@@ -325,7 +325,7 @@ impl Hop {
     /// `from_m` if the distance across the line is longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
-        if !(self.noise > 0.0) {
+        if self.is_silent() {
             return Some(place);
         }
         let hop = self.noisy(target, from_m);
@@ -418,7 +418,16 @@ const CLOSE: f32 = 5e-7;
 
 impl Hop {
     pub(in crate::optimiser) fn is_silent(&self) -> bool {
-        !(self.noise > 0.0)
+        !(self.nu() > 0.0)
+    }
+
+    /// Returns nu, 1/m^2. A constant 0 without the feature `noise` removes the search in noise from the image.
+    fn nu(&self) -> f32 {
+        if cfg!(feature = "noise") {
+            self.noise
+        } else {
+            0.0
+        }
     }
 
     /// Returns [`Hop::reach`] with noise, which is at most that without it.
@@ -442,7 +451,7 @@ impl Hop {
             aside_squared: self.aside_squared,
             across_squared: self.across_squared,
             base: self.base,
-            noise: self.noise,
+            noise: self.nu(),
         }
     }
 }

@@ -181,7 +181,9 @@ impl Relay {
         } else {
             first
         };
-        for &byte in bytes {
+        let mut rest = bytes;
+        while let Some((&byte, after)) = deframer.push_run(rest).split_first() {
+            rest = after;
             if let Some(decoded) = deframer.push(byte)
                 && let Some(frame) = self.endpoint.open(decoded, self.node.stats_mut())
             {

@@ -77,9 +77,6 @@ impl core::error::Error for UploadError {}
 
 #[cfg(feature = "upload")]
 impl Upload {
-    /// Length of an encoded upload, bytes.
-    pub const LENGTH: usize = super::message::UPLOAD_LENGTH;
-
     /// Creates an upload of `config` with `version`, 1 to 65535, for relays with the mission `base`.
     ///
     /// If rounding has put eta of its channel outside of the other two factors, it is clamped to the nearer one.

@@ -207,6 +207,7 @@ impl<F: Flash> Journal<F> {
 }
 
 /// Returns the sector with the newest record, 0 if there is none.
+#[inline(never)] // called from several places
 fn current(found: [Found; 2]) -> usize {
     let [first, second] = found.map(|found| found.newest);
     usize::from(second > first)

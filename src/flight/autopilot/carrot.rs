@@ -8,7 +8,7 @@
 //! /s, and by more while it accelerates. The carrot is therefore slower than allowed by that much, and the drone stays within the
 //! allowed speed.
 
-use crate::flight::autopilot::vehicle::Kind;
+use crate::flight::autopilot::state::Kind;
 use crate::flight::axis::Axis;
 use crate::geodetic::Geodetic;
 use crate::place::Placement;

@@ -2,8 +2,7 @@
 
 use super::carrot::Target;
 use super::report::{AutopilotEvent, Events};
-use super::state::{FlightMode, Release, ReleaseCause, WaitReason};
-use super::vehicle::Kind;
+use super::state::{FlightMode, Kind, Release, ReleaseCause, WaitReason};
 use super::vehicle::millis;
 use super::vehicle::{Astray, OffLine};
 use crate::event::Event;

@@ -6,9 +6,9 @@
 use heapless::{Deque, String, Vec};
 
 use crate::event::Event;
-use crate::flight::autopilot::state::{Release, State, WaitReason};
+use crate::flight::autopilot::state::{Kind, Release, State, WaitReason};
 use crate::flight::autopilot::trust::Mistrust;
-use crate::flight::autopilot::vehicle::{Kind, OffLine};
+use crate::flight::autopilot::vehicle::OffLine;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::outgoing::{Outgoing, severity};
 use crate::guard::HoldReason;

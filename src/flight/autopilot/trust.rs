@@ -4,8 +4,8 @@
 //! radio cannot sign. An autopilot with a key ignores unsigned frames silently, so the firmware is told of each kind of mismatch,
 //! once. A mismatch is reported after three consecutive heartbeats of an autopilot.
 
+use super::state::Kind;
 use super::vehicle::AUTOPILOT;
-use super::vehicle::Kind;
 use crate::flight::mavlink::incoming::{Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]

@@ -1,8 +1,7 @@
 //! State of the autopilot as received. It has the kind, reports and clock, the delay of the link, the drone's position, and the
 //! noise that a SiK radio measures.
 
-use super::state::FlightMode;
-use crate::flight::autopilot::state::Observed;
+use super::state::{FlightMode, Kind, Observed};
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::{Incoming, Received, noise_w};
@@ -372,29 +371,6 @@ impl RadioNoise {
     pub(super) fn take(&mut self) -> Option<Sample> {
         let (at, power_w) = self.0.take()?;
         Some(Sample::Heard { at, power_w })
-    }
-}
-
-/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
-const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
-
-/// Kind of autopilot.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Kind {
-    /// PX4: OFFBOARD grants control, for as long as targets are streamed.
-    Px4,
-    /// ArduCopter: GUIDED grants control, and a target holds for good.
-    ArduCopter,
-}
-
-impl Kind {
-    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`.
-    pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
-        match autopilot {
-            12 => Some(Self::Px4),
-            3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),
-            _ => None,
-        }
     }
 }
 

@@ -137,6 +137,7 @@ impl Node {
         self.telemetry.events.raise(event);
     }
 
+    #[inline(never)] // called from many places
     pub(super) fn raise_about(&mut self, about: About, side: Side, node: u16) {
         self.telemetry.events.raise_about(about, side, node);
     }

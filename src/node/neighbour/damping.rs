@@ -89,6 +89,7 @@ impl Link {
     }
 
     /// Number of losses that are not forgotten yet.
+    #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
             0

@@ -550,6 +550,7 @@ pub(super) struct Findings {
 
 impl Findings {
     /// Returns the differences from `before`. As a faulty node, 0 is the transmitter and `all` + 1 the receiver.
+    #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {
             Some(self.off)

@@ -101,6 +101,7 @@ impl ViewChange {
 
     /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message. One message could otherwise
     /// use up all view numbers; a relay that was away for long repeats its view often enough.
+    #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
             self.newest = self.newest.toward(view, LEAP);

@@ -33,10 +33,6 @@ const LONG: usize = if cfg!(feature = "sensing") {
     SWEEP
 };
 
-/// Length of an upload as a body and as stored, bytes: an offer without its last two bytes.
-#[cfg(feature = "upload")]
-pub use self::offer::UPLOAD_LENGTH;
-
 /// Maximum body: an offer, measurements, or without those features a sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {

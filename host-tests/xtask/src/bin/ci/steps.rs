@@ -23,7 +23,7 @@ const SETS: [&str; 7] = [
     "guard,flight",
     "mavlink-signing",
     "altitude,adjust",
-    "field,guard,auth",
+    "field,noise,guard,auth",
     "guard,upload",
 ];
 
