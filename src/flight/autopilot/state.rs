@@ -85,7 +85,6 @@ const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 
 /// Kind of autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Kind {
     /// PX4: OFFBOARD grants control, for as long as targets are streamed.
     Px4,

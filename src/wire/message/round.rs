@@ -540,7 +540,7 @@ impl Heard {
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
-            estimate: estimate,
+            estimate,
             sums,
             receiver,
             excluded: off,
