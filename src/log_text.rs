@@ -1,5 +1,10 @@
 //! Texts that `defmt` prints for events and their reasons. An image stores their numbers only, so the texts take no flash.
 
+#![expect(
+    clippy::match_same_arms,
+    reason = "the texts differ, which the linter does not see in interned strings"
+)]
+
 use crate::event::Event;
 use crate::geodetic::LineError;
 use crate::side::Side;
@@ -84,7 +89,7 @@ impl defmt::Format for Event {
             Self::LeaseLapsed => (
                 None,
                 defmt::intern!(
-                    "the lease has expired because not all relays are reachable: this relay holds its position"
+                    "the lease has expired because not all relays are reachable: this relay keeps its setpoint"
                 ),
             ),
             Self::NoQuorum => (
@@ -109,9 +114,10 @@ impl defmt::Format for Event {
             ),
             Self::Adopted => (None, defmt::intern!("the chain flies the uploaded mission")),
         };
-        match node {
-            Some(node) => defmt::write!(f, "node {=u16} {=istr}", node, text),
-            None => defmt::write!(f, "{=istr}", text),
+        if let Some(node) = node {
+            defmt::write!(f, "node {=u16} {=istr}", node, text);
+        } else {
+            defmt::write!(f, "{=istr}", text);
         }
     }
 }

@@ -583,11 +583,7 @@ impl RecoveryReport {
         }
         if let Some(offered) = self.offered_s {
             let after = self.formed_s - offered;
-            _ = if self.detected_s.is_some() {
-                write!(text, "adopted {after:.3} s after the upload began, ")
-            } else {
-                write!(text, "adopted {after:.3} s after the upload began, ")
-            };
+            _ = write!(text, "adopted {after:.3} s after the upload began, ");
         }
         let Some(converged) = self.converged_s else {
             return text + "replaced by another view before convergence";
