@@ -17,7 +17,7 @@
 //! | active | larger claim of the same epoch; it has held a position since before it first received the other node; its claim number plus 2^31 is the larger one | raise its claim number by 2^31; send claims as before, with a key one and 8 more | active |
 //! | active | larger claim otherwise | drop its agreed position | passive |
 //! | active | on links, no key: 2.25, 2.75, 3.75, 5.75, 9.75, 17.75 s after it became active, 0.25, 0.75 s and so on after a claim of another active node, then every `dead_after` | send a claim | active |
-//! | active | on a shared channel, with a key: one message of every second lease renewal sent | send a handshake after it | active |
+//! | active | on a shared channel, with a key: one message of each lease renewal sent | send a handshake after it | active |
 //! | passive | every quarter of `probe_after`, no key | send a claim with the flag passive | passive |
 //! | passive | claim of an active node, or other frame with its own index received | restart the timer | passive |
 //! | passive | handshake of a neighbour that shows the nonce of the other node | none: the neighbour may not know yet that the node is gone | passive |

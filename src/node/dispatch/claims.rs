@@ -106,19 +106,15 @@ impl Node {
 
     /// Returns true if a handshake accompanies `message`.
     ///
-    /// It does with every second lease renewal, on a shared channel.
-    ///
-    /// Another relay with this number then detects this one even if the chain sends nothing else. On a lossy channel renewals are
-    /// retransmitted, each time with a handshake: one with every renewal would delay the chain's recovery.
+    /// It does with each lease renewal, on a shared channel. Another relay with this number then detects this one even if the chain
+    /// sends nothing else.
     pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
-        let renewal = match message {
-            Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {
-                pulse.number
-            }
-            Message::Pulsed(pulsed) if pulsed.done => pulsed.number,
-            _ => return false,
+        let renews = match message {
+            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
+            Message::Pulsed(pulsed) => pulsed.done,
+            _ => false,
         };
-        renewal % 2 == 0 && self.member.settings.wiring == Wiring::Shared
+        renews && self.member.settings.wiring == Wiring::Shared
     }
 
     pub(crate) fn rival(&self, claim: Claim) -> Sender {

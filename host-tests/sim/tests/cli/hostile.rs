@@ -313,7 +313,7 @@ fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
     let output = chain(&format!("{options} --svg {name}"));
     assert!(output.status.success(), "{output:?}");
     let svg = std::fs::read_to_string(&file).unwrap();
-    assert!(svg.contains(">spread<"), "{svg}");
+    assert!(svg.contains(">relays spread e...<"), "{svg}");
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 

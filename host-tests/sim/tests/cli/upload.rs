@@ -100,7 +100,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
         " s  relays 1 to 8 stored mission 1",
         " s  mission 1 adopted: 8 relays",
         "converged: 8 relays, SIR 1.582",
-        "view 1, mission 1 uploaded: adopted after 0.",
+        "view 1, mission 1 uploaded: adopted 0.",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }
