@@ -67,7 +67,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change() {
     let ended = bench.uploads("1", moved).succeeds();
     assert_eq!(
         said(&ended, "current"),
-        ["relay 1 flies the mission that it was loaded with"]
+        ["relay 1 flies the mission with which it was loaded"]
     );
     let changes = said(&ended, "change");
     assert_eq!(

@@ -150,7 +150,7 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 1");
     answer(&drone, 2);
     relay.line(
-        "command refused: the command has to name all lost relays of one side, and no others (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
+        "command refused: the command must name all lost relays of one side, and no others (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
     );
     drone.order("clear 2");
     answer(&drone, 0);

@@ -149,7 +149,7 @@ fn a_local_port_that_cannot_be_had_is_named() {
         (&short, [&*in_use, "udp:HOST:PORT@LOCAL, within 1 to 65535"]),
         (
             &own,
-            ["is this program's own port", "LOCAL must be another"],
+            ["is this program's own port", "LOCAL must differ from PORT"],
         ),
     ] {
         let line = relay(address, "").refused(1);

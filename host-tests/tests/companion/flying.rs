@@ -33,7 +33,7 @@ impl Flight {
     fn found_by(kind: &str, key: Option<&str>, options: &str) -> Self {
         let mut flight = Self::started(kind, [key; 2], options);
         if key.is_some() {
-            flight.relay.line("autopilot: frames are signed");
+            flight.relay.line("autopilot: frames to the autopilot are signed");
         }
         let found = flight.relay.line("autopilot: found a");
         assert!(found.to_lowercase().contains(kind), "{found}");
@@ -50,7 +50,7 @@ impl Flight {
         let drone = Peer::autopilot(kind, &link, START_M, theirs.as_deref());
         let ours = ours.map_or_else(String::new, |file| format!("--autopilot-key-file {file}"));
         let mut relay = relay(&link, &format!("{ours} {options}"));
-        relay.line("autopilot: by --autopilot");
+        relay.line("autopilot: connected by --autopilot");
         Self {
             drone,
             relay,
