@@ -52,7 +52,7 @@ impl core::fmt::Display for ChannelError {
         f.write_str(match self {
             Self::Carrier => "carrier frequency must be within 1e6 to 1e12 Hz",
             Self::ExcessLoss => "excess loss factors must be within 1 to 1e20 (0 to 200 dB)",
-            Self::LossOrder => "excess loss without line of sight must not be below that with it",
+            Self::LossOrder => "the excess loss without line of sight must be at least the excess loss with line of sight",
             Self::Weight => "weight of line of sight must be within 0 to 1",
         })
     }

@@ -8,7 +8,6 @@ use crate::side::Side;
 ///
 /// A *node* is a relay's index before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Event {
     /// `Relay::setpoint` has changed: fly there, or hold the position if there is none.
@@ -88,7 +87,7 @@ pub enum Event {
         /// Reason of the rejection.
         why: LineError,
     },
-    /// The relay's estimate of the interference has changed (`Relay::belief`). New positions follow.
+    /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
     NewEstimate,
     /// The measurements do not fit a single source on the ground (raised at the leader). They may also be too few, or
     /// contradictory. `Relay::unfit` gives the reason.

@@ -103,7 +103,6 @@ impl Sites {
 
 /// Reason why a newer mission does not fit its line on earth or the relay's own geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum LineError {
     /// The mission's distance differs from that between its sites. Or it has no sites, and its distance differs from the
@@ -122,7 +121,7 @@ pub enum LineError {
 impl core::fmt::Display for LineError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Distance => "the distance must be that between its sites, or without sites of its own that between the loaded ones",
+            Self::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has none",
             Self::Sites => "the sites must be on earth, 10 m to 100 km apart",
             Self::Altitude => "the altitudes must be within the relay's own geofence",
             Self::Lateral => "the lateral range must be within the relay's own geofence",

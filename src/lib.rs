@@ -31,6 +31,8 @@ mod guard;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod guard;
+#[cfg(feature = "defmt")]
+mod log_text;
 pub mod mission;
 mod node;
 #[cfg(not(feature = "internals"))]

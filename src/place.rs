@@ -77,7 +77,7 @@ impl CrossSection {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
     /// Position across the line.
-    pub at: CrossSection,
+    pub cross_section: CrossSection,
     /// Transmit power, W.
     pub power_w: f32,
 }

@@ -85,7 +85,7 @@ impl Bearing {
     }
 }
 
-/// Returns sqrt(a^2 + b^2), with the larger one factored out so that no square overflows or underflows.
+/// Returns sqrt(a^2 + b^2). The larger of a and b is factored out, so that no square overflows or underflows.
 fn length(a: f32, b: f32) -> f32 {
     let large = a.abs().max(b.abs());
     if large > 0.0 {

@@ -273,7 +273,7 @@ pub enum SetupError {
     Silence,
     /// `without_quorum.y_m` is not within -1e4 to 1e4, or `without_quorum.up_m` not within 0 to 1e4.
     WithoutQuorum,
-    /// A number of `guard` is not within its range, or the crate was built without the feature for it.
+    /// A number of `guard` is out of range, or the crate was built without the feature `guard`.
     Guard,
 }
 

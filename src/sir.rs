@@ -62,7 +62,7 @@ pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
-    pub(crate) at: CrossSection,
+    pub(crate) cross_section: CrossSection,
     pub(crate) gain: PowerRatio,
 }
 
@@ -70,7 +70,7 @@ impl Sender {
     /// Returns the ground transmitter, node 0.
     pub const fn transmitter(mission: &Mission) -> Self {
         Self {
-            at: CrossSection::on_line(0.0),
+            cross_section: CrossSection::on_line(0.0),
             gain: mission.tx_gain(),
         }
     }
@@ -78,7 +78,7 @@ impl Sender {
     /// Returns a relay as a sender.
     pub const fn relay(mission: &Mission, relay: Station) -> Self {
         Self {
-            at: relay.at,
+            cross_section: relay.cross_section,
             gain: mission.relay_gain(relay.power_w),
         }
     }
@@ -90,7 +90,7 @@ impl Sender {
     /// the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x) / (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
-        let across = to.cross_section().apart_squared(self.at);
+        let across = to.cross_section().apart_squared(self.cross_section);
         self.gain.value() * quiet(mission, to) / (square(step) + across)
     }
 }
@@ -109,7 +109,7 @@ pub(crate) const fn square(x: f32) -> f32 {
 /// Bisection steps in an interval in which the slope changes its sign.
 const HALVINGS: u8 = 32;
 
-/// Doublings of x at most until a falling function is below 0.
+/// Maximum number of doublings of x in the search for the sign change of a falling function.
 const DOUBLINGS: u8 = 64;
 
 /// Shape of SIR_1 along x >= 0 at one altitude.
@@ -173,7 +173,7 @@ impl Slope {
         self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s
     }
 
-    /// Returns half the derivative of phi, for X > 0; it falls beyond X.
+    /// Returns half the derivative of phi at `at`, for X > 0. The derivative falls beyond X.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)

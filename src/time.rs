@@ -70,7 +70,7 @@ impl Duration {
         }
     }
 
-    /// The span in microseconds.
+    /// Returns the duration in microseconds.
     pub const fn as_micros(self) -> u64 {
         self.micros
     }
@@ -186,7 +186,7 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` and a random eighth of it at most. Relays on a shared channel then do not stay in step.
+    /// Returns `span` plus a random part of up to an eighth. Relays on a shared channel then do not stay in step.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

@@ -49,7 +49,7 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, or one with a lower number if `view` is more than `most` numbers ahead of this one.
+    /// Returns `view`, or a view at most `most` numbers ahead of this view if `view` is farther ahead.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {

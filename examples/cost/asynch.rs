@@ -18,7 +18,7 @@ use super::missions::mission;
 /// Bit rate of the ports, bit/s.
 const BAUD: u32 = 115_200;
 
-/// Port in memory: the frame to receive with its read range, and the number of bytes sent.
+/// Port in memory: a frame to receive, the range of its unread bytes, and the number of bytes sent.
 struct Memory {
     coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,
@@ -124,7 +124,7 @@ fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures both runners, from the same moment on.
+/// Measures the blocking and the asynchronous runner, which start at the same time.
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = before() else {
         return;

@@ -33,7 +33,7 @@ fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// Measures a full sweep through a middle relay, and a frame rejected there.
+/// Measures a full sweep through a middle relay, and a frame that this relay rejects.
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));

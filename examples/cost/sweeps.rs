@@ -18,7 +18,7 @@ pub(crate) fn reach() {
         &INTERFERER,
         Sender::relay(&MISSION, common.on_line()),
         4,
-        common.on_line().at,
+        common.on_line().cross_section,
         0.0,
     );
     let mut most = 0;
@@ -46,7 +46,7 @@ fn reach_in_noise() {
         };
         let common = mission.config().common;
         let sender = Sender::relay(&mission, common.on_line());
-        let at = common.on_line().at;
+        let at = common.on_line().cross_section;
         let middle = Hop::new(&mission, &INTERFERER, sender, 4, at, 0.0);
         for from in [100.0_f32, 400.0, 499.9, 500.1, 600.0, 900.0] {
             for target in [0.005_f32, 0.0125, 1.0, 5.0, 40.0] {

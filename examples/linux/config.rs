@@ -182,7 +182,7 @@ fn said(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if two values are the same text or the same list of numbers.
+/// Returns true if the values `one` and `other` are the same text or the same list of numbers.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());

@@ -52,7 +52,7 @@ pub struct Refusals {
 }
 
 impl Refusals {
-    /// Returns a reason that was not reported before, if there is one.
+    /// Returns the next new reason for rejected frames; `None` if all reasons were reported.
     pub fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.look_at {
             return None;
@@ -85,9 +85,9 @@ impl Refusals {
                 version >= MANY,
                 version,
                 if signs {
-                    "are of another version of the format: do all relays run the same software version?"
+                    "have another version of the frame format: do all relays run the same software version?"
                 } else {
-                    "are signed, and this relay has no --key-file; or they are of another version of the format"
+                    "are signed, and this relay has no --key-file; or they have another version of the frame format"
                 },
             ),
             (

@@ -104,7 +104,7 @@ impl Fifo {
         let fd = open(path, flags, Mode::empty()).map_err(|error| format!("{name}: {error}"))?;
         let kind = fstat(&fd).map(|stat| FileType::from_raw_mode(stat.st_mode));
         if kind != Ok(FileType::Fifo) {
-            return Err(format!("{name}: is no FIFO, make one with mkfifo"));
+            return Err(format!("{name}: is not a FIFO: make one with mkfifo"));
         }
         Ok(Self {
             fd,

@@ -165,7 +165,7 @@ struct Writer {
     path: Option<PathBuf>,
     /// True if the last line was written only in part.
     torn: bool,
-    /// Number of dropped lines reported so far.
+    /// Number of dropped lines that the log has reported.
     told: u64,
     format: Arc<Format>,
     shared: Arc<Shared>,

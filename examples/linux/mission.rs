@@ -187,7 +187,7 @@ pub fn interferer(text: &str) -> Result<Interferer, String> {
     })
 }
 
-/// Parses the two ends of a range of altitudes, m.
+/// Parses the lowest and the highest altitude of a range, m.
 ///
 /// # Errors
 /// The expected form or range.

@@ -135,7 +135,7 @@ impl Replug {
         self.baud
     }
 
-    /// Returns the bytes received so far.
+    /// Returns the number of bytes received since the start.
     pub const fn bytes_in(&self) -> u64 {
         self.counts.read
     }

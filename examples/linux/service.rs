@@ -20,7 +20,7 @@ use crate::notify::Notify;
 use crate::replug::Replug;
 use crate::socket::StatusSocket;
 
-/// Maximum time for the last log lines at exit.
+/// Maximum wait at exit for the log to write its last lines.
 const LAST_LINES: Duration = Duration::from_millis(500);
 
 /// Longest sleep after poll(2) has failed.
@@ -36,7 +36,7 @@ pub struct Service {
     signals: SignalDelivery<UnixStream, SignalOnly>,
     /// True after SIGHUP, a request to reopen the log, until it is handled.
     hangup: bool,
-    /// True after SIGUSR1, a request to log the status, until it is handled.
+    /// True from a SIGUSR1, which requests the status in the log, until the status is logged.
     asks_status: bool,
     notify: Option<Notify>,
 }

@@ -39,7 +39,7 @@ impl SiteOptions {
             return Ok(Some(sites));
         }
         Err(format!(
-            "--distance {distance_m}: must be {:.3} m, as --site-tx and --site-rx have it",
+            "--distance {distance_m}: must be {:.3} m, the distance between --site-tx and --site-rx",
             axis.distance_m()
         ))
     }

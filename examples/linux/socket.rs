@@ -57,7 +57,7 @@ impl StatusSocket {
                 return Err(named(&"there is another file of that name"));
             }
             if UnixStream::connect(path).is_ok() {
-                return Err(named(&"is in use already"));
+                return Err(named(&"is already in use"));
             }
             std::fs::remove_file(path).map_err(|error| named(&error))?;
         }

@@ -21,7 +21,7 @@ const WAITING: usize = 1_024;
 
 const MOST: u32 = 9_999;
 
-/// Bytes received or sent by one call, at port number `port`.
+/// Bytes that one call received or sent at port number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -154,7 +154,7 @@ fn create(path: &Path) -> Result<(File, PathBuf), String> {
         }
     }
     Err(format!(
-        "--capture {}: {MOST} captures of this name exist already; move them away",
+        "--capture {}: {MOST} captures of this name already exist: move them away",
         path.display()
     ))
 }

@@ -29,10 +29,10 @@ impl Tty {
     pub fn open(option: &str, path: &Path, baud: u32) -> Result<Self, String> {
         let name = format!("{option} {}", path.display());
         let fd = configured(path, baud).map_err(|error| match error {
-            Errno::WOULDBLOCK => format!("{name}: is in use already"),
-            Errno::NOTTY => format!("{name}: is no tty"),
+            Errno::WOULDBLOCK => format!("{name}: is already in use"),
+            Errno::NOTTY => format!("{name}: is not a tty"),
             Errno::NOENT => format!("{name}: No such file: is it plugged in?"),
-            Errno::ISDIR => format!("{name}: is a directory, and no tty"),
+            Errno::ISDIR => format!("{name}: is a directory, not a tty"),
             Errno::ACCESS => format!(
                 "{name}: permission denied; on most systems members of the group dialout may open it"
             ),

@@ -119,12 +119,12 @@ impl Companion {
             Instant::ZERO,
             EVENT,
             format_args!(
-                "by {place}{from}, {} m/s at most; engaged once its pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                "connected by {place}{from}, at most {} m/s; setpoint control begins when the pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
         );
         if self.plan.key.is_some() {
-            let what = "frames are signed, and frames that are not signed with its key are ignored";
+            let what = "frames to the autopilot are signed; frames that are not signed with the same key are ignored";
             log.tell(Instant::ZERO, EVENT, what);
         }
     }
@@ -198,7 +198,7 @@ impl Companion {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Reports a drone far from its line to the log and the operator, if due.
+    /// Reports a drone that is far from its line in the log and to the operator, if a report is due.
     fn tell_astray(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -228,7 +228,7 @@ impl Companion {
         }
     }
 
-    /// Returns the best data received so far; `None` once the autopilot is found.
+    /// Returns the best kind of data received; `None` once the autopilot is found.
     fn heard(&self) -> Option<Answer> {
         // A rejected signature is logged separately.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
@@ -361,7 +361,7 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
             return commanded(now, log, Ok(text), relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
-            let text = "the command has to name all lost relays of one side, and no others";
+            let text = "the command must name all lost relays of one side, and no others";
             return commanded(now, log, Err(text.to_owned()), relays, from);
         }
         AutopilotEvent::FenceBreached => "fence breached".to_owned(),
@@ -408,7 +408,7 @@ const fn mode(mode: FlightMode) -> &'static str {
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        _ => "another one",
+        _ => "unknown to this program",
     }
 }
 

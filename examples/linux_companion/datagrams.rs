@@ -7,7 +7,7 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 use serde_json::{Value, json};
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// Maximum number of attempts of a call that reports an earlier refusal.
+/// Maximum number of attempts of a socket call, which may fail because an earlier datagram was refused.
 const ATTEMPTS: usize = 4;
 
 #[derive(Debug)]
@@ -39,7 +39,7 @@ impl Datagrams {
             .map_err(|error| format!("{peer} cannot be reached: {error}"))?;
         if socket.local_addr().is_ok_and(|own| own == peer) {
             return Err(format!(
-                "{peer} is this program's own port; LOCAL must be another one than PORT, within 1 to 65535"
+                "{peer} is this program's own port: LOCAL must differ from PORT, within 1 to 65535"
             ));
         }
         let ready = socket.set_nonblocking(true);
@@ -135,7 +135,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// A refusal answers an earlier datagram and must lose neither the next sent nor the next received one.
+    /// Checks that the refusal of a datagram loses neither the next sent nor the next received datagram.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

@@ -16,7 +16,7 @@ pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Logged reasons, and newer ones that have not held long enough.
+/// Logged reasons, and newer reasons that have not lasted long enough to be logged.
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],
@@ -81,20 +81,22 @@ fn said(reason: HoldReason, whom: &str) -> String {
             format!("{whom} is not engaged, or has not reported its position yet")
         }
         HoldReason::Order => format!(
-            "this drone is on the wrong side of {whom} along the line, or too near to be certain; fly one of the two to its own side by hand"
+            "this drone is on the wrong side of {whom} along the line, or too close to it to be sure; fly one of the two drones to its own side by hand"
         ),
         HoldReason::Close => {
-            format!("the agreed position is nearer to {whom} than the drones may come yet")
+            format!("the agreed position is too close to the present position of {whom}")
         }
         HoldReason::Lost => {
             format!("a lost relay may still hover between this drone and {whom}")
         }
         HoldReason::NotFlown => {
-            format!("{whom} is not engaged, and is in the way or makes no room")
+            format!("{whom} is not engaged, and blocks the path or makes no room")
         }
-        HoldReason::Pending => format!("{whom} has not made room yet"),
+        HoldReason::Pending => format!("{whom} has not made room for this drone yet"),
         HoldReason::Halted => {
-            format!("a relay beyond {whom} is out of order; its log has the reason")
+            format!(
+                "a relay beyond {whom} is not in order with its neighbours; the log of that relay has the reason"
+            )
         }
     }
 }

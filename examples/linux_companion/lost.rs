@@ -63,7 +63,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "unknown command; the command is {CLEAR} N, with the numbers of all lost relays on one side that have landed"
+                "unknown command `{command}`: the only command is {CLEAR} N, with the numbers of all lost relays on one side that have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -72,10 +72,14 @@ impl Lost {
         let side = match (named.first(), named.last()) {
             (Some(first), _) if *first > self.index => Side::Downstream,
             (_, Some(last)) if *last < self.index => Side::Upstream,
-            (None, _) => return Err(format!("name the relays that have landed: {CLEAR} N")),
+            (None, _) => {
+                return Err(format!(
+                    "{CLEAR} names no relay: give the numbers of all lost relays on one side that have landed, as in {CLEAR} 3"
+                ));
+            }
             _ => {
                 return Err(format!(
-                    "clear the relays before and after relay {} one after the other",
+                    "{CLEAR} names relays on both sides of relay {}: clear one side at a time",
                     self.index
                 ));
             }
@@ -85,7 +89,7 @@ impl Lost {
         let missing: Vec<u16> = missing.copied().filter(|it| !named.contains(it)).collect();
         if !missing.is_empty() {
             return Err(format!(
-                "{} lost there, too: have all of them landed? Then name all of them",
+                "{} lost on the same side: if all of these have landed, name all of them",
                 listed(missing)
             ));
         }
@@ -107,7 +111,9 @@ impl Lost {
             return Err(format!("relay {word}: must be within 1 to {most}"));
         };
         if number == self.index {
-            return Err(format!("relay {number} is this relay"));
+            return Err(format!(
+                "relay {number} is this relay, which cannot be lost to itself"
+            ));
         }
         let is_heard = relay.neighbours().contains(&Some(number)) && !self.nodes.contains(&number);
         if is_heard {

@@ -168,7 +168,7 @@ impl Step {
                     "arrived",
                     fields,
                     format_args!(
-                        "{off_m:.1} m from the agreed position, x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m"
+                        "the drone is {off_m:.1} m from its agreed position: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m"
                     ),
                 );
             }

@@ -42,7 +42,7 @@ pub(crate) struct Options {
     /// Tty toward the receiver; relay N needs it only for uploads from there
     #[arg(long, value_name = "TTY")]
     pub(crate) downstream: Option<PathBuf>,
-    /// Tty of one radio channel shared by all relays, instead of the other two
+    /// Tty of one radio channel shared by all relays, instead of --upstream and --downstream
     #[arg(long, value_name = "TTY")]
     pub(crate) shared: Option<PathBuf>,
     /// Bit rate of every tty, bit/s, 1200 to 4000000

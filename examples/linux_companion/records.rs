@@ -35,7 +35,7 @@ pub(crate) fn resume_views(
     if let Some(bytes) = &bytes {
         stored = record(bytes, ViewRecord::LENGTH);
         let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
-            refused("is damaged, or no record of views: remove the file before the next flight, and start again")
+            refused("is damaged or not a record of views: remove the file before the next flight, and start again")
         })?;
         relay.resume_view(now, &votes).map_err(|error| match error {
             RecordError::Base => refused(&format!(
@@ -70,7 +70,7 @@ fn held(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
         return Ok(None);
     };
     let upload = record(&bytes, Upload::LENGTH).and_then(Upload::decode);
-    let upload = upload.ok_or_else(|| named("is damaged, or no upload"))?;
+    let upload = upload.ok_or_else(|| named("is damaged or not an upload"))?;
     let (base, loaded) = (upload.base(), mission.digest());
     if base != loaded || upload.config().relays != mission.relays() {
         return Err(named(&format!(

@@ -193,7 +193,7 @@ impl Flight {
         self.sleep(wakes.into_iter().flatten().min())
     }
 
-    /// Handles signals and status requests; returns the time of the next call.
+    /// Handles signals and status requests; returns the time by which the next call is due.
     fn tell(&mut self, time: Instant) -> Option<Instant> {
         let Self {
             service,
@@ -226,7 +226,7 @@ impl Flight {
         })
     }
 
-    /// Sleeps until there may be something to do; returns false after a signal to end.
+    /// Sleeps until input or a timer needs work; returns false after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> bool {
         let fifo = self.positions.as_ref().map(Positions::fd);
         let files = [&self.views, &self.uploads].into_iter().flatten();

@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde_json::json;
 use uav_relay::Geofence;
-use uav_relay::sensing::belief::{Belief, Spread, Told};
+use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 
 use uav_relay::{
     Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, Stats, Upload,
@@ -96,16 +96,16 @@ impl Report {
             Instant::ZERO,
             "resumed",
             json!({ "version": version }),
-            format_args!("flies version {version} of the mission, uploaded before this start"),
+            format_args!("this relay flies version {version} of the mission, which was uploaded before this start"),
         );
     }
 
-    /// Logs that the relay keeps its votes on views from before this start.
+    /// Logs that the relay's votes on views from an earlier start were restored.
     pub(crate) fn stands_by(&self) {
         self.log.tell(
             Instant::ZERO,
             "restored",
-            "votes of before this start, from --view-file; before another flight remove that file",
+            "this relay's earlier votes on views were read from --view-file; remove that file before another flight",
         );
     }
 
@@ -118,17 +118,20 @@ impl Report {
                 }
             }
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
-            Event::Infeasible => tell("infeasible", "no target SIR can be met"),
+            Event::Infeasible => tell(
+                "infeasible",
+                "no target SIR can be met; all relays keep their positions",
+            ),
             Event::Adopted => self.adopted(now, relay),
             Event::ViewAccepted => self.reformed(now, relay),
-            Event::NewEstimate => self.believed(now, relay.belief()),
+            Event::NewEstimate => self.log_estimate(now, relay.interference_estimate()),
             Event::LeaseLapsed => tell(
                 "lease expired",
-                "not all relays are reachable; holds its position and requests a new view",
+                "not all relays are reachable; this relay holds its position and requests a new view",
             ),
             Event::NoQuorum => tell(
                 "no quorum",
-                "too few relays are reachable; holds its position; bring the missing relays into range, or land these",
+                "too few relays are reachable; this relay holds its position; bring the missing relays into range, or land the reachable ones",
             ),
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
@@ -137,7 +140,7 @@ impl Report {
                     now,
                     "uploaded",
                     json!({ "version": version }),
-                    format_args!("stored version {version} of the mission"),
+                    format_args!("version {version} of the mission was received and stored"),
                 );
             }
             Event::InterfererUnclear => tell(
@@ -210,14 +213,14 @@ impl Report {
             Event::MissionMismatch { .. } => say(
                 "mismatch",
                 format_args!(
-                    "{name} flies another mission than 0x{:04x}; load the same mission into both",
+                    "{name} has another mission than this relay, which has 0x{:04x}; load the same mission into both",
                     self.flown(relay)
                 ),
             ),
             Event::KeyMismatch { .. } => say(
                 "key",
                 format_args!(
-                    "{name} signs with another key, or an attacker uses its number; give both the same --key-file"
+                    "{name} signs with another key than this relay, or an attacker uses its number; give both relays the same --key-file"
                 ),
             ),
             Event::EpochWentBack { .. } => say(
@@ -229,7 +232,7 @@ impl Report {
             Event::SensorOff { .. } => say(
                 "sensor",
                 format_args!(
-                    "the measurements of {name} do not fit those of the others and are ignored; check its receiver"
+                    "the interference measured by {name} does not fit the other measurements and is ignored; check the receiver of {name}"
                 ),
             ),
             _ if relay.is_passive() => say(
@@ -288,7 +291,7 @@ impl Report {
         let fields = json!({ "version": version });
         let sites = relay.sites();
         let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
-        let what = format_args!("flies version {version} of the mission{sites}");
+        let what = format_args!("the chain flies version {version} of the mission{sites}");
         self.log.say(now, "adopted", fields, what);
     }
 
@@ -316,9 +319,9 @@ impl Report {
         }
     }
 
-    fn believed(&self, now: Instant, told: Told) {
-        match told.belief {
-            Belief::Source { source, receiver_w } => self.log.say(
+    fn log_estimate(&self, now: Instant, numbered: NumberedEstimate) {
+        match numbered.estimate {
+            InterferenceEstimate::Source { source, receiver_w } => self.log.say(
                 now,
                 "estimate",
                 json!({
@@ -331,7 +334,7 @@ impl Report {
                     Exact(source.y_m)
                 ),
             ),
-            Belief::Unknown(spread) => {
+            InterferenceEstimate::Unknown(spread) => {
                 let spread = match spread {
                     Spread::Even => "evenly",
                     Spread::TowardTx => "toward the transmitter",
@@ -341,8 +344,8 @@ impl Report {
                     format_args!("interference unknown; the relays spread {spread} to measure it");
                 self.log.tell(now, "estimate", what);
             }
-            Belief::Mission => {
-                let what = "the interferer of the mission";
+            InterferenceEstimate::Mission => {
+                let what = "the chain uses the interferer of the mission";
                 self.log.tell(now, "estimate", what);
             }
         }

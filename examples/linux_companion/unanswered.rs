@@ -8,7 +8,7 @@ const PATIENCE: Duration = Duration::from_millis(3_000);
 /// Kind of the most specific data received from the port since the start.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Answer {
-    /// Empty so far: no byte has arrived.
+    /// No byte has been received.
     Nothing,
     /// Bytes without an intact MAVLink 2 frame.
     Noise,
@@ -18,7 +18,7 @@ pub(crate) enum Answer {
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Best data so far, and the time since when; `None` once the autopilot is found.
+    /// Best kind of data received, and the time of its first receipt. `None` once the autopilot is found.
     newest: Option<(Answer, Instant)>,
     told: Option<Answer>,
 }
@@ -31,7 +31,7 @@ impl AnswerMonitor {
         }
     }
 
-    /// Takes the data received so far, `None` for an autopilot. Returns a fault to report, once for each kind.
+    /// Handles the best kind of data received, `None` for an autopilot. Returns a fault to report, once for each kind.
     pub(crate) fn look(&mut self, now: Instant, heard: Option<Answer>) -> Option<Answer> {
         let (answer, since) = self.newest?;
         let Some(heard) = heard else {

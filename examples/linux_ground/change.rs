@@ -63,7 +63,7 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
 
 pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
-        let what = "cannot be computed in advance, since the relays measure the interference or find no positions";
+        let what = "the moves of the relays are unknown in advance: the relays measure the interference, or no positions fit the new mission";
         log.tell(now, "move", what);
         return;
     };

@@ -69,7 +69,7 @@ impl Chain {
         })
     }
 
-    /// Delivers the frames of the previous turn and collects those of this one.
+    /// Delivers the frames that relays sent in the previous turn, and collects the frames of this turn.
     fn turn(&mut self, version: u16) {
         self.now = Instant::from_micros(self.now.as_micros() + TURN_US);
         let now = self.now;
@@ -97,7 +97,7 @@ impl Chain {
         }
     }
 
-    /// Runs until all relays agree on positions in mission `version`. Returns `None` if they do not by `end`.
+    /// Runs until all relays agree on positions in mission `version`; returns `None` at the time `end`.
     fn positions(&mut self, version: u16, end: Clock) -> Option<Vec<Placement>> {
         self.agreed.fill(false);
         while !self.agreed.iter().all(|agreed| *agreed) {

@@ -118,7 +118,7 @@ impl NewOptions {
         let keeps = along_m.is_none() && (sited.is_some() || own.is_some());
         if keeps && config.distance_m.to_bits() != kept_m.to_bits() {
             return Err(format!(
-                "--new-distance {}: must be that of --distance where the relays keep their sites; else give --new-site-tx or --new-site-rx",
+                "--new-distance {}: must equal --distance, because the relays keep their sites; to change it, give --new-site-tx or --new-site-rx",
                 config.distance_m
             ));
         }
@@ -153,7 +153,7 @@ impl NewOptions {
         let (turn, most) = (before.turn_rad(&axis).to_degrees(), most_turn_deg(config));
         if turn > most {
             return Err(named(&format_args!(
-                "turns the line by {turn:.1} degrees: must be within 0 to {most:.1}, so that relays that are {} m apart keep their order along it",
+                "turns the line by {turn:.1} degrees: must be within 0 to {most:.1}, so that relays {} m apart keep their order along the line",
                 config.min_separation_m
             )));
         }
@@ -161,7 +161,7 @@ impl NewOptions {
         let along_m = axis.distance_m() as f32;
         match self.new_distance {
             Some(given) if !axis.is_of(given) => Err(format!(
-                "--new-distance {given}: must be {along_m:.3} m, as the new sites have it, or be left out"
+                "--new-distance {given}: must be {along_m:.3} m, the distance between the new sites, or be left out"
             )),
             _ => Ok(Some((sites, along_m))),
         }
@@ -198,7 +198,7 @@ impl NewOptions {
     }
 }
 
-/// Refuses a line far from the present one, because the drones there would have no position along it.
+/// Refuses a line far from the present line, because the drones would have no position along it.
 fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
@@ -217,7 +217,7 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
         ""
     };
     Err(format!(
-        "the new line is {:.0} km from the one that is flown along: must be within {:.0} km, where the drones are{hint}",
+        "the new line is {:.0} km from the line of the present mission: must be within {:.0} km{hint}",
         far_m / 1e3,
         most_m / 1e3
     ))

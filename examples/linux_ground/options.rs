@@ -84,7 +84,7 @@ pub(crate) struct Options {
     /// --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
     pub(crate) no_fence: bool,
-    /// Take values that are not given from the loaded mission instead of the flown one
+    /// Take values that are not given from the loaded mission instead of the mission in flight
     #[arg(long, requires = "version")]
     pub(crate) from_loaded: bool,
     /// Source of interference measurements at this end. A FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or
@@ -189,7 +189,7 @@ fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
         }
         if !options.yes && !options.dry_run && !std::io::stdin().is_terminal() {
             return Err(format!(
-                "--version {version}: nobody can confirm the upload, since standard input is no terminal; give --yes, or --dry-run to see what it changes"
+                "--version {version}: the upload cannot be confirmed, because standard input is not a terminal: give --yes, or --dry-run to see its changes"
             ));
         }
     }

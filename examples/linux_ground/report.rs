@@ -46,17 +46,17 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             let what = format_args!("version {version}, mission 0x{digest:04x}{sites}");
             log.tell(now, "offering", what);
         }
-        Progress::Held { by } => log.tell(
+        Progress::Stored { by } => log.tell(
             now,
-            "held",
-            format_args!("relay {by} holds version {version}, and the others are asked"),
+            "stored",
+            format_args!("relay {by} has stored version {version}; the other relays are being asked"),
         ),
         Progress::Adopted { by } => log.say(
             now,
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
             format_args!(
-                "relay {by} flies version {version}: 1 of {all} relays is known to, and it is asked for the others"
+                "relay {by} flies version {version}, as the first of {all} relays; it is being asked for the others"
             ),
         ),
         Progress::Flown { by, view, relays } => log.say(
@@ -64,7 +64,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             "flown",
             json!({ "version": version, "flown_by": relays, "relays": all }),
             format_args!(
-                "{relays} of {all} relays fly version {version}, as relay {by} says, view {} of the chain",
+                "{relays} of {all} relays fly version {version} in view {}, according to relay {by}",
                 view.number()
             ),
         ),
@@ -78,11 +78,13 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
             format!(
-                "--version {version}: must be within {next} to 65535, the relays hold version {held}"
+                "--version {version}: must be within {next} to 65535, because the relays have version {held}"
             )
         }
         None => {
-            format!("--version {version}: the relays hold version {held}, the last one there is")
+            format!(
+                "--version {version}: no version is left, because the relays have version {held}, the largest one"
+            )
         }
     }
 }
@@ -94,9 +96,9 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     } = *flown;
     let fields = json!({ "relay": by, "version": version, "flies": flies });
     let what = match (version, flies) {
-        (0, _) => format!("relay {by} flies the mission that it was loaded with"),
+        (0, _) => format!("relay {by} flies the mission with which it was loaded"),
         (_, true) => format!("relay {by} flies version {version}"),
-        (_, false) => format!("relay {by} holds version {version}, and does not fly it yet"),
+        (_, false) => format!("relay {by} has stored version {version}, but does not fly it yet"),
     };
     log.say(now, "current", fields, what);
 }
@@ -104,10 +106,10 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
 /// Returns the error for an upload refused by a relay, with the value that most likely causes it.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
-    let who = format!("--version {version}: relay {by}, or one beyond it, refuses it");
+    let who = format!("--version {version}: relay {by}, or a relay beyond it, rejects the upload");
     match Outside::of(plan, upload) {
         Some(Outside { what, .. }) => format!("{who}: {what}"),
-        None => format!("{who}: the log of the one that does says why"),
+        None => format!("{who}: the log of the rejecting relay gives the reason"),
     }
 }
 
@@ -206,11 +208,11 @@ impl Outside {
 pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.options.timeout;
     let state = match progress {
-        Progress::Held { by } => {
-            format!("relay {by} holds version {version}, and the chain does not fly it yet")
+        Progress::Stored { by } => {
+            format!("relay {by} has stored version {version}, but the chain does not fly it yet")
         }
         Progress::Adopted { by } => format!(
-            "relay {by} flies version {version}, and not all relays of its view are known to"
+            "relay {by} flies version {version}, but it is unknown whether all relays of its view do"
         ),
         // The ground has only asked so far.
         Progress::Idle => format!(
@@ -218,7 +220,7 @@ pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Groun
             why(plan, ground.stats())
         ),
         _ => format!(
-            "no relay is known to hold version {version}: {}",
+            "no relay is known to have stored version {version}: {}",
             why(plan, ground.stats())
         ),
     };
@@ -232,54 +234,56 @@ fn why(plan: &Plan, stats: &Stats) -> String {
         (
             stats.mission,
             format!(
-                "hellos are of relays that were loaded with another mission than 0x{:04x}; say what they were loaded with",
+                "hellos come from relays that were loaded with another mission than 0x{:04x}: give this station the mission that the relays were loaded with",
                 plan.loaded.mission.digest()
             ),
         ),
         (
             stats.forged,
-            "frames have a wrong tag: is the key in --key-file that of the relays?".to_owned(),
+            "frames have a wrong tag: --key-file must be the key of the relays".to_owned(),
         ),
         (
             stats.unsigned,
-            "frames are not signed: relays without --key-file take no uploads".to_owned(),
+            "frames are not signed: relays without --key-file accept no uploads".to_owned(),
         ),
         (
             stats.foreign,
             format!(
-                "frames are of another network number than --network {}",
+                "frames have another network number than --network {}",
                 plan.options.network
             ),
         ),
         (
             stats.version,
-            "frames are of another version of the format".to_owned(),
+            "frames have another version of the frame format: the firmware of the relays and this program must match".to_owned(),
         ),
         (
             stats.misaddressed.saturating_add(stats.overheard),
             format!(
-                "frames are heard and none is for the {}: are --key-file, --end and --of those of the relays? The log of the nearest one says more",
+                "frames were received, but none for the {}: compare --key-file, --end and --of with the options of the relays, and read the log of the nearest relay",
                 name(plan.end)
             ),
         ),
         (
             stats.crc,
             format!(
-                "frames are damaged: is --baud {} that of the relays?",
+                "frames are damaged: --baud {} must be the data rate of the relays",
                 plan.options.baud
             ),
         ),
     ];
     match faults.into_iter().find(|(count, _)| *count > 0) {
         Some((count, fault)) => format!("{count} {fault}"),
-        None if stats.received > 0 => "one answers, and does not take it yet".to_owned(),
+        None if stats.received > 0 => {
+            "a relay replies, but has not stored the upload yet".to_owned()
+        }
         // A relay with another mission sends only handshakes.
         None if stats.handshakes > 0 => format!(
-            "one is there and says nothing: it was loaded with another mission than 0x{:04x}, most likely",
+            "a relay sends handshakes but no hellos: it was probably loaded with another mission than 0x{:04x}",
             plan.loaded.mission.digest()
         ),
         None => format!(
-            "nothing was heard; is --tty {} the one toward the chain, and are --network {}, --baud {}, --end and --key-file right? The log of a relay that hears this says more",
+            "no frame was received: check that --tty {} leads to the chain, and check --network {}, --baud {}, --end and --key-file; the log of a relay that receives this station gives the reason",
             plan.options.tty.display(),
             plan.options.network,
             plan.options.baud
@@ -289,9 +293,9 @@ fn why(plan: &Plan, stats: &Stats) -> String {
 
 pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let (event, what) = if is_heard {
-        ("back", "is received, and receives this station")
+        ("back", "and this station receive each other")
     } else {
-        ("lost", "does not answer")
+        ("lost", "does not reply")
     };
     let text = format_args!("relay {node} {what}");
     log.say(now, event, json!({ "node": node }), text);

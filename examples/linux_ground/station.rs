@@ -186,7 +186,7 @@ impl<'a> Station<'a> {
         None
     }
 
-    /// Handles signals and status requests; returns the time of the next call.
+    /// Handles signals and status requests; returns the time by which the next call is due.
     fn tell(&mut self, time: Instant) -> Option<Instant> {
         let Self {
             service,
@@ -202,7 +202,7 @@ impl<'a> Station<'a> {
         service.tend(time, "station", |log, command| {
             if let Some((command, _)) = command {
                 let text =
-                    format!("{command}: a station takes no commands; send nothing for its state");
+                    format!("{command}: a ground station accepts no commands: send an empty request to read its state");
                 return json!({ "done": false, "text": text });
             }
             json!({
@@ -223,7 +223,7 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// Sleeps until there may be something to do; returns the result after a signal to end.
+    /// Sleeps until input or a timer needs work; returns the result after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> Over {
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
         let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
@@ -241,7 +241,9 @@ impl<'a> Station<'a> {
 
     fn stop(&self) -> Result<(), String> {
         if !self.plan.options.stand {
-            return Err("stopped before the chain was known to fly it".to_owned());
+            return Err(
+                "stopped by a signal before the chain was known to fly the new mission".to_owned(),
+            );
         }
         self.service.stopping();
         let log: &Log = &self.service.log;
@@ -264,7 +266,7 @@ fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
         return Value::Null;
     };
     let (progress, flown_by) = match ground.progress() {
-        Progress::Held { .. } => ("held", 0),
+        Progress::Stored { .. } => ("stored", 0),
         Progress::Adopted { .. } => ("adopted", 1),
         Progress::Refused { .. } => ("refused", 0),
         Progress::Flown { relays, .. } => ("flown", relays),

@@ -23,8 +23,9 @@ const MOST_STEPS: u32 = 400_000;
 pub struct Frame {
     /// Time of arrival.
     pub at: Instant,
-    /// Sending and receiving node.
+    /// Sender of the frame.
     pub from: usize,
+    /// Receiver of the frame.
     pub to: usize,
     /// Port of the receiver.
     pub port: Port,
@@ -118,7 +119,7 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Delivers the next frame that has arrived, or else advances to the next timer or arrival. Stops at `until`.
+    /// Delivers the next frame that has arrived, or advances to the next timer or arrival. Stops at `until`.
     ///
     /// Then all nodes handle their timers and send. Returns false at `until`.
     ///

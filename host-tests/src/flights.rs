@@ -84,7 +84,7 @@ pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     start.collect()
 }
 
-/// Returns eight drones in a row, each with its own speed and an exact position.
+/// Returns eight drones in a row with random speeds and exact position reports.
 pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
@@ -104,7 +104,7 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
     setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
 }
 
-/// Returns own powers and altitudes of all eight relays three times in ten, otherwise none.
+/// Returns own profiles of all eight relays with a probability of 30 %, otherwise an empty list.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();

@@ -29,7 +29,7 @@ pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
     plan::solve(mission, Schedule::Bracketed, of).ok()
 }
 
-/// Returns the relays' positions for a target that can be met.
+/// Returns the relays' positions for `target`, which the chain must be able to meet.
 pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Placement> {
     let of = |index| profile_of(mission, own, index);
     (1..=mission.relays())
@@ -75,7 +75,7 @@ pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Li
             .zip(&x)
             .map(|(index, &x_m)| {
                 let profile = profile_of(&mission, &own, index);
-                (profile.on_line().at.at(x_m), profile)
+                (profile.on_line().cross_section.at(x_m), profile)
             })
             .collect();
         let reference = link.sir_hops(&x.iter().map(|&x| f64::from(x)).collect::<Vec<_>>());
@@ -89,7 +89,7 @@ pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Li
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// A chain solved near its optimum.
+/// Solution of a chain, compared with its optimum.
 #[derive(Debug)]
 pub struct Solved {
     /// Positions along Tx-Rx, m.
@@ -133,9 +133,9 @@ pub fn optimum_is_found(
 pub struct Mixed {
     /// Number of chains with an agreement.
     pub solved: u32,
-    /// Number of them at the optimum.
+    /// Number of chains at the optimum.
     pub best: u32,
-    /// Largest number of sweeps.
+    /// Largest number of sweeps of a chain.
     pub sweeps: u32,
 }
 
@@ -204,7 +204,7 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
         let gain = mission.relay_gain(profile.power_w);
         (Sender::relay(&mission, before), from, gain)
     };
-    let place = profile.on_line().at;
+    let place = profile.on_line().cross_section;
     let hop = Hop::new(&mission, mission.interferer()?, sender, index, place, 0.0);
     Some(DrawnHop {
         link,
@@ -223,7 +223,7 @@ pub struct Reaches {
     pub inside: u32,
     /// Reaches beyond positions that miss the target.
     pub leaps: u32,
-    /// Targets that no position meets.
+    /// Number of targets that no position meets.
     pub infeasible: u32,
 }
 

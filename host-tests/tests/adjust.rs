@@ -122,7 +122,7 @@ fn the_grid_moves_where_a_separate_program_moves() {
             sender = Sender::relay(
                 &mission,
                 uav_relay::place::Station {
-                    at: place.cross_section(),
+                    cross_section: place.cross_section(),
                     power_w: 1.0,
                 },
             );

@@ -109,7 +109,7 @@ fn random_links_settle_at_their_optimum() {
     assert!(hopeless > 0);
 }
 
-/// Compares the paper's step of 0.1: number of targets, and last target.
+/// Checks the number of targets and the last target with the paper's fixed step of 0.1.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [

@@ -23,7 +23,7 @@ const NEAR: f64 = 1e-3;
 /// Relative error by which a bound may be too low: the search's tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
-/// Returns true if the farthest chain meets the target.
+/// Returns true if the chain in which every relay is at its reach meets `target`.
 fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {

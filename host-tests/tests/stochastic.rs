@@ -228,7 +228,7 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// Checks the closed loop: relays configured with an even field measure the true one and agree again.
+/// Checks that relays configured with an even field measure the true field and agree again.
 #[test]
 fn what_is_measured_takes_the_place_of_what_was_agreed() {
     let mut rng = generator(67);

@@ -184,7 +184,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         true
     }
 
-    /// Writes all bytes; returns true on success.
+    /// Writes all `bytes` to the port; returns true on success.
     async fn write(&mut self, mut bytes: &[u8], clock: &impl Clock) -> bool {
         while !bytes.is_empty() {
             let begun = clock.now();
@@ -293,7 +293,7 @@ impl Frames {
         ROOM.saturating_sub(self.0.len()) >= MAX_FRAME
     }
 
-    /// Queues a whole frame; returns false if it does not fit.
+    /// Queues a complete frame for sending; returns false if the queue has no room for the frame.
     pub(super) fn push(&mut self, frame: &[u8]) -> bool {
         let fits = frame.len() <= ROOM.saturating_sub(self.0.len());
         if fits {

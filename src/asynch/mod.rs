@@ -218,7 +218,7 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         }
     }
 
-    /// Returns the link, to recover its port.
+    /// Ends the task and returns the link, from which the port can be recovered.
     pub fn release(self) -> AsyncLink<R, W, Pin> {
         self.channel
     }

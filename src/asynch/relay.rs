@@ -15,7 +15,7 @@ use crate::serial::SerialStats;
 /// relay across an `await`. An interrupt passes its data through a channel to such a task.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if there has been an input since the last turn.
+    /// True if the firmware has changed an input since the task's last turn.
     changed: Cell<bool>,
     /// Waker of the task that runs the ports.
     runner: Cell<Option<Waker>>,
@@ -87,7 +87,7 @@ impl<'a> AsyncRelay<'a> {
         wake(&self.runner);
     }
 
-    /// Wakes the task that waits for an event.
+    /// Wakes the firmware task that waits for the relay's next event.
     pub(super) fn tell(&self) {
         wake(&self.listener);
     }

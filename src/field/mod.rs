@@ -18,7 +18,7 @@ const UPSILON: (f32, f32) = (1e-9, 1e32);
 pub struct FieldPoint {
     /// Position along the line from Tx (0) to Rx (D), m: -1e7 to 1e7.
     pub x_m: f32,
-    /// Upsilon = E[1/I] there, 1/W: 1e-9 to 1e32.
+    /// Upsilon = E[1/I] at this x, 1/W: 1e-9 to 1e32.
     pub upsilon_per_w: f32,
 }
 

@@ -3,7 +3,7 @@
 //! | progress | state of the polled relay | action |
 //! | --- | --- | --- |
 //! | `Offering` | holds an older mission, or has not answered | send a hello every second, and the mission in reply to the relay's hello; after three unanswered hellos poll the next of the four nearest relays |
-//! | `Held` | holds the new mission, flies another | poll every second |
+//! | `Stored` | holds the new mission, flies another | poll every second |
 //! | `Adopted` | flies the new mission; not all of its view are known to | poll every second |
 //! | `Flown` | all of its view fly the mission; relays outside a view take no part until they do | done |
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
@@ -275,7 +275,7 @@ impl Ground {
                 upload,
                 offer_number,
             }) if self.is_answer(upload, *offer_number) => {
-                self.told(sender, *upload);
+                self.on_upload(sender, *upload);
                 &mut self.stats.received
             }
             _ => &mut self.stats.malformed,
@@ -296,7 +296,7 @@ impl Ground {
     }
 
     /// Records the upload that relay `by` has sent in answer to the question.
-    fn told(&mut self, by: u16, upload: Upload) {
+    fn on_upload(&mut self, by: u16, upload: Upload) {
         let flies = matches!(&self.flown, Some(flown) if flown.by == by && flown.flies && flown.version == upload.version());
         self.flown = Some(FlownMission {
             by,
@@ -372,7 +372,7 @@ impl Ground {
         } else if hello.active {
             Progress::Adopted { by }
         } else {
-            Progress::Held { by }
+            Progress::Stored { by }
         };
         // A final state does not change, even if another relay is not up to date.
         if self.is_under_way() || !is_under_way(progress) {
@@ -498,7 +498,7 @@ impl Ground {
 const fn is_under_way(progress: Progress) -> bool {
     matches!(
         progress,
-        Progress::Offering | Progress::Held { .. } | Progress::Adopted { .. }
+        Progress::Offering | Progress::Stored { .. } | Progress::Adopted { .. }
     )
 }
 
@@ -534,7 +534,7 @@ pub enum Progress {
     /// The mission is offered; no relay is known to hold it.
     Offering,
     /// A relay holds the mission; the ground station polls until the chain flies it.
-    Held {
+    Stored {
         /// Node number of the relay.
         by: u16,
     },

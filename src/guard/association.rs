@@ -46,8 +46,9 @@ pub(super) struct Association {
     strays: u8,
     /// True if a message is pending.
     pub(super) due: bool,
-    /// True if the neighbour forwarded a request to open the chain; and the last such request sent to it.
+    /// True if the neighbour has forwarded a request to open the chain.
     pub(super) opens: bool,
+    /// Value of that request in the last message to the neighbour.
     open_sent: bool,
     /// Reminders until the neighbour's halt request expires, 0 for none.
     halt_reminders_left: u8,
@@ -298,10 +299,10 @@ impl Association {
 /// Limit of this relay's x. Its cause is a lost relay that may still hover, or an obstacle that is not flown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Nearest lost node, and the limit, m.
+    /// Nearest lost node, and the limit of this relay's x because of that node, m.
     lost: Option<(u16, f32)>,
-    /// x from which on a relay that was lost nearby is at least the separation away, m. Until then only its position across the
-    /// line may separate the two. NaN if there is none.
+    /// x from which a nearby lost relay is at least the separation away, m; NaN if no relay is lost nearby. Below this x the two
+    /// may be separated across the line only.
     near_m: f32,
     /// True if a lost relay was out of order with this one at its last message.
     disordered: bool,
@@ -484,7 +485,7 @@ impl KeepOut {
 pub struct Fence {
     /// Number of the sender's association with this neighbour, never 0.
     pub association: u16,
-    /// Last number received from the destination's association, 0 for none.
+    /// Echo of the destination's association number as last received, 0 for none.
     pub echo: u16,
     /// Owner: number of the fence, 0 before the first. Follower: number of the newest fence received.
     pub number: u16,
@@ -492,7 +493,7 @@ pub struct Fence {
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
-    /// Position of the sender across the line, or its target there, m. Both coordinates are -1e7 to 1e7.
+    /// Position of the sender across the line, or its target position across the line, m. Both coordinates are -1e7 to 1e7.
     pub across: CrossSection,
     /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
     /// must not move across the line.
@@ -558,7 +559,7 @@ pub enum HoldReason {
     Order,
     /// The agreed distance along x is less than allowed, given the current positions across the line.
     Close,
-    /// A lost relay may still hover there.
+    /// A lost relay may still hover between this relay and its agreed position.
     Lost,
     /// The neighbour is not flown, and blocks the path or has not made room.
     NotFlown,

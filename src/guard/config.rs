@@ -193,7 +193,7 @@ impl GuardConfig {
 /// Maximum distance of a position from Tx, m.
 const FARTHEST_M: f32 = 1e7;
 
-/// Returns true if `x_m` is a valid position along x, m; false for NaN.
+/// Returns true if `x_m` is finite and in the range of positions along x.
 pub(super) fn is_place(x_m: f32) -> bool {
     x_m.abs() <= FARTHEST_M
 }

@@ -27,7 +27,7 @@ pub(super) struct FenceFollower {
     /// True once this relay has cleared a fence.
     clear: bool,
     /// True if the owner was informed that the newest fence has been cleared.
-    told: bool,
+    owner_informed: bool,
 }
 
 impl FenceFollower {
@@ -41,7 +41,7 @@ impl FenceFollower {
             taken_m: f32::INFINITY,
             target_m: 0.0,
             clear: false,
-            told: false,
+            owner_informed: false,
         }
     }
 
@@ -89,7 +89,7 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association along another line; of lost relays it only keeps that there are some.
+    /// Starts a new association along another line. Lost relays are kept without their positions.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -151,11 +151,11 @@ impl FenceFollower {
             self.number = fence.number;
             self.fence_m = fence.x_m;
             self.asked_m = fence.apart_m;
-            self.told = false;
+            self.owner_informed = false;
         }
     }
 
-    /// Returns the smallest allowed x, m; above the current setpoint, it is a request to go there.
+    /// Returns the smallest allowed x, m. A value above the current setpoint asks this relay to go there.
     #[inline(never)] // called from several places
     pub(super) fn least(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {
@@ -228,7 +228,7 @@ impl FenceFollower {
     pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
         if self.is_agreed() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
-            self.association.due |= low_m >= self.fence_m && !self.told;
+            self.association.due |= low_m >= self.fence_m && !self.owner_informed;
         }
     }
 
@@ -250,7 +250,7 @@ impl FenceFollower {
             return None;
         }
         self.association.due = false;
-        self.told = low_m >= self.fence_m;
+        self.owner_informed = low_m >= self.fence_m;
         let mut fence = self.association.fence(own);
         (fence.number, fence.x_m) = (self.number, low_m);
         if !placed {

@@ -424,16 +424,16 @@ impl Guard {
         if !self.flown || self.own.target.is_none() || !self.own.reachable.is_known() {
             self.pass_halt();
             let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-            let told = [(Side::Upstream, up), (Side::Downstream, down)]
+            let fence_message = [(Side::Upstream, up), (Side::Downstream, down)]
                 .into_iter()
                 .find_map(|(side, association)| {
                     let fence = association.poll_unpaired(&self.own)?;
                     Some((side, association.node, fence))
                 });
-            if let Some((_, _, fence)) = &told {
-                self.own.told = fence.across.at(fence.x_m);
+            if let Some((_, _, fence)) = &fence_message {
+                self.own.sent_place = fence.across.at(fence.x_m);
             }
-            return told;
+            return fence_message;
         }
         let own = &self.own;
         let placed = self.owner.is_ordered(own);

@@ -134,17 +134,17 @@ pub(super) struct Own {
     pub(super) reachable: ReachableInterval,
     /// Time of the last change of the setpoint across the line.
     turned: Instant,
-    /// True once the relay has arrived there across the line.
+    /// True once the relay has arrived at the setpoint's position across the line.
     pub(super) still: bool,
-    /// True if the chain is to open, as far as known here.
+    /// True if this relay knows of a request to open the chain.
     pub(super) open: bool,
     /// True while this relay holds its position. This relay or another one is not in order with its neighbours.
     pub(super) halted: bool,
     pub(super) reported: Option<Placement>,
     /// Last position sent while not flown.
-    pub(super) told: Placement,
+    pub(super) sent_place: Placement,
     /// Reminders since the last change of the setpoint.
-    stands: u8,
+    reminders: u8,
     /// Last setpoint at which this relay arrived, or its first one. It is on its way from there, so it stops no farther outside.
     left: Placement,
 }
@@ -162,8 +162,8 @@ impl Own {
             open: false,
             halted: true,
             reported: None,
-            told: Placement::on_line(0.0, 0.0),
-            stands: 0,
+            sent_place: Placement::on_line(0.0, 0.0),
+            reminders: 0,
             left: Placement::on_line(0.0, 0.0),
         }
     }
@@ -174,7 +174,7 @@ impl Own {
             self.still = false;
         }
         if self.setpoint != Some(setpoint) {
-            self.stands = 0;
+            self.reminders = 0;
         }
         self.setpoint = Some(setpoint);
     }
@@ -193,7 +193,7 @@ impl Own {
     }
 
     pub(super) const fn count_reminder(&mut self) {
-        self.stands = self.stands.saturating_add(1);
+        self.reminders = self.reminders.saturating_add(1);
     }
 
     /// Returns true if the setpoint has not moved for some reminders before the agreed position. That position is farther toward
@@ -207,14 +207,15 @@ impl Own {
             Side::Downstream => target.x_m - setpoint.x_m,
         };
         let wants = ahead_m > self.config.rounding() || !clear && !self.has_agreed_cross_section();
-        self.stands >= MAX_REMINDERS_STILL && wants
+        self.reminders >= MAX_REMINDERS_STILL && wants
     }
 
     /// Returns true if the relay, while not flown, was reported away from the position that it has sent.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
-            !self.is_near(place.cross_section(), self.told.cross_section())
-                || (place.x_m - self.told.x_m).abs() > self.config.hover_m + self.config.rounding()
+            !self.is_near(place.cross_section(), self.sent_place.cross_section())
+                || (place.x_m - self.sent_place.x_m).abs()
+                    > self.config.hover_m + self.config.rounding()
         })
     }
 
@@ -271,6 +272,7 @@ impl Own {
     }
 
     /// Returns true if the setpoint across the line is the agreed one.
+    #[inline(never)] // called from several places
     pub(super) fn has_agreed_cross_section(&self) -> bool {
         self.target
             .is_none_or(|target| target.cross_section() == self.cross_section())

@@ -18,13 +18,13 @@ pub(super) struct FenceOwner {
     fence_m: f32,
     /// Requested step, m; infinite for the separation.
     asked_m: f32,
-    /// Step since the neighbour agreed, m, unless another limit is larger.
+    /// Step along x to which the neighbour has agreed, m, or a larger limit of this relay.
     granted_m: f32,
     /// Smallest x at which the neighbour stays for certain, m; negative infinity before its first message.
     counted_m: f32,
     /// Agreed x of the neighbour, m.
     target_m: f32,
-    /// Neighbour's position across the line, and true if it has arrived there.
+    /// Neighbour's position across the line, and true if the neighbour has arrived at that position.
     across: CrossSection,
     still: bool,
     /// True if the neighbour has received the newest fence.
@@ -116,7 +116,7 @@ impl FenceOwner {
         self.association.heard != 0
     }
 
-    /// Returns true without a neighbour, or if the neighbour is beyond this relay.
+    /// Returns true if there is no neighbour, or the neighbour has a larger x than this relay.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour()

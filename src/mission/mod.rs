@@ -94,6 +94,8 @@ pub enum MissionError {
     InterfererPlace,
     /// `noise_w` is not within 0 to 1, or above 1e12 times the interferer's power received at 1 m.
     Noise,
+    /// `noise_w` is above 0, and the crate was built without its feature `noise`.
+    NoiseFeature,
     /// The crate was built without its feature `field`.
     Field,
     /// `tolerance` is not within 1e-6 to 0.1.
@@ -122,6 +124,7 @@ impl core::fmt::Display for MissionError {
             Self::Noise => {
                 "noise_w must be within 0 to 1, and at most 1e12 times the interferer's power received at 1 m"
             }
+            Self::NoiseFeature => "a noise_w above 0 needs the feature `noise`",
             Self::Field => "a field of interference needs the feature `field`",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
         })
@@ -260,7 +263,7 @@ impl Profile {
     /// Returns a relay with this profile right above the line.
     pub const fn on_line(self) -> Station {
         Station {
-            at: CrossSection::on_line(self.altitude_m),
+            cross_section: CrossSection::on_line(self.altitude_m),
             power_w: self.power_w,
         }
     }
@@ -357,6 +360,9 @@ impl Mission {
         }
         if !within(noise_w, 0.0, 1.0) {
             return Err(MissionError::Noise);
+        }
+        if noise_w > 0.0 && !cfg!(feature = "noise") {
+            return Err(MissionError::NoiseFeature);
         }
         if matches!(interference, Interference::Field(_)) && !cfg!(feature = "field") {
             return Err(MissionError::Field);
@@ -525,7 +531,11 @@ impl Mission {
     ///
     /// 0 without noise and in a field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
-        self.noise_at_a_metre
+        if cfg!(feature = "noise") {
+            self.noise_at_a_metre
+        } else {
+            0.0
+        }
     }
 
     /// Order in which the positions are computed.
@@ -741,7 +751,7 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Gains for an unknown interferer with relays of `power_w`. SIR = (D / d)^2 on every hop, so equal hops are best.
+/// Returns the gains for an unknown interferer with relays of `power_w`. They give SIR = (D / d)^2 on every hop, so equal hops are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -52,7 +52,7 @@ pub(crate) enum Stage {
     Outstanding,
     /// The result is known.
     Completed,
-    /// Given up after it was sent, so its times are no signs of life. Otherwise as `Completed`.
+    /// Cancelled after sending: its times are no signs of life. The other rules of `Completed` apply.
     Cancelled,
 }
 
@@ -88,11 +88,11 @@ pub(crate) struct Circulation {
     retries: u8,
     /// True once the next relay has replied that it has the message.
     is_received: bool,
-    /// True if this relay or the previous one has seen the current message lost.
+    /// True if this or the previous relay has noticed a loss of the current message.
     is_lossy: bool,
     /// Further messages for which the channel counts as lossy.
     lossy_messages: u8,
-    /// Unasked repetitions of the reply that are left.
+    /// Remaining repetitions of the reply without a request for it.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
@@ -187,6 +187,7 @@ impl Circulation {
         self.stop(Stage::Cancelled);
     }
 
+    #[inline(never)] // called from many places
     const fn stop(&mut self, stage: Stage) {
         self.stage = stage;
         self.is_forward_due = false;
@@ -195,7 +196,7 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles the same message once more. The previous relay has retransmitted it, `path` hops from the initiator.
+    /// Handles a retransmission of the current message by the previous relay. The initiator is `path` hops away.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
@@ -286,7 +287,7 @@ impl Circulation {
     }
 }
 
-/// Late messages in a row after which they count as messages of a restarted leader.
+/// Number of consecutive old messages after which the sender counts as a restarted leader.
 pub(crate) const SUSPICIOUS: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]

@@ -15,7 +15,7 @@ pub(crate) struct Member {
     /// Interference of the active mission, independent of the current estimate.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
-    /// Node number, from 1 next to Tx.
+    /// Node number: 1 is the relay next to Tx.
     pub(crate) node: u16,
     /// Number of relays of the mission as loaded before flight.
     pub(crate) all: u16,
@@ -67,10 +67,10 @@ pub(crate) struct Context<'a> {
     pub(crate) member: &'a Member,
     /// Newest mission that this relay has stored.
     pub(crate) latest: MissionId,
-    /// True if this relay has no next relay on a pass.
+    /// True if this relay is the last relay of a pass.
     pub(crate) end: bool,
     /// Remaining time of other relays' leases.
-    pub(crate) held: Held,
+    pub(crate) other_leases: OtherLeases,
 }
 
 impl<'a> Context<'a> {
@@ -155,7 +155,7 @@ impl<'a> Context<'a> {
 
 /// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Held {
+pub(crate) struct OtherLeases {
     /// Longest lease of members of this relay's view that rely on this relay.
     pub(crate) lease_left: Duration,
     /// Accepted view, and the longest lease of members of earlier views. `None` if a member may not have accepted `view`.
@@ -163,7 +163,7 @@ pub(crate) struct Held {
     pub(crate) rest: Option<Duration>,
 }
 
-impl Held {
+impl OtherLeases {
     #[cfg(test)]
     pub(crate) const NONE: Self = Self {
         lease_left: Duration::from_micros(0),
@@ -182,7 +182,7 @@ impl Held {
     }
 }
 
-/// Effects of one layer on the others.
+/// Effects of one layer on the other layers.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
@@ -191,7 +191,7 @@ impl Held {
 pub(crate) struct Effects {
     /// Reason why the received message had no effect.
     pub(crate) ignored: Option<Ignored>,
-    /// A message is retransmitted.
+    /// True if a message was retransmitted.
     pub(crate) resent: bool,
     /// A pass or a proposal starts at this relay.
     pub(crate) began: bool,
@@ -222,7 +222,7 @@ pub(crate) enum Peer {
     Previous,
 }
 
-/// Result of a layer, which the others or the firmware need.
+/// Result of a layer for the other layers or the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
     /// The chain has agreed on a target.
@@ -244,7 +244,7 @@ pub(crate) struct Sensed {
     pub(crate) new_estimate: bool,
     /// The measurements do not fit a single source.
     pub(crate) unclear: bool,
-    /// Node whose measurements do not fit those of the others.
+    /// Node whose measurements do not fit the other nodes' measurements.
     pub(crate) off: Option<u16>,
 }
 

@@ -64,11 +64,11 @@ pub(crate) enum Sender {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if it is of a newer epoch than this relay; false if it is of the same epoch.
+    /// True if the claim has a newer epoch than this relay; false if it has the same epoch.
     pub(crate) newer_epoch: bool,
     /// True if its sender is passive.
     pub(crate) passive: bool,
-    /// True if it was sent after this relay's start: it names this relay's claim, or a key proves it.
+    /// True if the claim was sent after this relay's start, as this relay's claim in it or a key proves.
     pub(crate) is_current: bool,
 }
 
@@ -164,7 +164,7 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use an index; returns true if that should be reported.
+    /// Records that two nodes use one index; returns true if the duplicate should be reported.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -197,7 +197,7 @@ impl IndexClaims {
         self.heard
     }
 
-    /// Returns true if this relay had a position before it received the other node, which it receives now.
+    /// Returns true if this relay had a position before it first received the other node.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -357,7 +357,7 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Removes the other node, which is gone; returns true if the relay becomes active.
+    /// Removes the other node after its silence; returns true if this relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {

@@ -29,7 +29,7 @@
 //! for at most a quarter of `dead_after`.
 
 use super::circulation::{Circulation, Reply};
-use super::context::Held;
+use super::context::OtherLeases;
 use super::context::{Context, Effects, LayerEvent, Peer};
 use super::context::{PAUSE, earliest, longest_lease, tenths};
 use crate::settings::Settings;
@@ -114,13 +114,13 @@ impl Lease {
 
     /// Returns the silence after which a neighbour may be lost. The span of the last renewal, at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
-        let told = self.current.map_or(0, |current| current.span);
-        from_tenths(told).max(settings.dead_after)
+        let span = self.current.map_or(0, |current| current.span);
+        from_tenths(span).max(settings.dead_after)
     }
 
     /// Returns the remaining leases of other members, as far as this relay knows.
-    pub(crate) fn other_leases(&self, now: Instant) -> Held {
-        Held {
+    pub(crate) fn other_leases(&self, now: Instant) -> OtherLeases {
+        OtherLeases {
             lease_left: self.vouched_until.since(now),
             view: self.rest.0,
             rest: self.bound.map(|until| until.since(now)),

@@ -47,7 +47,7 @@ struct Asked {
     last: Instant,
 }
 
-/// State of the offers to the neighbour on one side, and of the ground station there.
+/// State of the offers to the neighbour, and to the ground station, on one side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
     /// Number of the neighbour's last hello, which an offer answers, and its time; 0 before any.
@@ -55,7 +55,7 @@ struct Offering {
     heard: Option<Instant>,
     /// True if an offer is pending.
     is_due: bool,
-    /// Time of the next repetition, and number of offers so far.
+    /// Time of the next repetition, and number of offers sent.
     at: Option<Instant>,
     tries: u8,
     /// True if a hello to the ground station is pending.
@@ -80,7 +80,7 @@ impl Offering {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
     /// Stored.
-    Held,
+    Stored,
     /// Rejected: no valid line on earth, or outside the geofence; `is_new` for the first time.
     Refused { why: LineError, is_new: bool },
     /// Ignored: not newer, or for other relays.
@@ -291,7 +291,7 @@ impl MissionUpdate {
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the refused mission if it is the stored or a newer one, and not `active`.
+    /// Returns the refused mission, unless it is `active` or older than the stored mission.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
@@ -302,7 +302,7 @@ impl MissionUpdate {
         refused == self.latest && self.refuse(refused)
     }
 
-    /// Records that `id` is refused; returns true if that is new.
+    /// Records that mission `id` is refused; returns true for the first refusal.
     fn refuse(&mut self, id: MissionId) -> bool {
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| uploads.refused.replace(id) != Some(id))
@@ -317,7 +317,7 @@ impl MissionUpdate {
         match self.fits(member, upload) {
             Ok(()) => {
                 self.store(upload);
-                Offered::Held
+                Offered::Stored
             }
             Err(UploadError::Line(why)) => Offered::Refused {
                 why,
@@ -345,7 +345,7 @@ impl MissionUpdate {
         }
         self.fits(member, upload)?;
         match self.store_if_newer(member, upload) {
-            Offered::Held => Ok(()),
+            Offered::Stored => Ok(()),
             _ => Err(UploadError::Old),
         }
     }

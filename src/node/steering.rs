@@ -19,7 +19,7 @@ pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
     /// Setpoint last reported to the firmware.
-    told: Option<Placement>,
+    reported_setpoint: Option<Placement>,
 }
 
 impl Steering {
@@ -27,7 +27,7 @@ impl Steering {
     pub(crate) const NONE: Self = Self {
         guard: None,
         remind_at: None,
-        told: None,
+        reported_setpoint: None,
     };
 
     /// Creates the guard that `settings` request, for a relay with these `neighbours`.
@@ -62,8 +62,8 @@ impl Steering {
             }
         }
         let setpoint = self.setpoint(agreed);
-        let changed = setpoint != self.told;
-        self.told = setpoint;
+        let changed = setpoint != self.reported_setpoint;
+        self.reported_setpoint = setpoint;
         changed
     }
 

@@ -8,10 +8,10 @@
 use super::PerTarget;
 use crate::root::sqrt;
 
-/// Targets in a full ladder.
+/// Number of target SIRs in a full ladder.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps from the middle one to either end of a full ladder, both included.
+/// Number of gaps from the middle gap to either end of a full ladder, both included.
 const HALF: usize = TARGETS / 2;
 
 /// Target SIRs (linear, rising), as one target and two one-byte codes.
@@ -39,7 +39,7 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets for a plain pass or another.
+    /// Returns a ladder with the same targets, for a plain pass if `plain` is true.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }

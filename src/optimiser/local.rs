@@ -47,7 +47,7 @@ pub enum Local {
 pub struct HopEnd {
     /// Position; at altitude 0 for a ground station.
     pub place: Placement,
-    /// Minimum distance to it, m; 0 for a ground station.
+    /// Minimum distance between the relay and this node, m; 0 for a ground station.
     pub apart_m: f32,
 }
 
@@ -148,8 +148,9 @@ pub struct LocalSearch {
     column: u8,
     /// Best row of the current round: its altitude and its worse SIR.
     best_row: (f32, f32),
-    /// Best position so far if it is better than the current one, with its worse SIR. Otherwise the SIR is that of the current one.
+    /// Best position found if it is better than the current position; `None` otherwise.
     found: Option<Placement>,
+    /// Worst-hop SIR of that position, or of the current one, linear.
     best_sir: f32,
 }
 
@@ -237,7 +238,7 @@ impl LocalSearch {
         Some(u16::from(HALVINGS) + 4)
     }
 
-    /// Searches a row for the x beyond which the incoming hop is no longer the better one. Returns the best worse SIR.
+    /// Searches a row for the x at which both hops have equal SIRs. Returns the best worst-hop SIR of the row.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;

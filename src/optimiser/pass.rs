@@ -6,7 +6,7 @@
 //! out of reach of every chain. See [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may
 //! have to hold back.
 //!
-//! On the way back each relay has a position, and [`stand`](Link::stand) returns the required position of the relay before it on
+//! On the way back each relay has a position, and [`required_position`](Link::required_position) returns the required position of the relay before it on
 //! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
 //! The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole chain
@@ -15,7 +15,7 @@
 use super::PerTarget;
 use super::ladder::{Ladder, TARGETS};
 use super::retreat::{HopInterference, Retreat, Step, least};
-use super::spacing::{Hop, Stand, receiver_reach};
+use super::spacing::{Hop, RequiredPosition, receiver_reach};
 use crate::mission::{Heading, Mission, Profile};
 use crate::place::Station;
 use crate::root::sqrt_in_place;
@@ -24,7 +24,7 @@ use crate::sir::{Sender, square};
 /// Maximum number of field points per call, for as many targets as that allows, but at least one.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Relay before this one on a pass, as stated in its message.
+/// Previous relay of a pass, as stated in its message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
@@ -49,7 +49,7 @@ impl Behind {
 pub struct Link<'a> {
     /// Mission of the relay.
     pub mission: &'a Mission,
-    /// Relay before it on the pass; `None` for the first one, which starts at Tx or Rx.
+    /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain, 1 next to Tx.
     pub index: u16,
@@ -136,7 +136,14 @@ impl Link<'_> {
             let sender = self.behind.map_or(Sender::transmitter(mission), |behind| {
                 Sender::relay(mission, behind.relay)
             });
-            let hop = Hop::new(mission, interferer, sender, self.index, self.own.at, 0.0);
+            let hop = Hop::new(
+                mission,
+                interferer,
+                sender,
+                self.index,
+                self.own.cross_section,
+                0.0,
+            );
             return Some(Onward::Rx(match self.end_m {
                 Some(end_m) => hop.ending(end_m),
                 None if self.plain => hop,
@@ -144,7 +151,9 @@ impl Link<'_> {
             }));
         }
         mission.field()?;
-        let altitude_m = self.behind.map(|behind| behind.relay.at.altitude_m);
+        let altitude_m = self
+            .behind
+            .map(|behind| behind.relay.cross_section.altitude_m);
         let hop = Retreat::new(mission, self.own, self.index, altitude_m);
         Some(Onward::Tx(if self.plain {
             hop
@@ -193,7 +202,7 @@ impl Link<'_> {
             return Some((reach - mission.config().distance_m + last_hop, reach));
         }
         let c = mission.tx_gain().value() / target;
-        let beyond = square(self.own.at.altitude_m);
+        let beyond = square(self.own.cross_section.altitude_m);
         let value = |place: f32, quiet: f32| {
             // Limited to 1e9 m, as the last hop toward Rx, since an infinite slack cannot be sent.
             let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - beyond;
@@ -223,19 +232,26 @@ impl Link<'_> {
     ///
     /// `None` if there is none, because a range that was assumed to have no holes has one. Bounded by two reaches, in a field by
     /// three for each of its points.
-    pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
+    pub fn required_position(
+        &self,
+        target: f32,
+        from_m: f32,
+        place: f32,
+    ) -> Option<RequiredPosition> {
         if self.plain {
-            return Some(Stand::AtReach);
+            return Some(RequiredPosition::AtReach);
         }
         match self.onward()? {
-            Onward::Rx(hop) => hop.stand(target, from_m, place),
+            Onward::Rx(hop) => hop.required_position(target, from_m, place),
             Onward::Tx(hop) => {
                 let Some(behind) = self.behind else {
-                    return Some(Stand::AtReach);
+                    return Some(RequiredPosition::AtReach);
                 };
-                let apart = self
-                    .mission
-                    .least_step(self.own.at.apart_squared(behind.relay.at));
+                let apart = self.mission.least_step(
+                    self.own
+                        .cross_section
+                        .apart_squared(behind.relay.cross_section),
+                );
                 let low = from_m.max(place + apart).max(place.next_up());
                 // A position that leaves all relays toward Rx room along the line, at any altitude, is preferred.
                 let clear = self.mission.latest(self.index.saturating_add(1));
@@ -245,9 +261,9 @@ impl Link<'_> {
                 };
                 let step = to(clear).or_else(|| to(self.latest()))?;
                 Some(if step.to_m <= from_m {
-                    Stand::AtReach
+                    RequiredPosition::AtReach
                 } else {
-                    Stand::At(step.to_m)
+                    RequiredPosition::At(step.to_m)
                 })
             }
         }
@@ -437,9 +453,9 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             let link = self.link(at);
             let before = before(self.mission, at);
             let from_m = self.reach(before)?;
-            place = match link.stand(self.target, from_m, place)? {
-                Stand::AtReach => from_m,
-                Stand::At(x_m) => x_m,
+            place = match link.required_position(self.target, from_m, place)? {
+                RequiredPosition::AtReach => from_m,
+                RequiredPosition::At(x_m) => x_m,
             };
             let Some(before) = before else {
                 return Some(place);

@@ -175,7 +175,7 @@ fn placed(
     chain.place(0)?;
     chain
         .place(index)
-        .map(|x_m| profile_of(index).on_line().at.at(x_m))
+        .map(|x_m| profile_of(index).on_line().cross_section.at(x_m))
 }
 
 /// Returns the position of relay `index` for `target`, held back if that lets the other relays meet it.

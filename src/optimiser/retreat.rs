@@ -46,7 +46,7 @@ pub struct Retreat {
 impl Retreat {
     /// Returns the hop from relay `index`, `own`, to a relay at `altitude_m`, or to Rx if that is `None`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
-        let climb = own.at.altitude_m - altitude_m.unwrap_or(0.0);
+        let climb = own.cross_section.altitude_m - altitude_m.unwrap_or(0.0);
         Self {
             gain: match altitude_m {
                 Some(_) => mission.relay_gain(own.power_w).value(),
@@ -63,7 +63,7 @@ impl Retreat {
         }
     }
 
-    /// Returns the same hop with a receiver that may go to the end of its range. The relays before `index` then hold back to leave
+    /// Returns this hop with a receiver that may go to the end of its range. The relays before `index` then hold back to leave
     /// themselves room.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {

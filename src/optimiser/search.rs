@@ -59,7 +59,7 @@ const BEND: f32 = 0.25;
 /// Minimum reduction of the bracket by a sweep after which the interpolation is used again.
 const PROGRESS: f32 = 0.25;
 
-/// Sweeps after which the search takes the best target so far.
+/// Number of sweeps after which the search commits the best feasible target found.
 const MOST_SWEEPS: u32 = 48;
 
 /// State of a search: the current bracket and the next ladder.
@@ -278,7 +278,7 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Evaluates the polynomial through `points` (abscissa, value) at 0. `None` unless the abscissae fall strictly.
+/// Returns the value at 0 of the polynomial through `points` (abscissa, value). `None` unless the abscissae fall strictly.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {

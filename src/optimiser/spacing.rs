@@ -81,7 +81,7 @@ use crate::sir::{Sender, in_noise, square};
 /// Required position of the previous relay of the pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Stand {
+pub enum RequiredPosition {
     /// Reach of that relay; or Tx or Rx, which do not move.
     AtReach,
     /// x, m.
@@ -153,7 +153,7 @@ impl Hop {
         at: CrossSection,
         end_m: f32,
     ) -> Self {
-        let (from, aside) = (sender.at, interferer.y_m);
+        let (from, aside) = (sender.cross_section, interferer.y_m);
         let climb = at.altitude_m - from.altitude_m;
         Self {
             sender,
@@ -170,7 +170,7 @@ impl Hop {
         }
     }
 
-    /// Returns the same hop if not relay `index` but those after it hold back to leave themselves room.
+    /// Returns this hop for a chain in which the relays after `index` hold back, instead of relay `index`.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -261,7 +261,7 @@ impl Hop {
         let nearest = self.least_step + 2.0 * f32::EPSILON * near;
         let needed = ratio * (square(nearest) + self.across_squared);
         // s / (1 + nu s) >= needed has no solution if the signal is below the noise.
-        let left = 1.0 - self.noise * needed;
+        let left = 1.0 - self.nu() * needed;
         if !(left > 0.0) {
             return None;
         }
@@ -287,23 +287,28 @@ impl Hop {
     /// Returns the required position of the sender, with the receiver at `place`. The sender's reach for `target` is `from_m`.
     ///
     /// It is the closest allowed position, which has the best SIR; `None` if there is none.
-    pub fn stand(&self, target: f32, from_m: f32, place: f32) -> Option<Stand> {
+    pub fn required_position(
+        &self,
+        target: f32,
+        from_m: f32,
+        place: f32,
+    ) -> Option<RequiredPosition> {
         if self
             .reach(target, from_m)
             .is_some_and(|reach| place >= reach)
         {
-            return Some(Stand::AtReach);
+            return Some(RequiredPosition::AtReach);
         }
         let heard = square(self.interferer_x_m - place) + self.aside_squared;
-        let heard = in_noise(heard, self.noise);
+        let heard = in_noise(heard, self.nu());
         let ratio = self.sender.gain.ratio(target);
         let at = |from: f32| {
             let needed = ratio * (square(place - from) + self.across_squared);
             let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
             met.then_some(if from < from_m {
-                Stand::At(from)
+                RequiredPosition::At(from)
             } else {
-                Stand::AtReach
+                RequiredPosition::AtReach
             })
         };
         if self.from_tx {
@@ -320,7 +325,7 @@ impl Hop {
     /// `from_m` if the distance across the line is longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
-        if !(self.noise > 0.0) {
+        if self.is_silent() {
             return Some(place);
         }
         let hop = self.noisy(target, from_m);
@@ -391,7 +396,7 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 /// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
 /// that it is smooth in the target for the root search.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
-    let across = square(relay.at.y_m) + square(relay.at.altitude_m);
+    let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
@@ -413,7 +418,16 @@ const CLOSE: f32 = 5e-7;
 
 impl Hop {
     pub(in crate::optimiser) fn is_silent(&self) -> bool {
-        !(self.noise > 0.0)
+        !(self.nu() > 0.0)
+    }
+
+    /// Returns nu, 1/m^2. A constant 0 without the feature `noise` removes the search in noise from the image.
+    fn nu(&self) -> f32 {
+        if cfg!(feature = "noise") {
+            self.noise
+        } else {
+            0.0
+        }
     }
 
     /// Returns [`Hop::reach`] with noise, which is at most that without it.
@@ -437,7 +451,7 @@ impl Hop {
             aside_squared: self.aside_squared,
             across_squared: self.across_squared,
             base: self.base,
-            noise: self.noise,
+            noise: self.nu(),
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::place::Placement;
 use crate::relay::frames;
-use crate::sensing::belief::Told;
+use crate::sensing::estimate::NumberedEstimate;
 use crate::sensing::fit::Unfit;
 use crate::settings::{Identity, Settings, SetupError, Wiring, check};
 use crate::side::Side;
@@ -181,7 +181,9 @@ impl Relay {
         } else {
             first
         };
-        for &byte in bytes {
+        let mut rest = bytes;
+        while let Some((&byte, after)) = deframer.push_run(rest).split_first() {
+            rest = after;
             if let Some(decoded) = deframer.push(byte)
                 && let Some(frame) = self.endpoint.open(decoded, self.node.stats_mut())
             {
@@ -542,7 +544,7 @@ impl Relay {
     }
 
     /// Returns the estimate of the interference and its number. The mission's until the chain has estimated another.
-    pub fn belief(&self) -> Told {
+    pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
 

@@ -45,7 +45,7 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of consistent measurements, relative to the expected one.
+/// Maximum variance of consistent measurements, relative to the expected variance.
 const OUT_OF_LINE: f64 = 4.0;
 
 /// Minimum reduction of the misfit by an exclusion, in squared standard deviations.
@@ -54,26 +54,26 @@ const DEVIATIONS: f64 = 49.0;
 /// Minimum absolute reduction of the misfit by an exclusion: some 15 % of one position.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the variances without the second-best relay and without the faulty one.
+/// Minimum ratio of the variances without the second suspect and without the faulty relay.
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of the relative errors of consistent measurements (some 1.5 dB).
 const OF_ONE_MIND: f64 = 0.1;
 
-/// Passes between a failed trial and the next one.
+/// Number of sensing passes between a failed trial and the next trial.
 const REST: u8 = 4;
 
-/// Maximum squared difference at which a relay fits the others again. In squared standard deviations, and absolutely.
+/// Maximum squared difference at which an excluded relay fits again. In squared standard deviations, and absolutely.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays for an identification. With four, an exclusion leaves three, and three unknowns fit any three
 /// measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of positions, after fading; with fewer, any of them could be faulty.
+/// Minimum faded number of measured positions. With fewer, the faulty relay cannot be identified.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the others' mean weight to that of a position. A smaller weight is lost in the rounding of the sums.
+/// Maximum ratio of the mean weight to the weight of one position. Smaller weights are lost in the rounding of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Passes until the next trial may start.
     rest: u8,
-    /// Node without which the others fit best.
+    /// Node without which the other nodes' measurements fit best.
     best: u16,
     /// Residual of the fit to all relays.
     seen: f32,
@@ -110,7 +110,7 @@ pub(crate) enum Next {
     Review,
     /// Take the result although the measurements are inconsistent: the faulty relay is unknown.
     Unknown,
-    /// Discard the result, and start another pass soon.
+    /// Discard the result of this pass, and start another sensing pass soon.
     Again,
 }
 
@@ -302,14 +302,14 @@ const APART: (f64, f64) = (49.0, 0.174);
 /// Minimum number of relays; with fewer and two ends, the faulty one is unknown.
 const FEWEST_FOR_ENDS: u16 = 3;
 
-/// Ratio of an end's level to the expected one, and its relative variance.
+/// Ratio of a ground end's level to the expected level, and the ratio's relative variance.
 #[derive(Clone, Copy, Debug)]
-struct Told {
+struct EndLevel {
     ratio: f64,
     unsure: f64,
 }
 
-impl Told {
+impl EndLevel {
     fn fits(&self) -> bool {
         !is_apart(self.ratio, self.unsure, APART)
     }
@@ -333,21 +333,21 @@ pub(super) fn judge_ends(
         return before;
     }
     let distance_m = mission.config().distance_m;
-    let told = |x_m, level: Level| {
+    let end_level = |x_m, level: Level| {
         let there = terms(distance_m, Placement::on_line(x_m, 0.0));
         let expected = fit.value(&there);
         let own = f64::from(relative_error) * f64::from(relative_error);
         let ratio = v_at_end(mission, level) / expected;
         // The difference is relative to the smaller of the two, and so is the error of the expected level.
         let unsure = fit.relative_variance(&there) * (1.0 / (ratio * ratio)).max(1.0);
-        let told = Told {
+        let end_level = EndLevel {
             ratio,
             unsure: fit.variance() + own / f64::from(level.count) + unsure,
         };
-        (level.is_heard() && expected > 0.0).then_some(told)
+        (level.is_heard() && expected > 0.0).then_some(end_level)
     };
-    let transmitter = told(0.0, levels.transmitter);
-    let receiver = told(distance_m, levels.receiver);
+    let transmitter = end_level(0.0, levels.transmitter);
+    let receiver = end_level(distance_m, levels.receiver);
     let off = |transmitter, receiver, unknown| EndsOff {
         transmitter,
         receiver,

@@ -50,7 +50,7 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the last unknown is solved for.
+    /// True if the system is solved for all unknowns; false if the last unknown is left out.
     whole: bool,
 }
 
@@ -130,8 +130,9 @@ pub struct Fit {
     products: [f64; 10],
     right: [f64; 4],
     factor: Factor,
-    /// Variance of the relative error of one position, and the expected one.
+    /// Variance of the relative error of one position.
     variance: f64,
+    /// Expected value of `variance`.
     expected: f64,
     /// Residual of the sums, and the number of positions beyond the unknowns.
     seen: f64,
@@ -234,7 +235,7 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if there are more positions than unknowns, with errors as expected.
+    /// Returns true if there are more positions than unknowns, and their errors are as small as expected.
     pub(crate) fn is_of_one_mind(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -256,7 +257,7 @@ impl Fit {
         self.off(&self.coefficients, others)
     }
 
-    /// Returns the expected mean square relative error of the fit.
+    /// Returns the expected mean square relative error of the fitted interference.
     pub(crate) fn chance(&self) -> f64 {
         let unknowns = if self.factor.whole { 4.0 } else { 3.0 };
         unknowns * self.variance / self.count
@@ -277,8 +278,8 @@ impl Fit {
         let [aa, _, _, ad, ..] = self.products;
         let half = 0.5 * f64::from(mission.config().distance_m);
         let t = ad / aa;
-        let told = self.factor.whole && d * d * self.factor.last() > 4.0 * self.variance;
-        let left = if told {
+        let is_known = self.factor.whole && d * d * self.factor.last() > 4.0 * self.variance;
+        let left = if is_known {
             d > 0.0
         } else {
             f64::from(side_m) / half < t
@@ -371,7 +372,7 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the search area for sources, in units of D / 2. From D before Tx to D beyond Rx, and 1.5 D to each side.
+/// Half width of the area searched for sources, in units of D / 2. It reaches D before Tx and beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
 /// Grid steps from the middle to the edge of the first grid.
@@ -380,7 +381,7 @@ const COARSE: i8 = 8;
 /// Grid steps from the middle to the edge of each finer grid.
 const FINE: i8 = 2;
 
-/// Number of finer grids, with steps of 0.4 times those of the previous one.
+/// Number of finer grids; the steps of each are 0.4 times the steps of the previous grid.
 const FINER: u8 = 5;
 
 /// Returns X', Y' and k of the closest source on one side of the line of positions. `None` if no source fits at all. `sign` is 1 or

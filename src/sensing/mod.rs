@@ -15,15 +15,15 @@
 //! | --- | --- |
 //! | `sums` | the terms of a position; the levels of the transmitter and the receiver; the sums that a pass collects |
 //! | `fit` | the source that fits the sums, or the closest one, its uncertainty, and the reasons for no source |
-//! | [`belief`] | the chain's interference estimate, and the rules for its replacement; the velocity of a moving interferer |
+//! | [`estimate`] | the chain's interference estimate, and the rules for its replacement; the velocity of a moving interferer |
 //! | `doubt` | the relay whose measurements do not fit those of the others; the same for the transmitter and the receiver |
 //!
 //! Errors of measured powers are assumed to be *relative*: the mean of K independent samples has an error of 1 / sqrt(K), and
 //! each position has an error of its own (shadowing). So each position counts once, with the weight 1 / v^2, however long a relay
 //! hovers there. Accuracy: `host-tests/tests/sensing/`.
 
-pub mod belief;
 pub(crate) mod doubt;
+pub mod estimate;
 #[cfg(not(feature = "internals"))]
 pub(crate) mod fit;
 #[cfg(feature = "internals")]

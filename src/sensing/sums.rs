@@ -29,7 +29,7 @@ pub struct Level {
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// The measurements do not fit, and the faulty one is unknown.
+    /// True if the two ends' measurements contradict each other, so that the faulty end is unknown.
     pub(crate) unknown: bool,
 }
 
@@ -230,7 +230,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Returns true if all numbers are finite, and those of squares not negative.
+    /// Returns true if all sums are finite, and sums of squares are not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
@@ -240,7 +240,7 @@ impl Sums {
     }
 }
 
-/// Distance from which on a position is another one, as a fraction of D.
+/// Minimum distance between two positions that count as different, as a fraction of D.
 const APART: f32 = 1.0 / 200.0;
 
 /// Measurements of one relay. 120 bytes.

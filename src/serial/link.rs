@@ -59,7 +59,7 @@ pub struct SerialLink<P, D = NoPin> {
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
     clock: MonotonicClock,
-    /// Time at which a byte was last accepted, or the first one was queued.
+    /// Time at which the port last accepted a byte, or the first byte was queued.
     moved_at: Instant,
     /// Bytes written by the last poll; they count from the next one, because their exact time is unknown.
     uncounted: u32,

@@ -8,7 +8,7 @@ use embedded_hal_nb::serial::{Error as _, ErrorKind};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
-    /// Byte received before the previous one was read.
+    /// Overrun: a byte was received before the previous byte was read.
     Overrun,
     /// Byte without a stop bit: another baud rate, a break, a loose wire.
     Framing,
@@ -16,7 +16,7 @@ pub enum Fault {
     Parity,
     /// Byte sampled on a noisy line.
     Noise,
-    /// Another error, or an unknown one.
+    /// Receive error of another or an unknown kind.
     Other,
 }
 

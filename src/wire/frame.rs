@@ -155,7 +155,7 @@ pub struct Opened<'a> {
     pub header: Header,
     /// Body: a message unless the frame is a handshake.
     pub body: &'a [u8],
-    /// Header and body, which the tag covers.
+    /// Signed bytes: header and body.
     pub signed: &'a [u8],
     /// Unverified tag, if there is one.
     pub tag: Option<[u8; TAG]>,

@@ -35,10 +35,10 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the numbers of two nonces that one node uses in an epoch.
+/// Maximum difference between the counters in two nonces that one node uses in an epoch.
 const NEAR: u32 = 1 << 12;
 
-/// Number of handshakes of an older epoch in a row that cannot be delayed ones.
+/// Number of consecutive handshakes of an older epoch after which they cannot be delayed frames.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,11 +62,11 @@ struct Peer {
     older: Older,
 }
 
-/// Handshakes of an older epoch, or of the same one restarted.
+/// Handshakes of an older epoch, or of a restart in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Older {
     epoch: u32,
-    /// Counter of the last one, plus one.
+    /// Counter of the last such handshake, plus one.
     next: u32,
     /// Number of handshakes in a row with rising counters.
     times: u8,
@@ -105,9 +105,9 @@ impl Peer {
 pub(crate) struct Session {
     key: Key,
     epoch: u32,
-    /// Silence after which another node of the same number is accepted in place of the known one.
+    /// Silence of the known node after which another node with the same number is accepted.
     gone_after: Duration,
-    /// Claim number; the lower halves of this relay's nonces are above it.
+    /// Claim number of this relay. The lower halves of this relay's nonces are larger.
     claim: u32,
     /// Lower half of the last created nonce.
     made: u32,
@@ -235,10 +235,10 @@ impl Session {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             let Nonces { sender, receiver } = peer.nonces(epoch);
             let asks = core::mem::take(&mut peer.asks) || !peer.proven;
-            let told = sender.to_le_bytes().into_iter();
-            let told = told.chain(receiver.to_le_bytes());
-            let told = told.chain([u8::from(asks)]);
-            for (place, byte) in body.iter_mut().zip(told) {
+            let tag = sender.to_le_bytes().into_iter();
+            let tag = tag.chain(receiver.to_le_bytes());
+            let tag = tag.chain([u8::from(asks)]);
+            for (place, byte) in body.iter_mut().zip(tag) {
                 *place = byte;
             }
         }
@@ -262,19 +262,19 @@ impl Session {
 
     /// Authenticates an intact frame with the sender address `sender`. Work: that of one tag.
     pub(crate) fn check(&mut self, now: Instant, sender: u16, frame: &Opened<'_>) -> Checked {
-        let Some(told) = frame.tag else {
+        let Some(tag) = frame.tag else {
             return Checked::Unsigned;
         };
         if frame.handshake {
             return self
-                .meet(now, sender, frame, told)
+                .meet(now, sender, frame, tag)
                 .unwrap_or(Checked::Forged);
         }
         let epoch = self.epoch;
         let Some(nonces) = self.find(sender).map(|peer| peer.nonces(epoch).turned()) else {
             return Checked::Forged;
         };
-        if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
+        if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), tag) {
             return Checked::Forged;
         }
         let Some(peer) = self.touch(sender) else {
@@ -296,11 +296,11 @@ impl Session {
         now: Instant,
         sender: u16,
         frame: &Opened<'_>,
-        told: [u8; TAG],
+        tag: [u8; TAG],
     ) -> Option<Checked> {
         let nonces = said(frame)?;
         let asks = frame.body.last().copied()?;
-        if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), told) {
+        if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), tag) {
             return None;
         }
         if let Sender::Rival(rival) = self.owner(nonces.receiver) {
@@ -355,10 +355,10 @@ impl Session {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
         let nonces = if frame.handshake { said(frame) } else { own() };
-        let Some((nonces, told)) = nonces.zip(frame.tag) else {
+        let Some((nonces, tag)) = nonces.zip(frame.tag) else {
             return Sender::Unknown;
         };
-        if !is_same(self.with(nonces).tag(frame.signed), told) {
+        if !is_same(self.with(nonces).tag(frame.signed), tag) {
             return Sender::Unknown;
         }
         self.owner(nonces.sender)

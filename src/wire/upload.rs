@@ -24,7 +24,7 @@ pub struct Upload {
     base: u16,
     /// Checked parameters of a mission with one interferer.
     config: MissionConfig,
-    /// Sites of the mission's line, if not the configured ones. Valid positions; every relay checks that they fit the mission.
+    /// Sites of the mission's line, if not the configured sites. Valid positions; every relay checks that they fit the mission.
     sites: Option<Sites>,
 }
 
@@ -45,7 +45,7 @@ pub enum UploadError {
     Base,
     /// The mission does not fit its line on earth.
     Line(LineError),
-    /// The relay already has this mission or a newer one.
+    /// The relay already has this mission or a newer mission.
     Old,
     /// Frames are not signed, because `Settings::auth` is not set.
     Unsigned,
@@ -57,14 +57,16 @@ impl core::fmt::Display for UploadError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Version => "version must be within 1 to 65535",
-            Self::Relays => "an upload must keep the number of relays",
+            Self::Relays => {
+                "an upload must have the number of relays of the mission that it replaces"
+            }
             Self::Field => {
                 "an upload, and the mission it replaces, must have one interferer and no field"
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
             Self::Line(error) => return error.fmt(f),
-            Self::Old => "version must be above that of the present mission",
+            Self::Old => "the version must be above the version of the present mission",
             Self::Unsigned => "uploads need signed frames",
             Self::Begun => "the relay has started: only a newer upload is accepted",
         })
@@ -75,9 +77,6 @@ impl core::error::Error for UploadError {}
 
 #[cfg(feature = "upload")]
 impl Upload {
-    /// Length of an encoded upload, bytes.
-    pub const LENGTH: usize = super::message::UPLOAD_LENGTH;
-
     /// Creates an upload of `config` with `version`, 1 to 65535, for relays with the mission `base`.
     ///
     /// If rounding has put eta of its channel outside of the other two factors, it is clamped to the nearer one.
@@ -143,7 +142,7 @@ impl Upload {
         self.base
     }
 
-    /// Parameters, which [`Mission::try_new`] accepts.
+    /// Returns the mission's parameters, which [`Mission::try_new`] accepts.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }

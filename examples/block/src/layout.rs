@@ -30,7 +30,7 @@ pub(super) struct Layout {
     /// Power, x and y.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
-    /// Carrier, excess losses, and weight of line of sight.
+    /// Carrier frequency, excess losses, and weight of line of sight.
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],
@@ -129,8 +129,8 @@ impl Layout {
         }
     }
 
-    /// Returns the field, its points stored in `room`. Without points it returns the interferer, which if all 0 is unknown to relays
-    /// that listen.
+    /// Returns the field, with its points stored in `room`, or the interferer of a block without points. An interferer of zeros
+    /// is unknown to relays that listen.
     pub(super) fn interference(
         &self,
         listens: bool,

@@ -64,7 +64,7 @@ impl Config {
 /// Line and speed of a drone with an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sites {
-    /// Latitude and longitude of transmitter and receiver, 1e-7 degrees, and the ground's height there, mm.
+    /// Sites of transmitter and receiver: latitude and longitude, 1e-7 degrees, and ground height, mm.
     pub ends: [[i32; 3]; 2],
     /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default.
     pub speed_m_s: f32,
@@ -151,7 +151,7 @@ pub enum ConfigError {
     Measure,
     /// Sensing settings out of range, or together with a field.
     Listen,
-    /// Interferer not 0 although there is a field.
+    /// Interferer is not 0 in a block with a field.
     Interferer,
     /// The number of points exceeds a block's capacity.
     Points,

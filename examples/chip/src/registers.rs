@@ -58,7 +58,7 @@ pub trait Registers {
     /// Writes the value of `register`.
     fn write(&mut self, register: Register, value: u32);
 
-    /// Clears the bits of `clear`, then sets those of `set`.
+    /// Clears the bits of `clear`, then sets the bits of `set`.
     fn modify(&mut self, register: Register, clear: u32, set: u32) {
         let value = self.read(register);
         self.write(register, value & !clear | set);

@@ -17,7 +17,7 @@ use uav_relay::CRC_32C;
 /// Value of an erased word.
 pub const BLANK: u32 = u32::MAX;
 
-/// Words of a record besides its payload.
+/// Number of words that a record has in addition to its payload.
 pub const AROUND: usize = 2;
 
 /// Number of places tried for one record, because some may be worn.
@@ -66,9 +66,9 @@ impl<F: Flash> Flash for &mut F {
 /// Action of [`Journal::keep`] when both sectors are full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WhenFull {
-    /// Stores nothing.
+    /// Store nothing.
     Refuse,
-    /// Erases the sector without the newest record, and continues there.
+    /// Erase the sector without the newest record, and continue in this sector.
     Erase,
 }
 
@@ -207,6 +207,7 @@ impl<F: Flash> Journal<F> {
 }
 
 /// Returns the sector with the newest record, 0 if there is none.
+#[inline(never)] // called from several places
 fn current(found: [Found; 2]) -> usize {
     let [first, second] = found.map(|found| found.newest);
     usize::from(second > first)

@@ -74,7 +74,7 @@ impl Flash for Sectors {
 }
 
 impl Sector {
-    /// Returns its length in words. Of the sectors below the large ones, only those of 16 KiB are in use.
+    /// Returns the sector's length in words. Of the small sectors only those of 16 KiB are in use.
     const fn len(self) -> usize {
         let bytes = if self.0 < LARGE { 16 * KIB } else { 128 * KIB };
         bytes as usize / 4
@@ -160,7 +160,7 @@ fn unlocked() -> FLASH {
     flash
 }
 
-/// Waits until the flash is idle, before the next command. Reads wait by themselves.
+/// Waits until the flash is idle, as each command requires. The hardware delays reads by itself.
 fn wait(flash: &FLASH) {
     while flash.sr().read().bsy().bit_is_set() {}
 }

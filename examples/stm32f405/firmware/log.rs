@@ -16,7 +16,7 @@ use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
 #[cfg(feature = "flight")]
 use uav_relay::flight::course::{Course, CourseError};
-use uav_relay::sensing::belief::Belief;
+use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Relay};
 use uav_relay_chip::clock::Source;
@@ -114,7 +114,7 @@ pub(crate) fn off_course(error: CourseError) {
     match error {
         CourseError::Axis(error) => error!("configuration refused: sites, {}", error),
         CourseError::Distance(along) => error!(
-            "configuration refused: the sites are {=f64} m apart, but the mission's distance differs",
+            "configuration refused: the sites are {=f64} m apart: the mission's distance must be the same",
             along
         ),
         other => error!("configuration refused: sites, {}", other),
@@ -143,54 +143,18 @@ pub(crate) fn cannot_sign_to_autopilot() {
 #[cfg(feature = "flight")]
 pub(crate) fn autopilot(event: AutopilotEvent) {
     match event {
-        AutopilotEvent::Found(kind) => info!("autopilot: found, {}", kind),
-        AutopilotEvent::Restarted => warn!("autopilot: restarted"),
-        AutopilotEvent::Refused => warn!(
-            "autopilot: flies to another target than it was sent; is the setpoint outside its fence?"
-        ),
-        AutopilotEvent::Released(release) => warn!("autopilot: released, {}", release),
-        AutopilotEvent::Waits(reason) => {
-            warn!("autopilot: cannot be engaged, {}", reason);
-        }
-        AutopilotEvent::LostCleared { relays, from, .. } => {
-            warn!("relays {} are cleared, by MAVLink {}", relays, from);
-        }
-        AutopilotEvent::ClearRefused { relays, from } => warn!(
-            "relays {} are not cleared: name all lost relays of one side; by MAVLink {}",
-            relays, from
-        ),
-        AutopilotEvent::FenceBreached => warn!("autopilot: fence breached"),
-        AutopilotEvent::State(State::Silent) => {
-            warn!("autopilot: no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2");
-        }
-        AutopilotEvent::State(State::Grounded) => {
-            info!("autopilot: on the ground, or not armed");
-        }
-        AutopilotEvent::State(State::Standby) => {
-            info!("autopilot: in the air, not controlled by the relay");
-        }
-        AutopilotEvent::State(State::Engaged) => {
-            info!("autopilot: setpoint control engaged");
-        }
-        AutopilotEvent::State(State::Blind) => {
-            warn!("autopilot: no position; keeps the last target");
-        }
-        AutopilotEvent::Mistrusted(Mistrust::NoKey) => {
-            error!("autopilot: signs its frames and ignores unsigned ones; no key in the block");
-        }
-        AutopilotEvent::Mistrusted(Mistrust::SignsOnly) => {
-            info!("autopilot: signs its frames but answers unsigned ones; no key in the block");
-        }
-        AutopilotEvent::Mistrusted(Mistrust::Unsigned) => {
-            error!("autopilot: does not sign its frames, which are ignored; a key in the block");
-        }
-        AutopilotEvent::Mistrusted(Mistrust::OtherKey) => {
-            error!("autopilot: signs with another key than the block's; its frames are ignored");
-        }
-        AutopilotEvent::Mistrusted(Mistrust::Old) => {
-            error!("autopilot: signs with an old timestamp; its frames are ignored");
-        }
-        other => info!("autopilot: {}", other),
+        AutopilotEvent::Mistrusted(Mistrust::SignsOnly) => info!("autopilot: {}", event),
+        AutopilotEvent::Mistrusted(_) => error!("autopilot: {}", event),
+        AutopilotEvent::Restarted
+        | AutopilotEvent::Refused
+        | AutopilotEvent::Released(_)
+        | AutopilotEvent::Waits(_)
+        | AutopilotEvent::LostCleared { .. }
+        | AutopilotEvent::ClearRefused { .. }
+        | AutopilotEvent::FenceBreached
+        | AutopilotEvent::OffLine(_)
+        | AutopilotEvent::State(State::Silent | State::Blind) => warn!("autopilot: {}", event),
+        _ => info!("autopilot: {}", event),
     }
 }
 
@@ -316,13 +280,13 @@ pub(crate) fn event(event: Event, relay: &Relay) {
     if !cfg!(feature = "defmt") {
         return;
     }
-    info!("event {}", event);
+    info!("{}", event);
     #[cfg(feature = "upload")]
     if event == Event::Adopted {
         info!("mission version {=u16} adopted", relay.version());
     }
     if event == Event::NewEstimate
-        && let Belief::Source { source, .. } = relay.belief().belief
+        && let InterferenceEstimate::Source { source, .. } = relay.interference_estimate().estimate
     {
         info!(
             "estimate: interferer {=f32} W ({=u32:#010x}) x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x})",

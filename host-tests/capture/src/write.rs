@@ -140,7 +140,7 @@ impl<W: Write> Capture<W> {
         block.write(&mut self.out)
     }
 
-    /// Flushes `out`, so that readers of the file see all frames so far.
+    /// Flushes `out`, so that readers of the file see all frames written.
     ///
     /// # Errors
     /// The capture cannot be written.

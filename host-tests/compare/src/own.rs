@@ -24,7 +24,7 @@ const TOLERANCE: f64 = 1e-4;
 const BATCHES: usize = 5;
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
-/// Solves the problem with this crate; the first run is the reference for the other solvers.
+/// Solves `problem` with this crate. Other solvers are compared with the first run.
 pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
     let (mission, _) = briefed.map_err(|error| error.to_string())?;

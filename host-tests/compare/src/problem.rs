@@ -17,7 +17,7 @@ pub(crate) enum Choice {
     Sides,
 }
 
-/// The best placement of a number of relays.
+/// Placement problem: the best positions of a given number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(crate) struct Problem {
     pub(crate) choice: Choice,

@@ -58,7 +58,7 @@ pub(crate) struct Found {
     /// First intermediate chain as good as this crate's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) level: Option<Mark>,
-    /// True if the time limit ended the run.
+    /// True if the time limit ended the solver's run.
     pub(crate) cut: bool,
 }
 

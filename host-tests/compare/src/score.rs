@@ -26,11 +26,11 @@ pub(crate) enum Refusal {
     Side(usize, f64),
     /// A relay is not in the band of altitudes: its index from 1, and h in m.
     Altitude(usize, f64),
-    /// A relay is behind its predecessor: its index from 1.
+    /// Relay with a smaller x than the relay before it: the relay's index, from 1.
     Order(usize),
     /// A relay is too close to its predecessor: its index from 1, and their distance in m.
     Separation(usize, f64),
-    /// The solver's reported SIR, and the differing one of its chain.
+    /// Wrong report: the SIR reported by the solver, and the SIR computed from its chain.
     Sir(f64, f64),
 }
 
@@ -105,7 +105,7 @@ pub(crate) struct Score {
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// Returns the score of a solver's result against a chain of `level` (linear SIR). Times are trusted, SIRs recomputed.
+/// Returns the score of a solver's result relative to `level` (linear SIR). The SIR is recomputed; the solver's time is trusted.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -29,7 +29,7 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("interferer_y_m", -2e3, 2e3),
 ];
 
-/// Value of a field in place of a drawn one, if the caller knows a better one.
+/// Function that returns a field's value, or `None` for a random value.
 pub type Hint<'a> = dyn FnMut(&mut Draw<'_>, &Field) -> Option<Value<'static>> + 'a;
 
 /// Draws from a source of random bytes: a random generator, or the input of a fuzzer.
@@ -384,7 +384,7 @@ fn proposal(fields: &mut Fields<'_>) {
     }
 }
 
-/// Makes the numbers of an offer those of one mission.
+/// Replaces the numbers of an offer by the numbers of one valid mission.
 fn offer(fields: &mut Fields<'_>) {
     let get = |fields: &Fields<'_>, name| Numbers(fields).get(name);
     let single = |fields: &mut Fields<'_>, name: &str, number: f64| {

@@ -23,9 +23,9 @@ pub struct Frame<'f> {
     pub name: Option<&'f str>,
     /// True for a handshake.
     pub handshake: bool,
-    /// Fields, as far as they can be decoded.
+    /// Decoded fields of the body, up to the first field that cannot be decoded.
     pub fields: Fields<'f>,
-    /// Header and body, if a tag follows, and the tag.
+    /// Signed part of the frame (header and body) and its tag; `None` for a frame without a tag.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
     /// Reason for rejection, if any.
     pub refusal: Option<Refusal>,

@@ -83,7 +83,7 @@ fn is_view(range: &str, view: u32) -> bool {
     }
 }
 
-/// Numbers of a body by name; NaN if there is none.
+/// Numbers of a body by field name; NaN for a name without a number.
 pub(crate) struct Numbers<'a, 'f>(pub(crate) &'a Fields<'f>);
 
 impl<'f> Numbers<'_, 'f> {
@@ -230,7 +230,7 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     single((offer.get("relays") - 1.0) * step) <= distance
 }
 
-/// Returns a ladder's targets. Each step is rounded from f64, which equals one f32 operation.
+/// Returns the targets of a ladder. Each f64 result is rounded to f32, as a relay's f32 operation does.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

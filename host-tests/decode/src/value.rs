@@ -26,7 +26,7 @@ pub enum Value<'f> {
     Bool(bool),
     /// Flags that are set, and the names of all.
     Flags(u8, &'f [String]),
-    /// A value, and the word for it.
+    /// Value with a name in the tables: the value, and the name.
     Word(u8, Option<&'f str>),
     /// An empty Option.
     None,

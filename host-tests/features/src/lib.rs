@@ -114,7 +114,7 @@ impl Chain {
         }
     }
 
-    /// Returns the CRC-32C of all bytes sent so far, in order.
+    /// Returns the CRC-32C of all bytes sent, in order.
     pub fn said(&self) -> u32 {
         CRC_32C.checksum(&self.said)
     }

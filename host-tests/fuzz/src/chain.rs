@@ -291,7 +291,7 @@ impl Chain {
         }
     }
 
-    /// Collects a relay's frames, and checks its distance from its neighbours.
+    /// Collects the frames of relay `at`, and checks the relay's distance from its neighbours.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -337,7 +337,7 @@ impl Chain {
         }
     }
 
-    /// Checks the separation of relay `at` (from 0) and its predecessor if both have positions of one pass.
+    /// Checks the separation between relay `at` (from 0) and the relay before it, if one pass placed both.
     fn look_at_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

@@ -62,7 +62,7 @@ pub fn frame(data: &[u8]) {
     assert_eq!(written.iter().position(|&byte| byte == 0), Some(len - 1));
 }
 
-/// Checks that the parts of an intact frame are those of the format.
+/// Checks that the crate splits an intact frame into the parts that the format defines.
 fn taken_apart(plain: &[u8]) {
     let opened = frame::open(plain);
     let (Some(checked), Some(&[_, first, _, second])) = (

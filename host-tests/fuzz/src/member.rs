@@ -80,13 +80,13 @@ impl Member {
         other
     }
 
-    /// Returns its next frame, signed: header, body, tag and CRC before COBS.
+    /// Returns the member's next signed frame before COBS: header, body, tag and CRC.
     pub fn signed(&mut self, header: Header, body: &[u8]) -> Vec<u8> {
         let relay = self.relay.clone();
         self.frame(header, SIGNED, &relay, body)
     }
 
-    /// Returns its handshake before COBS. It requests an answer only if it does not know the relay's nonce.
+    /// Returns the member's handshake before COBS. The handshake requests an answer if the relay's nonce is unknown.
     pub fn handshake(&mut self, header: Header) -> Vec<u8> {
         let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
         let body = [&*self.own, &*self.relay, &[asks]].concat();

@@ -175,7 +175,7 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes. A recorded handshake in them replaces the neighbours' nonces, so the neighbours are forgotten.
+    /// Delivers arbitrary bytes. A recorded handshake among them replaces nonces, so the fuzzer then forgets its neighbours.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);

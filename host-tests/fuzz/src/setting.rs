@@ -23,7 +23,7 @@ const BESIDE: Interference = Interference::Source(Interferer {
     y_m: 150.0,
 });
 
-/// Key of every network here.
+/// Key of every fuzzed network.
 pub const KEY: [u8; 32] = *b"known to whoever reads this line";
 
 const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
@@ -172,7 +172,7 @@ pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     }
 }
 
-/// Reads a lateral position, m, inside or outside of the lateral range; 0 without one.
+/// Reads a lateral position, m, inside or outside of the lateral range; 0 if there is no lateral range.
 pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     if lateral.is_single() {
         0.0

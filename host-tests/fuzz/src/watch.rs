@@ -101,7 +101,7 @@ impl Watched {
         &self.relay
     }
 
-    /// Returns its settings.
+    /// Returns the settings of the watched relay.
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }

@@ -65,7 +65,7 @@ pub struct Case {
     pub params: Params,
     /// Arguments by name.
     pub args: Value,
-    /// Result: a value, or values by name.
+    /// Result of the case: one value, or an object of named values.
     pub out: Value,
     /// Relative accuracy of the value.
     pub rtol: f64,

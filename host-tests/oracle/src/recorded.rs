@@ -38,7 +38,7 @@ pub struct Optimum {
 /// A scene with its best chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Test and random stream that draw the scene.
+    /// Name of the test, and of its random stream, that draws the scene.
     pub set: String,
     /// Scene; its relays are at the corridor's lowest altitude.
     pub scene: Scenario,
@@ -67,7 +67,7 @@ struct Row {
     noise_w: f64,
     /// Lowest and highest altitude, least and largest y.
     corridor: [f64; 4],
-    /// Index from 0, y and altitude of relays with a fixed cross-section position.
+    /// Index (from 0), y and altitude of each relay with a fixed y and altitude.
     #[serde(default)]
     held: Vec<(usize, f64, f64)>,
     sir: f64,

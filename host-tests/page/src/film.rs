@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::OccupiedEntry;
 
 use serde::Serialize;
-use uav_relay::sensing::belief::Belief;
+use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Instant, Placement, Side};
 use uav_relay_scenario::number::narrow;
 use uav_relay_sim::cli::Prepared;
@@ -32,7 +32,7 @@ struct StandTold {
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
     /// SIR of every hop between relays that are on and have a position, linear, at that time. Empty without relays.
     sirs: Vec<f32>,
-    /// Number of frames sent so far on all links.
+    /// Number of frames sent on all links until this time.
     messages: u64,
     /// Interferer as estimated by the first relay: W, m, m.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,7 +44,7 @@ struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
     /// Estimate of relays that locate the interferer.
-    believed: Option<Belief>,
+    believed: Option<InterferenceEstimate>,
 }
 
 impl FilmTold {
@@ -65,7 +65,7 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
         change.messages = shot.messages;
     }
     for stand in &outcome.stands {
-        changes.entry(stand.at).or_default().believed = Some(stand.believed.belief);
+        changes.entry(stand.at).or_default().believed = Some(stand.believed.estimate);
     }
     let last = changes.entry(outcome.ended).or_default();
     last.messages = outcome.messages;
@@ -117,7 +117,7 @@ fn stands(run: &Prepared<'_>, changes: BTreeMap<Instant, Change>) -> Vec<StandTo
             sirs: run.sirs_at(at, &chain).into_iter().map(narrow).collect(),
             messages,
             believed: match believed {
-                Some(Belief::Source { source, .. }) => {
+                Some(InterferenceEstimate::Source { source, .. }) => {
                     Some([source.power_w, source.x_m, source.y_m])
                 }
                 _ => None,

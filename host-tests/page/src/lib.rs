@@ -30,7 +30,7 @@ const LONGEST_S: u64 = 3_600;
 
 /// Result for the page.
 #[derive(Serialize)]
-struct Told {
+struct RunOutput {
     /// Output of `cargo chain --json`, character by character.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<Box<RawValue>>,
@@ -46,7 +46,7 @@ struct Told {
 #[wasm_bindgen]
 #[must_use]
 pub fn chain(options: &str, scenario: &str, film: bool) -> String {
-    let told = run(options, scenario, film).unwrap_or_else(|failure| Told {
+    let told = run(options, scenario, film).unwrap_or_else(|failure| RunOutput {
         report: None,
         film: None,
         wrong: Some(failure.line),
@@ -54,7 +54,7 @@ pub fn chain(options: &str, scenario: &str, film: bool) -> String {
     serde_json::to_string(&told).unwrap_or_default()
 }
 
-fn run(options: &str, scenario: &str, film: bool) -> Result<Told, Failure> {
+fn run(options: &str, scenario: &str, film: bool) -> Result<RunOutput, Failure> {
     let words = core::iter::once("chain").chain(options.split_whitespace());
     let options =
         Options::try_parse_from(words).map_err(|error| Failure::input(error.to_string()))?;
@@ -65,7 +65,7 @@ fn run(options: &str, scenario: &str, film: bool) -> Result<Told, Failure> {
         Err(Refused::Failed(failure)) => return Err(failure),
         Err(Refused::Reported(report, failure)) => {
             let line = failure.map(|failure| failure.line);
-            return Ok(Told {
+            return Ok(RunOutput {
                 wrong: line.or_else(|| report.error.clone()),
                 report: Some(raw(&*report)?),
                 film: None,
@@ -88,7 +88,7 @@ fn run(options: &str, scenario: &str, film: bool) -> Result<Told, Failure> {
     })?;
     let outcome = chain.finish();
     let report = run.report(&outcome);
-    Ok(Told {
+    Ok(RunOutput {
         wrong: report.error.clone(),
         report: Some(raw(&report)?),
         film: film.then(|| FilmTold::of(&run, &outcome)),

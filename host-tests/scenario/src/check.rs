@@ -89,7 +89,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects a key next to another one with the same meaning.
+    /// Rejects `key` in a table that also has a key of the same meaning.
     fn alone(
         &self,
         path: &str,

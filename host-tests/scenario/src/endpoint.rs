@@ -126,7 +126,7 @@ impl fmt::Display for EndpointError {
             Self::NoLocal => f.write_str("has a LOCAL that is not within 1 to 65535"),
             Self::NoDefault { port } => write!(
                 f,
-                "needs @LOCAL, because the default, PORT + {APART} = {}, is no port",
+                "needs @LOCAL, because the default, PORT + {APART} = {}, is above 65535",
                 u32::from(*port) + u32::from(APART)
             ),
         }
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(local("udp:h:64536"), Err(none));
         assert_eq!(
             none.to_string(),
-            "needs @LOCAL, because the default, PORT + 1000 = 65536, is no port"
+            "needs @LOCAL, because the default, PORT + 1000 = 65536, is above 65535"
         );
     }
 

@@ -50,11 +50,11 @@ pub enum Problem {
     SaidTwice,
     /// A geographic position needs `[site]`.
     NoSite,
-    /// The text is not one of the known ones.
+    /// The text is not one of the allowed values.
     UnknownChoice,
     /// The UDP address is malformed.
     NoEndpoint(EndpointError),
-    /// The number of entries contradicts another key.
+    /// The list has another number of entries than another key requires.
     OtherNumber,
     /// A single table is given instead of a list of tables.
     NoList,

@@ -304,12 +304,18 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
         Some(_) => (
             "channel.excess_loss_nlos_db",
             nlos,
-            format!("{} (excess_loss_los_db) to 200 dB", number(los)),
+            format!(
+                "{} dB (the value of excess_loss_los_db) to 200 dB",
+                number(los)
+            ),
         ),
         None => (
             "channel.excess_loss_los_db",
             los,
-            format!("0 to {} dB (excess_loss_nlos_db by default)", number(nlos)),
+            format!(
+                "0 to {} dB (the default of excess_loss_nlos_db)",
+                number(nlos)
+            ),
         ),
     };
     Err(mistake(

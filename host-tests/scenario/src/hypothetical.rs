@@ -104,7 +104,7 @@ pub struct Fit {
     pub x_m: f64,
     /// y_H, m, >= 0.
     pub y_m: f64,
-    /// Best power there, and the remaining error on the raster.
+    /// Best power of an interferer at this position, and the remaining error on the raster.
     pub weighed: Weighed,
 }
 
@@ -545,7 +545,7 @@ struct Corner {
     value: f64,
 }
 
-/// Returns the best corner found from `start` with initial `steps`; never worse than `start`.
+/// Returns the best point found by the simplex method from `start` with initial `steps`. It is never worse than `start`.
 ///
 /// Ends when the values at the corners agree to `tolerance` (relative), or after `most` steps of at most four evaluations.
 fn minimise(
@@ -627,7 +627,7 @@ mod tests {
         close(median(&[]), 0.0);
     }
 
-    /// Checks a narrow pit, which only shrinking reaches. Everything between the corners is higher than they are.
+    /// Checks a minimum in a narrow pit, which the simplex reaches only by shrinking.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

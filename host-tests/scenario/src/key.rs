@@ -44,11 +44,11 @@ fn check_mode(_: &Path) -> Result<(), String> {
 pub fn parse(text: &str) -> Result<[u8; 32], &'static str> {
     let text = text.trim();
     if !text.bytes().all(|digit| digit.is_ascii_hexdigit()) {
-        return Err("must be hexadecimal digits and nothing else");
+        return Err("must contain only hexadecimal digits");
     }
     let mut key = [0; 32];
     if text.len() != 2 * key.len() {
-        return Err("must be 64 hexadecimal digits, as of `openssl rand -hex 32`");
+        return Err("must be 64 hexadecimal digits, as printed by `openssl rand -hex 32`");
     }
     for (byte, at) in key.iter_mut().zip((0..).step_by(2)) {
         let digits = text.get(at..at + 2).unwrap_or_default();

@@ -45,7 +45,7 @@ pub(super) enum Need {
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
-    /// Keys with the same or overlapping meaning, which exclude this one.
+    /// Keys with the same or an overlapping meaning, which exclude this key.
     pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
@@ -267,7 +267,7 @@ impl Key {
         }
     }
 
-    /// Returns the keys that may replace this one, from its table.
+    /// Returns the keys of the same table that may replace this key.
     pub(super) fn instead(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,

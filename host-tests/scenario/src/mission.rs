@@ -16,7 +16,7 @@ use crate::{Interference, Scenario, Source};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The scenario's interferers cannot be replaced by a hypothetical one.
+    /// No single hypothetical interferer can replace the scenario's interferers.
     NoHypothetical,
     /// The relays do not fit on the distance with their least separation.
     NoRoom {
@@ -39,7 +39,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoHypothetical => {
-                f.write_str("no single interferer stands for these [[interferer]]")
+                f.write_str("no single interferer has the same effect as these [[interferer]]")
             }
             Self::NoRoom {
                 relays,
@@ -47,8 +47,8 @@ impl fmt::Display for Refusal {
                 distance_m,
             } => write!(
                 f,
-                "no placement: {relays} relays that stay {apart_m} m apart need {} m, and there are {distance_m} m from Tx to Rx: fewer \
-                 relays, or geometry.min_separation_m and geometry.distance_m of a --scenario FILE",
+                "no placement: {relays} relays that stay {apart_m} m apart need {} m, but Tx and Rx are {distance_m} m apart: use fewer \
+                 relays, or change geometry.min_separation_m or geometry.distance_m in a --scenario FILE",
                 f32::from(relays.saturating_sub(1)) * apart_m
             ),
             Self::Mission(error) => error.fmt(f),

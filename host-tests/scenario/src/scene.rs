@@ -62,7 +62,7 @@ pub struct Scene {
     pub eta: f64,
     /// Noise power of every receiver, W, >= 0; if above 0, SIR means SINR.
     pub noise_w: f64,
-    /// Altitudes of relays without a fixed one, and lateral limits of all.
+    /// Altitude limits of relays without a fixed altitude, and lateral limits of all relays.
     pub band: Corridor,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,
@@ -80,7 +80,7 @@ pub struct Place {
 }
 
 impl From<(f64, f64)> for Place {
-    /// Converts (x, h), above the line.
+    /// Converts (x, h), in metres, to a position above the line between Tx and Rx.
     fn from((x, h): (f64, f64)) -> Self {
         Self { x, y: 0.0, h }
     }

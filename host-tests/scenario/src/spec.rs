@@ -34,11 +34,11 @@ pub struct Scenario {
     pub tx_w: f64,
     /// EIRP of the receiver on the way back to Tx, W, 1e-6 to 1e6; `tx_w` by default.
     pub rx_w: f64,
-    /// EIRP of relays without a power of their own, W, 1e-6 to 1e6.
+    /// EIRP of every relay without its own `power_w`, W, 1e-6 to 1e6.
     pub uav_w: f64,
     /// Radio channel.
     pub channel: ChannelSpec,
-    /// Interference.
+    /// Interferers, or interference field, of the scenario.
     pub interference: Interference,
     /// Settings for relays that locate the interferer. [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
@@ -90,7 +90,7 @@ pub struct ListenSpec {
 }
 
 impl ListenSpec {
-    /// Returns the settings for `uavs` relays.
+    /// Returns the measurement settings of the relays in a chain of `uavs` relays.
     pub fn of(&self, uavs: u16) -> Listen {
         let default = if self.following {
             Listen::following(uavs)
@@ -212,7 +212,7 @@ pub struct BetaPoint {
     pub x_m: f64,
     /// First shape parameter, above 1 (E[1/I] is infinite otherwise) and at most 1e6.
     pub alpha: f64,
-    /// Second shape parameter, above 0 and at most 1e6.
+    /// Second shape parameter of the Beta distribution, above 0 and at most 1e6.
     pub beta: f64,
 }
 

@@ -131,7 +131,7 @@ pub(crate) struct Air {
     /// Withheld frames of the ground; `withheld` selects them.
     pub(crate) recorded: Vec<Vec<u8>>,
     pub(crate) withheld: fn(&[u8]) -> bool,
-    /// Frames on the air with the sender's index, `usize::MAX` for other senders.
+    /// Frames on the air with the index of the sending relay; `usize::MAX` for other senders.
     flying: Vec<(usize, Vec<u8>)>,
     rng: ChaCha8Rng,
 }
@@ -316,7 +316,7 @@ fn the_later_one_takes_part_once_the_other_is_gone() {
     }
 }
 
-/// Two relays with the same number start together: in the end one flies and the other is passive.
+/// Checks two relays with one number that start together: in the end one flies, and one is passive.
 #[test]
 fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
     for seed in 0..6 {
@@ -461,7 +461,7 @@ fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() 
     assert!((1..12).contains(&waited), "{waited} of 12");
 }
 
-/// Two wires lead to relays with the same number.
+/// Checks a relay whose two wires lead to relays with the same number: it reports the duplicate.
 #[test]
 fn a_neighbour_that_is_heard_at_both_ports_is_told() {
     let mission = mission(3);
@@ -515,7 +515,7 @@ fn station(base: &Mission, epoch: u32) -> Ground {
     )
 }
 
-/// Returns four relays, and the withheld offers of version 1.
+/// Returns a chain of four relays and the offers of version 1 that the attacker withheld.
 fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     let mut air = Air::of(base, |_| auth(KEY, 1), loss);
     air.run(60);
@@ -578,7 +578,7 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
     }
 }
 
-/// The same offer is accepted within the time limit: only the delay matters.
+/// Checks that the offer of the previous test is accepted if it arrives within the time limit.
 #[test]
 fn an_offer_that_comes_at_once_is_taken() {
     let base = mission(4);

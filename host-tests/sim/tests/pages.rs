@@ -101,7 +101,7 @@ fn the_pictures_of_the_readme_are_there_and_one_is_of_the_page() {
     );
 }
 
-/// The row on a lost relay must match the output of the command in it.
+/// Checks that the README's row on a lost relay matches the output of the command in that row.
 #[test]
 fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
     let text = read("README.md");

@@ -53,7 +53,7 @@ pub enum Uart {
 
 const UARTS: [Uart; 4] = [Uart::Usart1, Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
-/// Address in the flash, and the bytes from there.
+/// Address in the flash, and the bytes stored from that address.
 pub type Kept = (u32, Vec<u8>);
 
 /// Running emulated drone.

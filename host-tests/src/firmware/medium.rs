@@ -43,7 +43,7 @@ pub struct Medium {
     injected: Injected,
     flying: BinaryHeap<Reverse<Flying>>,
     order: u64,
-    /// Bytes of each sender since its last delimiter, and the time until which its line is busy.
+    /// Bytes of each sender since its last frame delimiter, and the time at which its line becomes idle.
     lines: Vec<(Vec<u8>, Instant)>,
 }
 

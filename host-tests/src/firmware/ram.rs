@@ -14,7 +14,7 @@ pub struct Ram {
     pub power: Option<usize>,
     /// Number of next writes that fail.
     pub worn: usize,
-    /// Sectors erased so far.
+    /// Sectors that were erased, in order.
     pub erased: Vec<usize>,
     rng: ChaCha8Rng,
 }

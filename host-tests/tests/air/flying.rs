@@ -3,7 +3,7 @@
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::watch::{Seen, groups, has_agreed};
 
-/// Returns the state of relay `index` of `relays` in view `view`.
+/// Returns the observed state of relay `index` in view `view` of `relays` relays.
 fn seen(view: u32, relays: u16, index: u16) -> Seen {
     Seen {
         is_on: true,

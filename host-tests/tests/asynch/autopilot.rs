@@ -337,7 +337,7 @@ fn it_is_engaged_and_led_to_its_place() {
     }
 }
 
-/// Checks that a silent autopilot counts as not flown, to the relay and the firmware, until it returns.
+/// Checks that relay and firmware treat a drone as not flown while its autopilot is silent.
 #[test]
 fn it_falls_silent_and_comes_back() {
     let mut scene = Scene::new(true);

@@ -11,7 +11,7 @@ use uav_relay::{
 
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
 
-/// Latency between neighbours.
+/// Time that a frame takes between neighbours.
 const ON_THE_WAY: Duration = Duration::from_millis(10);
 
 /// Returns mission version `version`, each with another position of the interferer.
@@ -69,11 +69,11 @@ pub(crate) struct Net {
     pub(crate) genuine: Vec<u32>,
     /// Lives of both ends of each link (from, to) on which a message was accepted last.
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Sender's life that the receiver of each link learned last, with its own life then.
+    /// Last life of the sender that the receiver learned, and the receiver's life at that time, by link.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
     /// Frames signed before their sender knew of the receiver's last start.
     outdated: BTreeSet<usize>,
-    /// Arrival times and indices of frames in transit.
+    /// Frames in transit: arrival time, and index of the frame.
     under_way: VecDeque<(Instant, usize)>,
     pub(crate) deeds: VecDeque<(Instant, Deed)>,
     wiring: Wiring,

@@ -43,7 +43,7 @@ impl Attacker {
         frame
     }
 
-    /// Returns sender, receiver and frame of a forged offer. The frame may instead have the ground station's address.
+    /// Returns sender, receiver and frame of a forged offer, which may claim to be the ground station's.
     pub(crate) fn pretended(
         &mut self,
         net: &Net,

@@ -28,7 +28,7 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// Returns the results and recipients of the answers so far.
+/// Returns the results and recipients of all answers to commands.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.said.iter();
     said.filter_map(|(_, said)| match said {

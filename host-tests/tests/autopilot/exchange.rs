@@ -33,7 +33,7 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns the link after the relay's outputs have been handed to it once more.
+/// Returns a copy of the link after a repeated hand-over of the relay's outputs.
 fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());
@@ -207,7 +207,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     assert!(format!("{first:?}") == format!("{expected:?}"));
 }
 
-/// The second of two drones is in the air on the wrong side of the first one.
+/// Checks that a drone on the wrong side of its neighbour cannot be engaged.
 #[test]
 fn a_drone_out_of_order_cannot_be_engaged() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
@@ -223,7 +223,7 @@ fn a_drone_out_of_order_cannot_be_engaged() {
     assert_eq!(vehicle.events.last(), Some(&waits));
 }
 
-/// A mission between other sites, then one between those that the link was created with.
+/// Checks that the link follows its relay to a mission with other sites, and back.
 #[test]
 fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
     let auth = Some(Auth {

@@ -28,7 +28,7 @@ enum Fault {
     /// The cable stores the bytes and then delivers them at once.
     Keeps,
     Cut,
-    /// The cable delays the bytes by so many µs.
+    /// The cable delays the bytes by the given time, µs.
     Delay(u64),
 }
 
@@ -336,7 +336,7 @@ impl Flight {
         engages
     }
 
-    /// Sends a frame of the companion and checks its texts.
+    /// Sends a frame of the companion to the vehicle, and checks the texts in the frame.
     fn send(&mut self, frame: &[u8]) {
         let now = self.now;
         if frame[7] == 253 {
@@ -363,7 +363,7 @@ impl Flight {
     }
 }
 
-/// Returns the faults of a flight, the number of engagements. The last value is true if it used the asynchronous runner.
+/// Returns the violations in a flight, and the number of engagements. The last value is true for the asynchronous runner.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

@@ -107,7 +107,7 @@ impl Body {
 
 /// Received target.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Told {
+pub(crate) struct SentTarget {
     pub(crate) to: Point,
     pub(crate) velocity: Point,
 }
@@ -131,7 +131,7 @@ pub(crate) struct Real {
     /// x beyond which an ArduCopter ignores targets, m.
     pub(crate) fence_x_m: f64,
     pub(crate) is_breached: bool,
-    told: Option<Told>,
+    told: Option<SentTarget>,
     told_at: Option<Instant>,
     stream_since: Instant,
     /// Holding point in the autopilot's own modes.
@@ -145,7 +145,7 @@ pub(crate) struct Real {
     pub(crate) echoes: bool,
     /// True while no position is sent.
     pub(crate) is_mute_of_positions: bool,
-    /// Steps by which positions are older than reported.
+    /// Number of simulation steps by which positions are older than their time stamps.
     pub(crate) hidden_lag: usize,
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
@@ -516,11 +516,11 @@ impl Real {
             self.stream_since = now;
         }
         if self.mode == Mode::Companion && to[0] <= self.fence_x_m {
-            self.told = Some(Told { to, velocity });
+            self.told = Some(SentTarget { to, velocity });
             self.told_at = Some(now);
         } else if self.kind == Kind::Px4 {
             // A PX4 in its failsafe flies to the target once it resumes.
-            self.told = Some(Told { to, velocity });
+            self.told = Some(SentTarget { to, velocity });
             self.told_at = Some(now);
         }
     }

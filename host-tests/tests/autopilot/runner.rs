@@ -106,7 +106,7 @@ impl Runner {
         self.incoming.0.borrow_mut().extend(bytes);
     }
 
-    /// Runs the task at `now`. Returns the bytes written.
+    /// Runs the autopilot task at `now`; returns the bytes that the task has written.
     pub(crate) fn run(&mut self, now: Instant) -> Vec<u8> {
         self.now.set(now);
         let mut cx = Context::from_waker(Waker::noop());

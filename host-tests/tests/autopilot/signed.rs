@@ -16,8 +16,9 @@ const STAMP: u64 = 37_527_840_000_000;
 /// Key and signing state of the autopilot.
 pub(crate) struct Key {
     bytes: [u8; 32],
-    /// Stamp at the autopilot's start, and stamp of the last frame.
+    /// Signing time stamp at the autopilot's start.
     zero: u64,
+    /// Signing time stamp of the last frame sent.
     last: u64,
     heard: u64,
 }
@@ -82,7 +83,7 @@ fn mistrust(vehicle: &Vehicle) -> Vec<Mistrust> {
     .collect()
 }
 
-/// Creates a vehicle with the key `theirs` and a link with the key `ours`.
+/// Creates a simulated vehicle that signs with `theirs`, connected to a link that signs with `ours`.
 pub(crate) fn keyed(kind: Kind, ours: Option<[u8; 32]>, theirs: Option<[u8; 32]>) -> Vehicle {
     let mut vehicle = Vehicle::new(kind);
     vehicle.key = theirs.map(Key::new);

@@ -80,7 +80,7 @@ struct Line {
 }
 
 impl Line {
-    /// Returns the point at distance x along the line, and the line's azimuth there.
+    /// Returns the point at distance `x` along the line, and the line's azimuth at that point.
     fn at(&self, x: f64) -> [f64; 3] {
         let (lat, lon, azimuth): (f64, f64, f64) =
             self.earth.direct(self.tx[0], self.tx[1], self.azimuth, x);
@@ -116,7 +116,7 @@ fn around(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// Draws a line of that length anywhere on earth, and a point up to 500 m beside it.
+/// Draws a line of `length` metres anywhere on earth, and a point up to 500 m beside the line.
 fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
     let tx = [
         unit(rng.random_range(-89.9..89.9)),

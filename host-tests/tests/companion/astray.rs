@@ -128,7 +128,7 @@ fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
     assert_eq!(apart.position()["sites_look_swapped"], false);
 }
 
-/// Checks a drone beside its line and outside the geofence: it has a position and may fly there.
+/// Checks a drone outside the geofence, but near the line: the log reports it, and it may be engaged.
 #[test]
 fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
     // 380 m along a line that starts 500 m farther on.

@@ -111,7 +111,7 @@ fn the_bench_of_the_page_runs_twice() {
             "relay 2  autopilot: found an ArduCopter",
             "relay 1  arrived: ",
             "relay 2  arrived: ",
-            "relay 1  adopted: flies version 1 of the mission, between 47.4000000,8.5400000,420.000 and 47.4120000,",
+            "relay 1  adopted: the chain flies version 1 of the mission, between 47.4000000,8.5400000,420.000 and 47.4120000,",
             "transmitter  flown: 2 of 2 relays fly version 1",
         ] {
             assert!(said.contains(part), "run {run}: no `{part}` in\n{said}");

@@ -67,7 +67,7 @@ impl Chain {
         }
     }
 
-    /// Uses a channel whose first ttys are those of the relays.
+    /// Creates a chain on a shared channel; the first `of` ttys belong to the relays.
     pub(crate) fn on_channel(of: usize, channel: Medium) -> Self {
         Self {
             is_shared: true,

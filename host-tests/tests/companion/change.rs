@@ -67,7 +67,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change() {
     let ended = bench.uploads("1", moved).succeeds();
     assert_eq!(
         said(&ended, "current"),
-        ["relay 1 flies the mission that it was loaded with"]
+        ["relay 1 flies the mission with which it was loaded"]
     );
     let changes = said(&ended, "change");
     assert_eq!(
@@ -80,7 +80,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change() {
     );
     assert_eq!(changes.len(), 2, "{changes:?}");
     assert_eq!(said(&ended, "move").len(), 2);
-    bench.0.lines("adopted: flies version 1");
+    bench.0.lines("adopted: the chain flies version 1");
     let after = bench.agreed();
     assert!((after[0] - before[0]).abs() > 1.0, "{before:?}, {after:?}");
 
@@ -92,13 +92,15 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change() {
     assert_eq!(said(&ended, "change"), [change]);
     let moves = said(&ended, "move");
     assert_eq!(said(&ended, "dry run"), ["version 2 was not uploaded"]);
-    assert!(!bench.0.relays[0].has_said("uploaded: stored version 2"));
+    assert!(
+        !bench.0.relays[0].has_said("uploaded: version 2 of the mission was received and stored")
+    );
 
     // A script's upload: the relays move as far as announced.
     let ended = bench.uploads("2", &format!("{new} --yes")).succeeds();
     assert_eq!(said(&ended, "move"), moves);
     let between = "between 47.4000000,8.5400000,420.000 and 47.4120000,8.5520000,433.000";
-    for line in bench.0.lines("adopted: flies version 2") {
+    for line in bench.0.lines("adopted: the chain flies version 2") {
         assert!(line.ends_with(between), "{line}");
     }
     let last = bench.agreed();
@@ -175,7 +177,7 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     let mut bench = Bench::new();
     bench.agreed();
     let new = "--new-interferer 80,700,-300";
-    let line = "--version 1: nobody can confirm the upload, since standard input is no terminal; give --yes, or --dry-run to see what it changes";
+    let line = "--version 1: the upload cannot be confirmed, because standard input is not a terminal: give --yes, or --dry-run to see its changes";
     assert_eq!(bench.uploads("1", new).refused(2), line);
     let question = "Upload version 1? [y/N] ";
     for answer in ["n\n", "\n"] {
@@ -186,5 +188,5 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     assert!(!bench.0.relays[0].has_said("uploaded: "));
     let (status, shown) = at_a_terminal(&bench.options("1", new), "y\n");
     assert_eq!((status, &shown[..]), (Some(0), question));
-    bench.0.lines("adopted: flies version 1");
+    bench.0.lines("adopted: the chain flies version 1");
 }

@@ -79,8 +79,11 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     let socket = drones.chain.files.path("status2");
     assert_eq!(asked(&socket)["relay"]["lost"], json!([3]));
     for (command, why) in [
-        ("land", "unknown command; the command is clear-lost N"),
-        ("clear-lost", "name the relays that have landed"),
+        (
+            "land",
+            "unknown command `land`: the only command is clear-lost N",
+        ),
+        ("clear-lost", "clear-lost names no relay"),
         ("clear-lost 2", "relay 2 is this relay"),
         ("clear-lost 1", "relay 1 is received and not lost"),
         ("clear-lost 4", "relay 4: must be within 1 to 3"),
@@ -116,7 +119,7 @@ fn a_client_that_sends_a_part_of_a_command_is_answered() {
     relay.line("converged: ");
     let (is_done, text) = commanded(&socket, "clear-lo");
     assert!(!is_done, "{text}");
-    relay.line("command refused: unknown command; the command is clear-lost N");
+    relay.line("command refused: unknown command `clear-lo`: the only command is clear-lost N");
     assert_eq!(asked(&socket)["relay"]["index"], 1);
     let text = answer(&socket, "", false);
     assert!(text.contains("\"has_lease\""), "the state: {text}");
@@ -147,7 +150,7 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 1");
     answer(&drone, 2);
     relay.line(
-        "command refused: the command has to name all lost relays of one side, and no others (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
+        "command refused: the command must name all lost relays of one side, and no others (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
     );
     drone.order("clear 2");
     answer(&drone, 0);

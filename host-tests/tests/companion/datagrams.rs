@@ -54,7 +54,7 @@ impl Ports {
     }
 }
 
-/// Checks that companion and autopilot receive each other.
+/// Checks that the companion and its autopilot receive each other's messages.
 fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
     relay.line("autopilot: found a PX4");
     relay.line("autopilot: on the ground, or not armed");
@@ -149,7 +149,7 @@ fn a_local_port_that_cannot_be_had_is_named() {
         (&short, [&*in_use, "udp:HOST:PORT@LOCAL, within 1 to 65535"]),
         (
             &own,
-            ["is this program's own port", "LOCAL must be another"],
+            ["is this program's own port", "LOCAL must differ from PORT"],
         ),
     ] {
         let line = relay(address, "").refused(1);

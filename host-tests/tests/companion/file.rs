@@ -70,7 +70,7 @@ fn three_with_one_file_settle_where_the_simulated_chain_does() {
     assert_ne!(settled[..], simulated(&Scenario::default(), 3));
 }
 
-/// Checks by the digest, which covers all numbers of a mission, that all programs read the same one.
+/// Checks by the mission digest that all programs read the same mission from a scenario file.
 #[test]
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Files::new();
@@ -129,7 +129,7 @@ fn what_is_wrong_with_the_file_is_named() {
     }
 }
 
-/// Checks that the command line overrides the file, and that each difference is reported once.
+/// Checks that options override the file, and that the log reports each overridden value once.
 #[test]
 fn what_the_command_line_says_otherwise_is_said_once() {
     let folder = Files::new();

@@ -33,7 +33,7 @@ impl Flight {
     fn found_by(kind: &str, key: Option<&str>, options: &str) -> Self {
         let mut flight = Self::started(kind, [key; 2], options);
         if key.is_some() {
-            flight.relay.line("autopilot: frames are signed");
+            flight.relay.line("autopilot: frames to the autopilot are signed");
         }
         let found = flight.relay.line("autopilot: found a");
         assert!(found.to_lowercase().contains(kind), "{found}");
@@ -50,7 +50,7 @@ impl Flight {
         let drone = Peer::autopilot(kind, &link, START_M, theirs.as_deref());
         let ours = ours.map_or_else(String::new, |file| format!("--autopilot-key-file {file}"));
         let mut relay = relay(&link, &format!("{ours} {options}"));
-        relay.line("autopilot: by --autopilot");
+        relay.line("autopilot: connected by --autopilot");
         Self {
             drone,
             relay,
@@ -86,7 +86,7 @@ impl Flight {
         assert_eq!(there.mode(), "companion");
     }
 
-    /// Changes the mode, as the pilot or the autopilot does.
+    /// Changes the flight mode, as the pilot or a failsafe of the autopilot does.
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay
@@ -113,7 +113,7 @@ fn is_an_onboard_computer(drone: &Peer) {
     assert_eq!((kind, autopilot), (&18.into(), &8.into()));
 }
 
-/// Checks that the targets lead from the drone to the place without a jump.
+/// Checks that the targets lead from the drone to `place` without a jump.
 fn lead_to(targets: &[Heard], place: Site) {
     let mut before = targets[0].own();
     for target in targets {
@@ -158,7 +158,7 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     assert!(moving.count() > 40, "what moves is said with its velocity");
     assert!(!all.last().unwrap().has_velocity(), "the last one stands");
     let line = flight.relay.line("arrived: ");
-    assert!(line.contains(" m from the agreed position, x "), "{line}");
+    assert!(line.contains(" m from its agreed position: x "), "{line}");
     (flight, place)
 }
 

@@ -40,7 +40,7 @@ fn a_drone_stays_where_it_is_and_then_flies_along_the_new_line() {
         let sites = format!("--site-tx {} --site-rx {}", text(TX), text(RX));
         let new = format!("--distance {distance} --new-site-rx {}", text(MOVED));
         Relay::ground(&format!("{upload} {sites} {new}")).succeeds();
-        let adopted = flight.relay.line("adopted: flies version 1");
+        let adopted = flight.relay.line("adopted: the chain flies version 1");
         let between = "between 47.4000000,8.5400000,420.000 and 47.4095000,8.5535000,440.000";
         assert!(adopted.ends_with(between), "{adopted}");
         // The drone is within a metre of its goal, and all targets are at one point there.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::process::Relay;
 
-/// Options to which those of [`WRONG`] without `--index` are added.
+/// Valid options, to which the entries of [`WRONG`] without `--index` are added.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
 
 /// Sites and their distance.
@@ -116,7 +116,7 @@ fn wrong_options_of_an_autopilot_are_named() {
 fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
     for (autopilot, why) in [
         ("/nowhere/tty", "--autopilot /nowhere/tty: No such file"),
-        ("/dev/null", "--autopilot /dev/null: is no tty"),
+        ("/dev/null", "--autopilot /dev/null: is not a tty"),
         (
             "udp:nowhere.invalid:14540",
             "--autopilot udp:nowhere.invalid:14540: HOST nowhere.invalid is not found: ",

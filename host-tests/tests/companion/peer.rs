@@ -196,12 +196,12 @@ impl Peer {
         self.order("takeoff");
     }
 
-    /// Waits for the next message that is `wanted`, ignoring those before.
+    /// Waits for the next message that is `wanted`, and ignores all messages before it.
     pub(crate) fn hears(&self, wanted: impl Fn(&Heard) -> bool) -> Heard {
         self.hears_until(wanted).pop().unwrap()
     }
 
-    /// Returns all messages up to the next one that is `wanted`.
+    /// Returns all messages up to and including the next `wanted` message.
     pub(crate) fn hears_until(&self, wanted: impl Fn(&Heard) -> bool) -> Vec<Heard> {
         let end = Instant::now() + LIMIT;
         let mut all = Vec::new();
@@ -220,7 +220,7 @@ impl Peer {
         }
     }
 
-    /// Returns the messages received in `span`, without earlier ones.
+    /// Returns the messages that are received during the next `span`.
     pub(crate) fn hears_for(&self, span: Duration) -> Vec<Heard> {
         self.forget();
         std::thread::sleep(span);

@@ -91,7 +91,7 @@ fn what_is_no_fifo_is_refused() {
     let files = Files::new();
     let file = files.write("file", "1 2 3\n");
     for (path, why) in [
-        (file, "is no FIFO, make one with mkfifo"),
+        (file, "is not a FIFO: make one with mkfifo"),
         (files.text("none"), "No such file"),
     ] {
         let line = Relay::start(&format!("--index 1 --of 1 --positions {path}")).refused(1);

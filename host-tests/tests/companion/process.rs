@@ -94,13 +94,13 @@ impl Relay {
         }
     }
 
-    /// Returns true if a line so far contains `part`.
+    /// Returns true if a line that the process has printed contains `part`.
     pub(crate) fn has_said(&mut self, part: &str) -> bool {
         self.seen.extend(self.lines.try_iter());
         self.seen.iter().any(|line| line.contains(part))
     }
 
-    /// Waits for a line that contains `part`, unless there has been one.
+    /// Waits for a line that contains `part`; returns at once if the process has printed such a line.
     pub(crate) fn says(&mut self, part: &str) {
         if !self.has_said(part) {
             self.line(part);
@@ -201,7 +201,7 @@ impl Relay {
         (ended.stdout, ended.stderr.remove(0))
     }
 
-    /// Returns the processor time and the number of voluntary sleeps so far.
+    /// Returns the process's processor time and number of voluntary sleeps since its start.
     pub(crate) fn cost(&self) -> (Duration, u64) {
         let file = |name| std::fs::read_to_string(format!("/proc/{}/{name}", self.child.id()));
         let stat = file("stat").unwrap();

@@ -22,7 +22,7 @@ use crate::stays::fill_disk;
 struct Seen {
     answers: u64,
     slowest: Duration,
-    /// Answers without a setpoint after the first one with a setpoint.
+    /// Number of status answers without a setpoint after the first answer with a setpoint.
     placeless: u64,
     failed: u64,
 }

@@ -95,7 +95,7 @@ fn three_relays_know_what_both_stations_measure() {
         .unwrap();
     std::fs::write(&level, format!("1\nreceiver {rx_w:e}\nhalf a li")).unwrap();
     tx.line("\"event\":\"back\"");
-    rx.line("back: relay 3 is received");
+    rx.line("back: relay 3 and this station receive each other");
     for tty in 0..3 {
         until(status(tty), |said| {
             is_about(&said["relay"]["transmitter_w"], tx_w)
@@ -142,9 +142,7 @@ fn three_relays_know_what_both_stations_measure() {
 
     // A lost relay is reported because measurements are sent to it.
     drop(relays.remove(2));
-    write_until(&level, rx_w, || {
-        rx.has_said("lost: relay 3 does not answer")
-    });
+    write_until(&level, rx_w, || rx.has_said("lost: relay 3 does not reply"));
     for station in [tx, rx] {
         let last = station.stopped().pop().unwrap();
         assert!(last.contains("stopped"), "{last}");
@@ -217,8 +215,8 @@ fn a_station_that_stands_uploads_and_stands_on() {
         )
     };
     let (mut first, level, capture) = station("2", "first");
-    first.line("flown: 1 of 1 relays fly version 2, as relay 1 says");
-    relay.line("adopted: flies version 2");
+    first.line("flown: 1 of 1 relays fly version 2 in view ");
+    relay.line("adopted: the chain flies version 2");
     write(&level, "1e-9\n");
     first.line("measurement: 1.000e-9 W by ");
     first.stopped();
@@ -226,8 +224,10 @@ fn a_station_that_stands_uploads_and_stands_on() {
     assert!(said > 500, "{said} bytes in the capture");
 
     let (mut second, ..) = station("1", "second");
-    second.line("back: relay 1 is received");
-    second.line("not flown: --version 1: must be within 3 to 65535, the relays hold version 2");
+    second.line("back: relay 1 and this station receive each other");
+    second.line(
+        "not flown: --version 1: must be within 3 to 65535, because the relays have version 2",
+    );
     second.signal(Signal::TERM);
     assert_eq!(second.end().status, Some(0), "it stood on");
 }

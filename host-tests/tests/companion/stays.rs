@@ -134,7 +134,7 @@ fn the_socket_answers_one_object_whoever_else_is_stuck() {
     assert_eq!(said["relay"]["counters"]["refused"], 0);
     // A second process with the same name is refused; a stale name is not.
     let line = Relay::start(&options).refused(1);
-    assert!(line.contains("is in use already"), "{line}");
+    assert!(line.contains("is already in use"), "{line}");
     drop(relay);
     assert!(files.path("status").exists(), "it was killed");
     Relay::start(&options).line("started: ");

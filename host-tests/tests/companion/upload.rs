@@ -48,22 +48,22 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         assert!(!chain.files.path("upload1").exists());
         let ends = format!("--end tx --tty {}", chain.tx.as_ref().unwrap().tty(0));
         let last = ground(&chain.files, "3", &ends).succeeds().pop().unwrap();
-        let flown = "flown: 2 of 2 relays fly version 3, as relay 1 says, view ";
+        let flown = "flown: 2 of 2 relays fly version 3 in view ";
         assert!(last.contains(flown), "{last}");
         // Both log lines come before the ground station's.
-        chain.lines("uploaded: stored version 3");
-        chain.lines("adopted: flies version 3");
+        chain.lines("uploaded: version 3 of the mission was received and stored");
+        chain.lines("adopted: the chain flies version 3");
         chain.settles_at(&uploaded);
         // Both are killed at a random moment.
         chain.relays.clear();
         chain.relays = (1..=2).map(|index| relay(&chain, index, "")).collect();
-        chain.lines("resumed: flies version 3");
+        chain.lines("resumed: this relay flies version 3");
         chain.settles_at(&uploaded);
         for relay in &mut chain.relays {
             assert!(!relay.has_said("uploaded: ") && !relay.has_said("adopted: "));
         }
         let line = ground(&chain.files, "2", &ends).refused(1);
-        let held = "--version 2: must be within 4 to 65535, the relays hold version 3";
+        let held = "--version 2: must be within 4 to 65535, because the relays have version 3";
         assert_eq!(line, held);
     }
 }
@@ -79,16 +79,16 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     chain.lines("converged: ");
     let ends = format!("--shared --end rx --tty {station}");
     let last = ground(&chain.files, "1", &ends).succeeds().pop().unwrap();
-    let flown = "flown: 2 of 2 relays fly version 1, as relay 2 says";
+    let flown = "flown: 2 of 2 relays fly version 1 in view ";
     assert!(last.contains(flown), "{last}");
     chain.settles_at(&uploaded);
     let kept = chain.files.path("upload2");
     std::fs::remove_file(&kept).unwrap();
     chain.relays.clear();
     chain.relays = (1..=2).map(|index| relay(&chain, index, "")).collect();
-    chain.relays[0].line("resumed: flies version 1");
-    chain.relays[1].line("uploaded: stored version 1");
-    chain.relays[1].line("adopted: flies version 1");
+    chain.relays[0].line("resumed: this relay flies version 1");
+    chain.relays[1].line("uploaded: version 1 of the mission was received and stored");
+    chain.relays[1].line("adopted: the chain flies version 1");
     chain.settles_at(&uploaded);
     // A separate thread writes the file.
     let begun = std::time::Instant::now();
@@ -123,12 +123,12 @@ fn a_file_that_is_of_no_use_is_named_and_not_used() {
     };
     for (bytes, words) in [
         (good.clone(), None),
-        (damaged, Some("is damaged, or no upload; not used")),
+        (damaged, Some("is damaged or not an upload; not used")),
         (
             good[..Upload::LENGTH].to_vec(),
-            Some("is damaged, or no upload; not used"),
+            Some("is damaged or not an upload; not used"),
         ),
-        (Vec::new(), Some("is damaged, or no upload; not used")),
+        (Vec::new(), Some("is damaged or not an upload; not used")),
         (
             stored(&high, &new()),
             Some("is for relays that were loaded with mission 0x"),
@@ -139,7 +139,10 @@ fn a_file_that_is_of_no_use_is_named_and_not_used() {
         let mut relay = Relay::start(&options);
         let place = if words.is_none() { &uploaded } else { &loaded };
         relay.settles_at(place[0]);
-        assert_eq!(relay.has_said("resumed: flies version 5"), words.is_none());
+        assert_eq!(
+            relay.has_said("resumed: this relay flies version 5"),
+            words.is_none()
+        );
         let stdout = relay.stopped();
         let said: Vec<&String> = stdout.iter().filter(|it| it.contains("  file: ")).collect();
         assert_eq!(said.len(), words.iter().count(), "{said:?}");
@@ -181,7 +184,7 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         let more = format!("--end tx --tty {tty} --new-altitude {altitude} {band}");
         let Some(range) = range else {
             ground(&chain.files, "5", &more).succeeds();
-            chain.lines("adopted: flies version 5");
+            chain.lines("adopted: the chain flies version 5");
             continue;
         };
         let more = format!("{more} --new-band {altitude},{altitude}");
@@ -194,7 +197,7 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         let relays = &mut chain.relays;
         assert!(!relays[0].has_said("upload refused: "), "nothing was sent");
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
-        let by = "relay 1, or one beyond it, refuses it";
+        let by = "relay 1, or a relay beyond it, rejects the upload";
         assert_eq!(line, format!("--version 5: {by}: {why}"));
         let own = "upload refused: the altitudes must be within the relay's own geofence, ";
         relays[0].line(&format!("{own}{range}"));

@@ -41,7 +41,7 @@ fn stored(chain: &Chain, index: usize) -> ViewRecord {
     ViewRecord::from_bytes(&bytes[..ViewRecord::LENGTH]).unwrap()
 }
 
-const STANDS_BY: &str = "restored: votes of before this start, from --view-file; before another flight remove that file";
+const STANDS_BY: &str = "restored: this relay's earlier votes on views were read from --view-file; remove that file before another flight";
 
 /// Kills all relays in a view of two; restarted, three fly, and no view number is used twice.
 #[test]
@@ -106,7 +106,7 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
     damaged[7] ^= 1;
-    let is_damaged = "is damaged, or no record of views: remove the file before the next flight, and start again";
+    let is_damaged = "is damaged or not a record of views: remove the file before the next flight, and start again";
     for (bytes, words) in [
         (damaged, is_damaged),
         (good[..good.len() - 1].to_vec(), is_damaged),
@@ -114,7 +114,7 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
         (Vec::new(), is_damaged),
         (
             other,
-            "the record is of a relay that was loaded with another mission: for a new flight remove the file, and start again; in the same \
+            "the record was written by a relay that was loaded with another mission: for a new flight remove the file, and start again; in the same \
              flight start the relay with the mission that it had",
         ),
     ] {

@@ -42,7 +42,7 @@ fn a_port_that_cannot_be_opened_says_why() {
         (files.text(""), "is a directory, and no tty"),
         (files.text("none"), "No such file: is it plugged in?"),
         ("/dev/null".to_owned(), "is no tty"),
-        (used, "is in use already"),
+        (used, "is already in use"),
     ];
     // Root may open any file.
     if std::fs::read(&secret).is_err() {
@@ -114,13 +114,13 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     fails(
         "key",
         "--network 8",
-        "nothing was heard; is --tty /dev/pts/",
+        "no frame was received: check that --tty /dev/pts/",
     );
     relay.line("rejected: ");
     fails(
         "other",
         "",
-        "are --network 1, --baud 115200, --end and --key-file right?",
+        "check --network 1, --baud 115200, --end and --key-file",
     );
     assert!(relay.line("rejected: ").contains("have a wrong tag"));
 }

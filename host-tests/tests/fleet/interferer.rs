@@ -48,7 +48,7 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
     last.sir_rx(x).unwrap()
 }
 
-/// Draws a target for one to several dozen relays, as a fraction of the outer hops' maximum.
+/// Draws a target that one to several dozen relays meet, as a fraction of the outer hops' maximum SIR.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)

@@ -108,7 +108,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns the fault of a flight, if any, and the smallest distances.
+/// Returns the first violation in a flight, if any, and the smallest distances between drones, m.
 fn judged(seed: u64) -> (Option<String>, f64, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

@@ -68,7 +68,7 @@ impl Chain {
         Some(took.as_micros().div_ceil(1000))
     }
 
-    /// Returns the relative margin of the chain's SIR over its target, and the smallest distance, m.
+    /// Returns the chain's relative SIR margin over its target, and the smallest distance of relays, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self

@@ -116,7 +116,7 @@ fn chain() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns relays with the frames of their chain's flight, and operations on an isolated one.
+/// Returns seeds of the relay target: frames of a chain's relays, and operations on one relay.
 fn relay() -> Vec<Vec<u8>> {
     let mut seeds = Vec::new();
     for mission in missions() {

@@ -33,7 +33,7 @@ const SPEED: f64 = 5.0;
 const TARGET_ACCELERATION: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
 
-/// Longest time until a drone that is given back at full speed hovers after its overshoot, s.
+/// Longest time from a release at full speed until the drone hovers, overshoot included, s.
 const BRAKES_S: f64 = 8.0;
 
 /// End of the faults, s. The flight ends when all drones have arrived, or fails at `LAST_S`.
@@ -153,8 +153,9 @@ impl Drone {
 )]
 #[derive(Debug, Default)]
 struct Report {
-    /// Smallest distance less the required one, m, with the two drones and the time.
+    /// Smallest margin of two drones' distance over the required distance, m.
     margin_m: f64,
+    /// Indices of those drones, their distance, m, and the time, s.
     nearest: Option<(usize, usize, f64, f64)>,
     in_order: bool,
     arrived: bool,

@@ -55,7 +55,7 @@ pub(crate) struct Drone {
     pub(crate) taken: bool,
     /// True once the neighbour toward Tx or Rx knows that the pilot flies this drone.
     pub(crate) told: [bool; 2],
-    /// Range along x that the neighbours keep out of since then.
+    /// Range along x that the neighbours keep out of since the takeover.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
     /// Association numbers that this drone sent last, by side.
@@ -183,7 +183,7 @@ impl Drone {
             .fly(self.goal, self.speed, self.acceleration, step_s);
     }
 
-    /// Generates position reports and passes those that have arrived to the guard.
+    /// Generates position reports, and passes the reports that have arrived to the guard.
     pub(crate) fn report(&mut self, rng: &mut ChaCha8Rng, board: Board, hover_m: f64, now_s: f64) {
         if now_s >= self.next_report_s {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;

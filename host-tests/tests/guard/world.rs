@@ -191,7 +191,7 @@ impl World {
         least < most
     }
 
-    /// Checks that no two drones came too close in this step, or can from here, wherever they stop.
+    /// Checks that no two drones came too close in this step, or can come too close before they stop.
     fn check(&mut self) {
         let separation = f64::from(self.confines.separation_m);
         let floor = separation - self.allowed_m();
@@ -222,7 +222,7 @@ impl World {
     }
 }
 
-/// Returns the neighbours of drone `k` in a mission with so many relays.
+/// Returns the neighbours of drone `k` in a mission with `relays` relays.
 pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
     [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
 }

@@ -56,7 +56,7 @@ struct Result {
     bytes: u64,
 }
 
-/// Returns the scene in units of D.
+/// Returns a text that describes the scene, with lengths in units of D.
 fn described(link: &Link, corridor: Corridor) -> String {
     let d = link.distance_m;
     format!(

@@ -22,7 +22,7 @@ fn best(scenario: &Scenario, relays: u16) -> Plan {
     plan(scenario, &ask).unwrap()
 }
 
-/// Returns the libraries' reading of both files, after checks that hold for every plan.
+/// Writes the plan as GeoJSON and KML, checks both, and returns them as other libraries read them.
 fn read(scenario: &Scenario, plan: &Plan) -> Value {
     let line = scenario.line.unwrap();
     let map = Map::new(scenario, plan).unwrap();

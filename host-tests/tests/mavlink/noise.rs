@@ -90,7 +90,7 @@ fn an_unknown_message_costs_nothing_but_its_bytes() {
     assert_eq!(parser.counters().broken, 0);
 }
 
-/// Checks the worst known input: three false starts in sixteen bytes, each a checksum of 260 bytes.
+/// Checks the costliest known input: three false frame starts per sixteen bytes. Each costs a checksum over 260 bytes.
 #[test]
 fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
     let made = [

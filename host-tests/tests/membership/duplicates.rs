@@ -14,7 +14,7 @@ use super::*;
 /// Latency of a frame, and interval of the observations, ms.
 const STEP_MS: u64 = 10;
 
-/// Time limit for one duplicate to give up its setpoint after it has received the other, ms.
+/// Time limit for one duplicate to give up its setpoint after it has received the other duplicate, ms.
 const LIMIT_MS: u64 = 2_000;
 
 /// Time limit for two setpoints at duplicates that receive each other, ms. A settled chain sends few frames.
@@ -68,7 +68,7 @@ struct Case {
     seed: u64,
 }
 
-/// Results of one chain, ms.
+/// Durations measured in one simulated chain, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
     /// Longest time with two setpoints, from `LIMIT_MS` after the first frame between the duplicates.

@@ -19,7 +19,7 @@ fn paper(relays: u16) -> Setup {
     Setup::on_shared_channel(mission(relays))
 }
 
-/// Runs `setup`, which settles. The relays `left` end where an undisturbed chain of them does.
+/// Runs `setup`. Checks that the relays `left` end at the positions of an undisturbed chain of these relays.
 fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
     let outcome = run(setup.clone()).unwrap();
     assert_eq!(outcome.ending, Ending::Settled, "{name}");

@@ -47,7 +47,7 @@ impl World<'_> {
         }
     }
 
-    /// Delivers the frame `behind` places after the next one of a line `times` times.
+    /// Delivers the frame that is `behind` places after the next frame of `line`, `times` times.
     fn deliver(&mut self, line: u8, behind: u8, times: usize) -> Checked {
         let Some(line) = self.wires.pick(line) else {
             return Ok(());

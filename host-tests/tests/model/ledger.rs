@@ -138,7 +138,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Records a message sent to the neighbour at `to`.
+    /// Records a message that the relay sends to its neighbour at `to`.
     pub(crate) fn told(&mut self, to: Side, message: &Message, now: Instant) {
         if let Message::Heartbeat { request: 1.., .. } = message {
             self.signs[side(to)].ask(message, now);

@@ -45,7 +45,7 @@ type Checked<T = ()> = Result<T, TestCaseError>;
 
 const LONGEST: usize = 200;
 
-/// Sequences for each random mission.
+/// Number of operation sequences for each random mission.
 const SEQUENCES_A_MISSION: u32 = 10;
 
 fn count() -> u32 {

@@ -11,13 +11,13 @@ use proptest::prelude::*;
 pub(crate) enum Operation {
     /// The next frame of a line arrives.
     Deliver(u8),
-    /// The next frame of a line never arrives.
+    /// The next frame on this line is lost.
     Drop(u8),
     /// The next frame of a line arrives twice.
     Twice(u8),
-    /// A frame of a line overtakes those before it.
+    /// A frame of one line overtakes the frames before it.
     Overtake(u8, u8),
-    /// Several frames of a line arrive in one read: line, number of frames.
+    /// Several frames of one line arrive in one read: the line, and the number of frames.
     Burst(u8, u8),
     /// The next frame of a line is delayed: line, ms.
     Delay(u8, u16),
@@ -25,15 +25,15 @@ pub(crate) enum Operation {
     Damage(u8, Vec<(u8, u8)>),
     /// The clock advances to the next timer of any relay.
     Tick,
-    /// The clock advances by so many ms: every timer is served in time, and no frames arrive.
+    /// The clock advances by this many ms: every timer is served in time, and no frames arrive.
     Wait(u16),
-    /// The clock advances by so many ms while all main loops stand still: timers are served late.
+    /// The clock advances by this many ms while all main loops are suspended: timers are served late.
     Sleep(u16),
-    /// The clock advances by so many ms without faults: frames arrive in order.
+    /// The clock advances by this many ms without faults: frames arrive in order.
     Flow(u16),
     /// A relay reboots with another seed.
     Reboot(u8, u32),
-    /// A link is cut after so many bytes of the next frames.
+    /// A link is cut after this many bytes of the next frames: link, bytes.
     Cut(u8, u8),
     /// A link is restored.
     Join(u8),
@@ -41,7 +41,7 @@ pub(crate) enum Operation {
     Restart,
     /// A recorded frame of a line arrives again, if the chain signs its frames, which must withstand that.
     Replay(u8, u8),
-    /// A relay measures so many per cent of the agreed interference.
+    /// A relay measures this percentage of the agreed interference: relay, per cent.
     Measure(u8, u8),
 }
 

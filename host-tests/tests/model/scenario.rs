@@ -32,7 +32,7 @@ const SCENES: u64 = 400;
 pub(crate) enum Kind {
     /// Algorithm 1, predicted by the leader.
     Predicted,
-    /// Algorithm 1 by trial; relays may have altitudes and powers of their own.
+    /// Algorithm 1 by trials of targets. Relays may have their own altitudes and powers.
     Tried,
     /// Algorithm 1 with free altitudes.
     Altitude,

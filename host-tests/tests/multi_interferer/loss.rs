@@ -17,7 +17,7 @@ use super::scenes::{Sources, scenario};
 /// Relative SIR tolerance of the relays.
 const TOLERANCE: f64 = 1e-5;
 
-/// Upper bounds of the classes of relative error.
+/// Upper bounds of the classes into which the relative error of the fit is divided.
 const CLASSES: [f64; 6] = [0.001, 0.01, 0.03, 0.1, 0.3, 1.0];
 
 /// Relative error of the fit, and fraction of the best SIR that is lost.

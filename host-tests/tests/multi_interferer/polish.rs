@@ -73,7 +73,7 @@ fn at_one_altitude_it_stays_below_the_optimum() {
     assert!(4 * reached > 3 * count && start_reached < reached / 2);
 }
 
-/// Checks that the chain approaches the joint optimum of one source without exceeding it.
+/// Checks that the chain's SIR approaches the joint optimum for one source without exceeding it.
 #[test]
 fn in_a_band_it_comes_near_the_joint_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(80);

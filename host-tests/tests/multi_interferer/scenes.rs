@@ -33,7 +33,7 @@ use uav_relay_scenario::{
 pub(crate) enum Sources {
     /// Sources at any position, also on the line.
     Any,
-    /// Sources well beside the line.
+    /// Sources far to the side of the line between Tx and Rx.
     Aloof,
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// Returns the scene with its band reduced to the lowest altitude.
+/// Returns the scene with the lowest altitude of its band as the only allowed altitude.
 pub(crate) fn level(mut scene: Scene) -> Scene {
     scene.band.most_m = scene.band.least_m;
     scene

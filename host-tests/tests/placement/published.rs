@@ -26,7 +26,7 @@ fn reference_cases_of_one_hop_hold() {
             mission.interferer().unwrap(),
             Sender::transmitter(&mission),
             1,
-            mission.config().common.on_line().at,
+            mission.config().common.on_line().cross_section,
             0.0,
         );
         let ours = hop.reach(case.arg("gamma").unwrap() as f32, 0.0);
@@ -44,7 +44,7 @@ fn reference_cases_of_one_hop_hold() {
             mission.interferer().unwrap(),
             Sender::relay(&mission, common.on_line()),
             2,
-            common.on_line().at,
+            common.on_line().cross_section,
             0.0,
         );
         let from = case.arg("s").unwrap();

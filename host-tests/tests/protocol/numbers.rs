@@ -12,7 +12,7 @@ fn sweep_in(bytes: &[u8]) -> Sweep {
     }
 }
 
-/// Returns the last relay after `sweep`, received as it is and then with its number changed by `off`.
+/// Returns the last relay after it received `sweep`, and again with its number changed by `off`.
 fn after_two(sweep: &[u8], now: Instant, off: u16) -> Relay {
     let mut tail = relay(mission(2), 2);
     tail.handle_bytes(now, Port::Upstream, sweep);

@@ -49,7 +49,7 @@ impl Image {
     }
 }
 
-/// Returns the image of an example; all are built once for all tests.
+/// Returns the image file of an example. The first call builds the images of all examples.
 pub(crate) fn image(example: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -280,9 +280,10 @@ impl Fleet {
             (1..).zip(places).all(|(drone, place)| {
                 let mut back = lines.iter().rev().filter(|line| line.drone == drone);
                 // An agreement is logged after its positions.
-                let agreed =
-                    back.find(|line| line.setpoint().is_some() || line.text == "event Converged");
-                agreed.is_some_and(|line| line.text == "event Converged")
+                let agreed = back.find(|line| {
+                    line.setpoint().is_some() || line.text == "the relays have agreed on positions"
+                });
+                agreed.is_some_and(|line| line.text == "the relays have agreed on positions")
                     && back.find_map(Line::setpoint) == Some(*place)
             })
         });

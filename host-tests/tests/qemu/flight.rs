@@ -78,7 +78,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         vehicle.heartbeats > 1 && asked.iter().all(|id| vehicle.asked.contains(id))
     });
     let name = match kind {
-        Kind::Px4 => "autopilot: found, Px4",
+        Kind::Px4 => "autopilot: found, PX4",
         Kind::ArduCopter => "autopilot: found, ArduCopter",
     };
     said(&mut fleet, name);

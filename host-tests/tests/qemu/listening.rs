@@ -4,7 +4,7 @@ use host_tests::firmware::emulator::Life;
 use mavlink::dialects::common::MavLandedState;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::mavlink::incoming::noise_w;
-use uav_relay::sensing::belief::Belief;
+use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Interference, Placement, Sample};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
@@ -96,7 +96,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
         .map(|relay| bits(relay.setpoint.unwrap()))
         .collect();
     let told = outcome.stands.last().unwrap().believed;
-    let Belief::Source { source, .. } = told.belief else {
+    let InterferenceEstimate::Source { source, .. } = told.estimate else {
         panic!("{told:?}");
     };
     println!("{told:?}");

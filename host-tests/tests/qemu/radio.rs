@@ -35,9 +35,10 @@ fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     // Each drone logs the new view, its new position, and the agreement.
     let story = |lines: &[Line], drone: u16, place: &[u32; 3]| {
         let mut new = lines[before..].iter().filter(|line| line.drone == drone);
-        let counted = new.find(|line| line.text == "event ViewAccepted")?;
+        let counted =
+            new.find(|line| line.text == "a new view has been accepted: new positions follow")?;
         new.find(|line| line.setpoint() == Some(*place))?;
-        let agreed = new.find(|line| line.text == "event Converged")?;
+        let agreed = new.find(|line| line.text == "the relays have agreed on positions")?;
         Some(agreed.at - counted.at)
     };
     fleet.wait("chain of four", |lines| {
@@ -52,7 +53,7 @@ fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     // Only drone 3 was lost.
     let lost = |drone| {
         let mut lines = fleet.of_drone(drone);
-        lines.any(|line| line.text.contains("Lost"))
+        lines.any(|line| line.text.contains("does not reply"))
     };
     assert_eq!([1, 2, 4, 5].map(lost), [false, true, true, false]);
 }

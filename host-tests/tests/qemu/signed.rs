@@ -62,9 +62,9 @@ fn a_drone_without_the_key_takes_no_part() {
             let mut lines = lines.iter().filter(|line: &&Line| line.drone == drone);
             lines.any(|line| line.text == text)
         };
-        lost(2, "event NeighbourLost { side: Downstream, node: 3 }")
-            && lost(3, "event NeighbourLost { side: Downstream, node: 4 }")
-            && lost(4, "event NeighbourLost { side: Upstream, node: 3 }")
+        lost(2, "node 3 downstream does not reply: look for that drone")
+            && lost(3, "node 4 downstream does not reply: look for that drone")
+            && lost(4, "node 3 upstream does not reply: look for that drone")
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
     let counters = [1, 2, 3, 4].map(|drone| fleet.counters(drone));

@@ -32,12 +32,12 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let sides = [
         (
             2,
-            "event NeighbourLost { side: Downstream, node: 3 }",
+            "node 3 downstream does not reply: look for that drone",
             asked[0],
         ),
         (
             4,
-            "event NeighbourLost { side: Upstream, node: 3 }",
+            "node 3 upstream does not reply: look for that drone",
             asked[1],
         ),
     ];
@@ -74,7 +74,7 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
     for drone in [1, 5] {
         let mut lost = fleet
             .of_drone(drone)
-            .filter(|line| line.text.contains("Lost"));
+            .filter(|line| line.text.contains("does not reply"));
         assert_eq!(lost.next(), None);
     }
 }

@@ -54,7 +54,9 @@ impl Three {
                 .filter(|line| line.text == text)
                 .count()
         };
-        let found = count("autopilot: cannot be engaged, Found");
+        let found = count(
+            "autopilot: cannot be engaged: OFFBOARD or GUIDED was chosen before the relay started; choose another mode first",
+        );
         if found > self.found {
             self.found = found;
             self.chooses = true;
@@ -62,7 +64,8 @@ impl Three {
             self.mavsdk.order("active");
         }
         let last = self.fleet.of_drone(1).last().map(|line| &*line.text);
-        if self.chooses && last == Some("autopilot: Ready") {
+        if self.chooses && last == Some("autopilot: ready: its pilot may choose OFFBOARD or GUIDED")
+        {
             self.chooses = false;
             self.mavsdk.order("mode offboard");
         }
@@ -72,7 +75,7 @@ impl Three {
         self.fleet.of_drone(drone).any(|line| line.text == text)
     }
 
-    /// Returns the first drone's target, where it then is, and the others' positions.
+    /// Returns the target of the first drone as its position, and the positions of the other drones.
     fn places(&self) -> Option<[Placement; 3]> {
         let first = axis().place(self.mavsdk.target()?)?;
         let [second, third] = self.others.each_ref().map(|vehicle| vehicle.place);
@@ -120,7 +123,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
     });
     three.mavsdk.order("px4");
     three.until("autopilots found", |three| {
-        three.has_logged(1, "autopilot: found, Px4")
+        three.has_logged(1, "autopilot: found, PX4")
             && [2, 3]
                 .iter()
                 .all(|drone| three.has_logged(*drone, "autopilot: found, ArduCopter"))

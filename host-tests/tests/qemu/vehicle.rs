@@ -40,7 +40,7 @@ const PERIODS: [(u32, u64); 4] = [
 
 /// Received target, with its time, ms.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Told {
+pub(crate) struct SentTarget {
     pub(crate) at: u64,
     pub(crate) place: Placement,
 }
@@ -66,7 +66,7 @@ pub(crate) struct Vehicle {
     pub(crate) place: Placement,
     /// Requested messages.
     pub(crate) asked: BTreeSet<u32>,
-    pub(crate) told: Vec<Told>,
+    pub(crate) told: Vec<SentTarget>,
     pub(crate) texts: Vec<String>,
     pub(crate) heartbeats: u32,
 }
@@ -337,7 +337,7 @@ impl Vehicle {
         };
         let place = self.axis.place(point).unwrap();
         let at = self.now();
-        self.told.push(Told { at, place });
+        self.told.push(SentTarget { at, place });
         if self.is_handed_over(at) {
             self.goal = Some((place, point));
         }

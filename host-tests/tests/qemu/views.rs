@@ -63,7 +63,10 @@ fn two_that_remember_a_view_without_them_do_not_fly_it() {
     let kept: Vec<Vec<Kept>> = blocks.iter().map(|block| flash(block, &said)).collect();
     let mut fleet = Fleet::with_flash(Image::Radio, &blocks, &kept, Faults::default(), 1);
     fleet.wait("a quorum that is missed", |lines| {
-        lines.iter().any(|line| line.text == "event NoQuorum")
+        lines.iter().any(|line| {
+            line.text
+                == "no quorum: bring the missing relays into range, or land the reachable ones"
+        })
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
     drop(fleet);

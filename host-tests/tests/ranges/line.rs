@@ -1,10 +1,10 @@
 //! Chain on lossless links, with checks that must hold for any inputs.
 
 use host_tests::bench::Bench;
-use uav_relay::sensing::belief::Belief;
+use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Event, Identity, Instant, Mission, Phase, Placement, Relay, Settings};
 
-/// Starts all relays of `mission` with the settings of each index from 1. `None` where they are refused.
+/// Starts the relays of `mission` with settings by index, from 1. `None` if a relay refuses its settings.
 pub(crate) fn line(
     mission: Mission,
     now: Instant,
@@ -58,7 +58,9 @@ pub(crate) fn check(line: &Bench) {
             numbers.into_iter().flatten().all(f32::is_finite),
             "{numbers:?}"
         );
-        if let Belief::Source { source, receiver_w } = relay.belief().belief {
+        if let InterferenceEstimate::Source { source, receiver_w } =
+            relay.interference_estimate().estimate
+        {
             assert!(
                 source.is_valid() && receiver_w.is_finite(),
                 "{source:?} {receiver_w}"

@@ -40,7 +40,7 @@ fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     }
 }
 
-/// Measures random powers for a minute at all nodes, and then those of a 1 W source at 300 m.
+/// Measures random powers for a minute at all nodes, and then the powers of a 1 W source at 300 m.
 fn fly(seed: u64, mission: Mission, settings: Settings) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some(mut line) = line(mission, Instant::ZERO, |_| settings) else {

@@ -21,7 +21,7 @@ fn close_all(got: &[f64], want: &[f64], rtol: f64, what: &str) {
     }
 }
 
-/// Returns the cases of one function, of which there must be some.
+/// Returns the cases of `function`; at least one case must exist.
 fn of(function: &str) -> Vec<Case> {
     let found = cases::of(function).unwrap();
     assert!(!found.is_empty(), "no case of {function}");

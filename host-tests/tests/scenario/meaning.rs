@@ -165,7 +165,7 @@ fn the_obstructed_loss_is_the_larger() {
         Problem::OutOfRange,
         &[
             "channel.excess_loss_nlos_db = 8.5",
-            "9 (excess_loss_los_db) to 200 dB",
+            "9 dB (the value of excess_loss_los_db) to 200 dB",
         ],
     );
     // The given key is reported, not the default that it contradicts.

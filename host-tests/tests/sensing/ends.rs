@@ -1,7 +1,7 @@
 //! Measurements of the transmitter and the receiver, sent over the air: `Ground::measured`.
 
 use rayon::prelude::*;
-use uav_relay::sensing::belief::Belief;
+use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Instant, Interference, Wiring};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
@@ -42,8 +42,10 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
 
 /// Returns the first relay's estimate of the power at the receiver, W.
 fn heard_at_rx(outcome: &Outcome) -> Option<f64> {
-    match outcome.relays.first()?.believed.belief {
-        Belief::Source { receiver_w, .. } if receiver_w > 0.0 => Some(f64::from(receiver_w)),
+    match outcome.relays.first()?.believed.estimate {
+        InterferenceEstimate::Source { receiver_w, .. } if receiver_w > 0.0 => {
+            Some(f64::from(receiver_w))
+        }
         _ => None,
     }
 }

@@ -54,7 +54,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
             let told: Vec<_> = outcome.relays.iter().map(|relay| relay.believed).collect();
             assert!(told.iter().all(|one| one.number > 0));
             // A held position belongs to the current estimate; the last estimate may still be in transit.
-            let bits = |one: &uav_relay::sensing::belief::Told| format!("{one:?}");
+            let bits = |one: &uav_relay::sensing::estimate::NumberedEstimate| format!("{one:?}");
             let alike = told.iter().all(|one| {
                 let same = |other: &&_| bits(one) == bits(other);
                 let numbered = told.iter().filter(|other| other.number == one.number);

@@ -8,7 +8,7 @@ use crate::pipe::{End, IoEnd, NbEnd, Trouble};
 
 pub(crate) const BAUD: u32 = 115_200;
 
-/// Time of a byte at [`BAUD`].
+/// Transmission time of one byte at [`BAUD`].
 pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
 /// Creates relay `index` of `relays` in the paper's scenario.

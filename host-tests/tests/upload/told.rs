@@ -56,7 +56,7 @@ fn the_ground_says_flown_only_once_every_relay_flies_it() {
                         was_partial = true;
                         false
                     }
-                    Progress::Offering | Progress::Held { .. } => false,
+                    Progress::Offering | Progress::Stored { .. } => false,
                     other => panic!("round {round}: {other:?}"),
                 }
             });

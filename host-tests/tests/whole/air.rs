@@ -56,7 +56,7 @@ pub(crate) enum Deed {
     Loss(f64),
     /// A mission is uploaded to the relay.
     Upload(usize, Box<Upload>),
-    /// The relay's clock steps by so many µs, but not below 0.
+    /// The relay's clock steps by this many µs, but not below 0: relay, step.
     Step(usize, i64),
 }
 

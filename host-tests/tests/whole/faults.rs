@@ -142,7 +142,7 @@ fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     assert!(below == 0 && median > 0.99, "{all:?}");
 }
 
-/// Checks four relays of which relay 2 is loaded with another mission.
+/// Checks that a relay reports a neighbour with another mission once a minute.
 #[test]
 fn a_relay_of_another_mission_is_told_of_once_a_minute() {
     for wiring in [Wiring::Pair, Wiring::Shared] {

@@ -169,7 +169,7 @@ fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
     }
 }
 
-/// Returns a schedule in which one relay neither receives nor is received for so long.
+/// Returns a schedule in which one relay neither sends nor receives frames for the given time.
 fn one_alone(relays: u16, alone: usize, minutes: u64) -> Schedule {
     let mut schedule = Schedule::of(relays, 1);
     schedule.cut(|at| at == alone, 60 * SECOND, (60 + 60 * minutes) * SECOND);

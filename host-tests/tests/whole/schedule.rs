@@ -132,7 +132,7 @@ pub(crate) fn random(seed: u64) -> Schedule {
     schedule
 }
 
-/// Draws a schedule of all faults but clock steps.
+/// Draws a schedule of faults of every kind except clock steps.
 pub(crate) fn without_steps(seed: u64) -> Schedule {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let count = relays(rng);

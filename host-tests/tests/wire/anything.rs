@@ -49,7 +49,7 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
     })
 }
 
-/// Changes a message so that it is plausible in this mission.
+/// Returns `said` with fields changed to values that are plausible in the test's mission.
 fn tamed(said: &Said) -> Said {
     let within = |numbers: Vec<f32>| numbers.into_iter().map(|number| number % 1000.0);
     match said.name() {
@@ -108,7 +108,7 @@ struct Step {
     tame: bool,
     /// Time until the next step, ms.
     wait_ms: u64,
-    /// True if a pass is then answered.
+    /// True if the relay answers a pass in this state.
     answered: bool,
 }
 

@@ -78,7 +78,7 @@ impl Bench {
         self.sends()
     }
 
-    /// Returns the ports and messages that the relay sends now, without claims.
+    /// Returns the messages that the relay sends at the bench's time, with their ports, without claims.
     pub(crate) fn sends(&mut self) -> Vec<(Port, Said)> {
         let mut out = self.sends_with_claims();
         out.retain(|(_, said)| !said.is("Claim"));

@@ -5,7 +5,7 @@ use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::optimiser::pass::Verdict;
 use uav_relay::place::{CrossSection, Station};
-use uav_relay::sensing::belief::{Belief, Spread, Told};
+use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{
     AdjustStep, Answer, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal,
@@ -190,7 +190,7 @@ fn sweep(name: &str, of: &Of<'_>) -> Sweep {
         // The anchor is negative in a plain pass.
         ladder: ladder.plainly(anchor < 0.0),
         relay: Station {
-            at: CrossSection {
+            cross_section: CrossSection {
                 y_m: if chosen { of.real("y_m") } else { 0.0 },
                 altitude_m: of.real("altitude_m"),
             },
@@ -339,12 +339,12 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
     let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {
         panic!("{message:?}");
     };
-    let belief = match of.byte("estimate") {
-        0 => Belief::Mission,
-        1 => Belief::Unknown(Spread::Even),
-        2 => Belief::Unknown(Spread::TowardTx),
-        3 => Belief::Unknown(Spread::TowardRx),
-        _ => Belief::Source {
+    let estimate = match of.byte("estimate") {
+        0 => InterferenceEstimate::Mission,
+        1 => InterferenceEstimate::Unknown(Spread::Even),
+        2 => InterferenceEstimate::Unknown(Spread::TowardTx),
+        3 => InterferenceEstimate::Unknown(Spread::TowardRx),
+        _ => InterferenceEstimate::Source {
             source: Interferer {
                 power_w: of.real("source_power_w"),
                 x_m: of.real("source_x_m"),
@@ -367,7 +367,7 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
     assert_eq!(*number, of.word("number"));
     assert_eq!(*mission, of.word("view_digest"));
     let number = of.word("estimate_number");
-    assert_eq!(*told, Told { number, belief });
+    assert_eq!(*told, NumberedEstimate { number, estimate });
     // Only this shows that the sums are in order.
     assert_eq!(
         format!("{sums:?}"),

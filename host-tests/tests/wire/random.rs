@@ -66,7 +66,7 @@ proptest! {
     }
 }
 
-/// Checks one body: decoded as its fields mean, or refused for the reason that the tables give.
+/// Checks that a body is decoded to the meaning of its fields, or refused for the reason in the tables.
 fn is_judged_by_the_tables(body: &[u8]) {
     let read = Message::decode(body);
     match Said::read(body) {
@@ -178,7 +178,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
     }
 }
 
-/// Checks that a chosen position on the line differs from a given one, and excludes measured values.
+/// Checks that a sweep with a solved position on the line is an Aside, without measured values.
 #[test]
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {
@@ -186,7 +186,7 @@ fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
         view_digest: 2,
         ladder: Ladder::single(1.5),
         relay: Station {
-            at: CrossSection::on_line(20.0),
+            cross_section: CrossSection::on_line(20.0),
             power_w: 1.0,
         },
         chosen,

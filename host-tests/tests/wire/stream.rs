@@ -23,6 +23,21 @@ fn deframed(stream: &[u8]) -> Vec<Outcome> {
             out.push(outcome.map(<[u8]>::to_vec));
         }
     }
+    assert_eq!(deframed_in_runs(stream), out, "the same in runs");
+    out
+}
+
+/// Returns the deframer's results for a stream that it decodes in runs.
+fn deframed_in_runs(stream: &[u8]) -> Vec<Outcome> {
+    let mut deframer = Deframer::new();
+    let mut out = Vec::new();
+    let mut rest = stream;
+    while let Some((&byte, after)) = deframer.push_run(rest).split_first() {
+        rest = after;
+        if let Some(outcome) = deframer.push(byte) {
+            out.push(outcome.map(<[u8]>::to_vec));
+        }
+    }
     out
 }
 

@@ -78,7 +78,7 @@ fn passes_have_the_digest_of_their_view() {
     }
 }
 
-/// Checks passes of another view from a neighbour with equal mission: the relay requests a new view.
+/// Checks that a relay requests a new view after a pass of another view of the same mission.
 #[test]
 fn a_pass_of_another_view_has_the_relay_ask_for_one() {
     let (mut bench, own) = in_view(id(2, 1));
@@ -182,7 +182,7 @@ fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
     }
 }
 
-/// Checks lease renewals: the next one grants the lease, and its expiry causes a view request.
+/// Checks that the second renewal grants the lease, and that the lease's expiry causes a view request.
 #[test]
 fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     let (mut bench, own) = agreed_in_view(id(3, 2));

@@ -27,7 +27,7 @@ pub(crate) fn mark(view: u32) -> u16 {
 /// Time for which a booted relay may be relied on, in tenths of a second: `dead_after`.
 pub(crate) const RELIED: u16 = 150;
 
-/// Returns the proposal of `view` forwarded at `place`, with votes of all booted relays up to there.
+/// Returns the proposal of `view` forwarded at `place`, with the votes of booted relays up to `place`.
 pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, relays: u16) -> Said {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
@@ -44,7 +44,7 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Sai
     refused(view, of, place, relays).with(changes)
 }
 
-/// Returns the decision that `there` of eight relays are too few.
+/// Returns the decision that refuses a view because only `there` of eight relays have voted.
 pub(crate) fn refused(view: u32, (mission, version): (u16, u16), place: u16, there: u16) -> Said {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,

@@ -12,7 +12,7 @@ use uav_relay_block::ADDRESS;
 /// A supported board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Board {
-    /// Name, as accepted by `--board`.
+    /// Name of the board, as given by `--board`.
     pub name: &'static str,
     /// Rust target triple.
     pub target: &'static str,

@@ -217,7 +217,7 @@ const BEGUN_S: u32 = 60;
 pub struct MovingShares {
     /// Ratios of the chain that tracks the interferer.
     pub followed: Vec<f64>,
-    /// Ratios of the chain that keeps its first optimal positions.
+    /// SIR of a chain that keeps its first optimal positions, relative to the current optimum.
     pub stayed: Vec<f64>,
 }
 
@@ -277,7 +277,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     }
 }
 
-/// Returns the arithmetic mean; NaN if empty.
+/// Returns the arithmetic mean of `shares`; NaN if there are no shares.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

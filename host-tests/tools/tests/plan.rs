@@ -428,7 +428,7 @@ fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     std::fs::write(&file, wrong).unwrap();
     let name = file.path().to_str().unwrap();
     let (status, line) = refusal(&format!("--uavs 1 --scenario {name}"));
-    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is no port";
+    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is above 65535";
     assert!(status == 2 && line.contains(named), "{line}");
 }
 
@@ -442,7 +442,7 @@ fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
         report["error"]
             .as_str()
             .unwrap()
-            .contains("gives every hop an SIR of 60 dB: the most is 20.980 dB, with "),
+            .contains("gives every hop an SIR of 60 dB: the highest SIR is 20.980 dB, with "),
         "{report}"
     );
     // The reported maximum can be met, and nothing above it.
@@ -610,7 +610,7 @@ fn what_is_not_there_is_not_planned() {
     let (status, line) = refusal("--uavs 300");
     assert_eq!(status, 1);
     assert!(
-        line.starts_with("no placement: 300 relays that stay 4 m apart need 1196 m, and there are 1000 m from Tx to Rx: fewer relays, or geometry.min_separation_m and geometry.distance_m of a --scenario FILE"),
+        line.starts_with("no placement: 300 relays that stay 4 m apart need 1196 m, but Tx and Rx are 1000 m apart: use fewer relays, or change geometry.min_separation_m or geometry.distance_m in a --scenario FILE"),
         "{line}"
     );
 }
@@ -639,10 +639,10 @@ fn maps_are_written_where_there_is_an_earth() {
 fn what_is_asked_in_decibels_is_answered_in_decibels() {
     let (status, line) = refusal("--target-sir-db 60");
     assert_eq!(status, 1);
-    assert!(line.starts_with("no number of relays, up to 1000, gives every hop an SIR of 60 dB: the most is 20.980 dB, with "), "{line}");
+    assert!(line.starts_with("no number of relays, up to 1000, gives every hop an SIR of 60 dB: the highest SIR is 20.980 dB, with "), "{line}");
     let (_, line) = refusal("--target-sir 1000");
     assert!(
-        line.contains("an SIR of 1000: the most is 125.31"),
+        line.contains("an SIR of 1000: the highest SIR is 125.31"),
         "{line}"
     );
     let (_, line) = refusal(&format!(
@@ -650,7 +650,7 @@ fn what_is_asked_in_decibels_is_answered_in_decibels() {
         example("multi_interferer.toml")
     ));
     assert!(
-        line.contains("an SIR of 60 dB: the most found is ") && line.contains(" dB"),
+        line.contains("an SIR of 60 dB: the highest SIR found is ") && line.contains(" dB"),
         "{line}"
     );
 
@@ -784,7 +784,7 @@ fn a_map_has_rounded_numbers_with_units_in_their_names() {
     assert!(numbers > 20, "{text}");
 }
 
-/// Returns the paper's scenario with extra lines in `[power]`.
+/// Returns the paper's scenario followed by the lines or tables of `sections`.
 fn with(sections: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let text = std::fs::read_to_string(example("scenario.toml")).unwrap();

@@ -15,7 +15,7 @@ pub struct Function {
     pub frame: u64,
     /// Addresses of functions that it calls or jumps to.
     pub calls: BTreeSet<u64>,
-    /// True if it calls through a pointer.
+    /// True if the function calls through a pointer.
     pub indirect: bool,
 }
 

@@ -8,7 +8,7 @@
 //! /s, and by more while it accelerates. The carrot is therefore slower than allowed by that much, and the drone stays within the
 //! allowed speed.
 
-use crate::flight::autopilot::vehicle::Kind;
+use crate::flight::autopilot::state::Kind;
 use crate::flight::axis::Axis;
 use crate::geodetic::Geodetic;
 use crate::place::Placement;
@@ -17,8 +17,10 @@ use crate::time::{Duration, Instant};
 /// Distance from the setpoint below which the carrot has arrived, m.
 const THERE_M: f32 = 0.01;
 
-/// Deceleration rate near the setpoint, 1/s, and the minimum speed there, m/s.
+/// Speed per remaining distance near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
+
+/// Minimum speed near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
 /// Rate at which autopilots catch up with a target, 1/s.
@@ -147,7 +149,7 @@ pub(super) struct Carrot {
     pub(super) place: Placement,
     /// Velocity along x, y and up, m/s.
     pub(super) velocity_m_s: [f32; 3],
-    stands: bool,
+    is_standing: bool,
     moved_at: Instant,
 }
 
@@ -157,14 +159,14 @@ impl Carrot {
         Self {
             place,
             velocity_m_s: [0.0; 3],
-            stands: true,
+            is_standing: true,
             moved_at: now,
         }
     }
 
-    /// Returns true if the target stands still.
-    pub(super) const fn stands(&self) -> bool {
-        self.stands
+    /// Returns true if the target does not move.
+    pub(super) const fn is_standing(&self) -> bool {
+        self.is_standing
     }
 
     /// Returns the position `ago` before the last step, extrapolated by the velocity.
@@ -184,7 +186,7 @@ impl Carrot {
         let left = length(to);
         let speed = length(self.velocity_m_s);
         let needs = pace.stopping_m(speed);
-        if self.stands || left <= THERE_M || dot(self.velocity_m_s, to) <= 0.0 {
+        if self.is_standing || left <= THERE_M || dot(self.velocity_m_s, to) <= 0.0 {
             return self.place;
         }
         let part = (needs / left).min(1.0);
@@ -246,7 +248,7 @@ impl Carrot {
             *self = Self::at(setpoint, now);
             return;
         }
-        self.stands = false;
+        self.is_standing = false;
         let velocity = |ahead: f32, aside: f32| ahead * speed + aside * keeps;
         let [x, y, up] = [
             velocity(ahead[0], aside[0]),
@@ -293,7 +295,7 @@ const AGAIN: Duration = Duration::from_millis(1_000);
 /// Consecutive reports of another target before an event is raised. An ArduCopter reports its target twice a second; the target
 /// must also have been sent for as long.
 const REFUSED_AFTER: u8 = 6;
-const TOLD_FOR: Duration = Duration::from_millis(3_000);
+const SENT_FOR: Duration = Duration::from_millis(3_000);
 
 /// Tolerance between the reported target of an ArduCopter and the carrot. Standing: 1e-7 degrees; moving: m, and s at the carrot's
 /// speed.
@@ -310,7 +312,7 @@ pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
     /// Number of times that the final position has been sent.
-    told: u8,
+    times_sent: u8,
     /// True once the autopilot has reported this target.
     is_taken: bool,
     /// Time since which targets are sent.
@@ -327,7 +329,7 @@ impl Target {
         Self {
             carrot: Carrot::at(place, now),
             due: now,
-            told: 0,
+            times_sent: 0,
             is_taken: false,
             since: now,
             elsewhere: 0,
@@ -338,7 +340,7 @@ impl Target {
     /// Restarts the counts after a change of the final position, which has not been sent.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
-        self.told = 0;
+        self.times_sent = 0;
         self.is_taken = false;
     }
 
@@ -352,7 +354,7 @@ impl Target {
         };
         let near = |a: i32, b: i32| a.abs_diff(b) <= TAKEN_WITHIN;
         let is_there = near(point.lat_e7, lat_e7) && near(point.lon_e7, lon_e7);
-        if self.told > 0 {
+        if self.times_sent > 0 {
             self.is_taken = is_there;
         }
         let amsl_mm = point.amsl_mm;
@@ -368,11 +370,11 @@ impl Target {
             off(said.x_m, self.carrot.place.x_m) && off(said.y_m, self.carrot.place.y_m)
         });
         // A standing target is reported exactly, or not at all.
-        if is_there || is_near && self.told == 0 {
+        if is_there || is_near && self.times_sent == 0 {
             self.elsewhere = 0;
             return false;
         }
-        if now.since(self.since) < TOLD_FOR {
+        if now.since(self.since) < SENT_FOR {
             return false;
         }
         let before = self.elsewhere;
@@ -381,27 +383,27 @@ impl Target {
     }
 
     /// Records that the drone's own position was sent as the target.
-    pub(super) fn tell_own_place(&mut self, now: Instant) {
+    pub(super) fn on_own_place_sent(&mut self, now: Instant) {
         self.due = now + STANDING;
     }
 
-    /// Returns true if the due target has to be sent now. The next time depends on whether it stands.
-    pub(super) fn tell(&mut self, now: Instant, kind: Kind) -> bool {
-        let stands = self.carrot.stands();
+    /// Returns true if the due target has to be sent at `now`, and schedules the next target.
+    pub(super) fn should_send(&mut self, now: Instant, kind: Kind) -> bool {
+        let is_standing = self.carrot.is_standing();
         self.due = now
             + match kind {
-                _ if !stands => MOVING,
+                _ if !is_standing => MOVING,
                 Kind::Px4 => STANDING,
                 Kind::ArduCopter => AGAIN,
             };
-        let is_known = self.is_taken || !self.is_said && self.told >= UNCONFIRMED;
-        let is_told = !stands || kind == Kind::Px4 || !is_known;
-        if !stands {
-            (self.told, self.is_taken) = (0, false);
-        } else if is_told && kind == Kind::ArduCopter {
-            self.told = self.told.saturating_add(1);
+        let is_known = self.is_taken || !self.is_said && self.times_sent >= UNCONFIRMED;
+        let is_sent = !is_standing || kind == Kind::Px4 || !is_known;
+        if !is_standing {
+            (self.times_sent, self.is_taken) = (0, false);
+        } else if is_sent && kind == Kind::ArduCopter {
+            self.times_sent = self.times_sent.saturating_add(1);
         }
-        is_told
+        is_sent
     }
 }
 
@@ -424,7 +426,7 @@ mod tests {
             carrot.advance(Instant::from_millis(100 * i), to, pace, None);
             way.push((carrot.place, length(carrot.velocity_m_s)))
                 .expect("room");
-            if carrot.stands() {
+            if carrot.is_standing() {
                 break;
             }
         }
@@ -526,7 +528,7 @@ mod tests {
                 assert!(carrot.place.x_m <= stop.x_m);
                 before = speed;
             }
-            assert!(carrot.stands(), "{after}");
+            assert!(carrot.is_standing(), "{after}");
         }
     }
 
@@ -577,7 +579,7 @@ mod tests {
                     turned = Some(i);
                 }
             }
-            assert!(carrot.stands(), "({x_m}, {y_m}): {carrot:?}");
+            assert!(carrot.is_standing(), "({x_m}, {y_m}): {carrot:?}");
             assert_eq!(carrot.place, to);
             // It stops from 4.8 m/s within 5.8 m.
             assert!(

@@ -2,8 +2,7 @@
 
 use super::carrot::Target;
 use super::report::{AutopilotEvent, Events};
-use super::state::{FlightMode, Release, ReleaseCause, WaitReason};
-use super::vehicle::Kind;
+use super::state::{FlightMode, Kind, Release, ReleaseCause, WaitReason};
 use super::vehicle::millis;
 use super::vehicle::{Astray, OffLine};
 use crate::event::Event;
@@ -92,7 +91,7 @@ pub struct Autopilot {
     release: Option<(Release, Instant)>,
     /// Reason for which the drone cannot be engaged, and its start. Then the last reported reason, and its time.
     wait: (Option<WaitReason>, Instant),
-    told_wait: Option<(Option<WaitReason>, Instant)>,
+    reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// False while the relay must not be engaged.
     ready: bool,
     /// Reasons of the guard that were reported to the operator, upstream and downstream.
@@ -135,7 +134,7 @@ impl Autopilot {
             recovery: RECOVERY,
             release: None,
             wait: (None, now),
-            told_wait: None,
+            reported_wait: None,
             ready: true,
             hold: [None; 2],
             newest_hold: ([None; 2], now),
@@ -481,7 +480,7 @@ impl Autopilot {
         let is_px4 = vehicle.kind() == Some(Kind::Px4);
         if is_px4 && vehicle.is_critical() {
             Some(WaitReason::Failsafe)
-        } else if vehicle.is_late(now) && vehicle.is_told() {
+        } else if vehicle.is_late(now) && vehicle.has_time_stamp() {
             Some(WaitReason::Link)
         } else if vehicle.is_granted() && !vehicle.is_chosen() {
             Some(WaitReason::Found)
@@ -499,7 +498,7 @@ impl Autopilot {
     /// Reports the reason for which the drone cannot be engaged, once it has lasted for a moment.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
-            self.told_wait = None;
+            self.reported_wait = None;
             self.wait = (None, now);
             return;
         }
@@ -507,10 +506,10 @@ impl Autopilot {
         if self.wait.0 != reason {
             self.wait = (reason, now);
         }
-        if self.wait_told_at().is_none_or(|at| at > now) {
+        if self.wait_report_due().is_none_or(|at| at > now) {
             return;
         }
-        self.told_wait = Some((reason, now));
+        self.reported_wait = Some((reason, now));
         let (event, line) = match reason {
             Some(reason) => (
                 AutopilotEvent::Waits(reason),
@@ -526,15 +525,15 @@ impl Autopilot {
     }
 
     /// Returns the time at which the reason to wait is reported; `None` if it has been.
-    fn wait_told_at(&self) -> Option<Instant> {
+    fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
             return None;
         }
         let settled = since + SETTLED;
-        match self.told_wait {
+        match self.reported_wait {
             None => Some(settled),
-            Some((told, _)) if told == reason => None,
+            Some((reported, _)) if reported == reason => None,
             Some((_, at)) => Some(settled.max(at + NEXT_REASON)),
         }
     }
@@ -613,9 +612,9 @@ impl Autopilot {
             let is_streamed = self.ready && self.vehicle.is_chosen();
             self.target = self.at_own_place(now).filter(|_| is_streamed);
             let target = self.target.as_mut()?;
-            target.tell_own_place(now);
+            target.on_own_place_sent(now);
             let carrot = target.carrot;
-            return self.told(now, &carrot);
+            return self.target_frame(now, &carrot);
         }
         let mut target = self.target.filter(|target| target.due <= now)?;
         match (self.state, self.setpoint.or(self.stop)) {
@@ -629,19 +628,20 @@ impl Autopilot {
             }
             _ => return None,
         }
-        let is_told = target.tell(now, kind);
+        let is_sent = target.should_send(now, kind);
         self.target = Some(target);
-        if !is_told {
+        if !is_sent {
             return None;
         }
-        self.told(now, &target.carrot)
+        self.target_frame(now, &target.carrot)
     }
 
     /// Returns the frame that sets the autopilot's target.
-    fn told(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
+    fn target_frame(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;
-        let velocity_m_s = (!carrot.stands()).then(|| self.axis.to_ned(x_m, carrot.velocity_m_s));
+        let velocity_m_s =
+            (!carrot.is_standing()).then(|| self.axis.to_ned(x_m, carrot.velocity_m_s));
         let yaw_rad = self
             .look
             .map(|look| self.axis.heading_rad(x_m, look.azimuth_rad));
@@ -725,7 +725,7 @@ impl Autopilot {
         let streams = self.streams.next_timeout(now);
         let due = [target, report, self.vehicle.next_timeout(now)]
             .into_iter()
-            .chain([recovered, self.wait_told_at()])
+            .chain([recovered, self.wait_report_due()])
             .chain([self.release.map(|(_, until)| until)])
             .flatten()
             .fold(self.heartbeat_at.min(streams), Instant::min);

@@ -24,8 +24,8 @@ mod vehicle;
 
 pub use link::Autopilot;
 pub use report::{AutopilotEvent, RelayNumbers};
-pub use state::{FlightMode, Release, ReleaseCause, WaitReason};
-pub use vehicle::{Kind, OffLine, Position};
+pub use state::{FlightMode, Kind, Release, ReleaseCause, WaitReason};
+pub use vehicle::{OffLine, Position};
 
 pub use super::mavlink::frame::Address;
 pub use super::mavlink::incoming::Counters;

@@ -6,9 +6,9 @@
 use heapless::{Deque, String, Vec};
 
 use crate::event::Event;
-use crate::flight::autopilot::state::{Release, State, WaitReason};
+use crate::flight::autopilot::state::{Kind, Release, State, WaitReason};
 use crate::flight::autopilot::trust::Mistrust;
-use crate::flight::autopilot::vehicle::{Kind, OffLine};
+use crate::flight::autopilot::vehicle::OffLine;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::outgoing::{Outgoing, severity};
 use crate::guard::HoldReason;
@@ -44,7 +44,7 @@ pub(super) enum Topic {
     Downstream,
     /// Event of the relay.
     Relay,
-    /// Fence of the autopilot.
+    /// Lines about the autopilot's fence.
     Fence,
     /// Command of the operator to clear lost relays.
     Clearance,
@@ -134,8 +134,8 @@ pub(super) struct Report {
     texts: Deque<String<50>, TEXTS>,
     /// Hashes of the sent lines, and the earliest time at which each may be sent again.
     recent: Vec<(u32, Instant), RECENT>,
-    /// Newest line sent on each topic.
-    told: [Option<Line>; Topic::COUNT],
+    /// Last line sent on each topic.
+    newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
     /// Number of values sent in this round.
     sent: usize,
@@ -187,14 +187,14 @@ impl Report {
     fn next_line(&mut self, now: Instant) -> Option<(u8, String<50>)> {
         let mut at = 0;
         while let Some(line) = self.lines.get(at).copied() {
-            let told = self.told.get_mut(line.topic as usize);
-            let is_known = told.as_deref() == Some(&Some(line));
+            let newest = self.newest_sent.get_mut(line.topic as usize);
+            let is_known = newest.as_deref() == Some(&Some(line));
             let rest = self.lines.get(at + 1..).unwrap_or_default();
             let is_overtaken = rest.iter().any(|other| other.topic == line.topic);
             if self.passes(now, line.hash()) {
                 self.remove_line(at);
-                if let Some(told) = self.told.get_mut(line.topic as usize) {
-                    *told = Some(line);
+                if let Some(newest) = self.newest_sent.get_mut(line.topic as usize) {
+                    *newest = Some(line);
                 }
                 let mut text = String::new();
                 for part in line.text {
@@ -232,7 +232,7 @@ impl Report {
         }
     }
 
-    /// Returns the next number, encoded by `encode`.
+    /// Removes the next number for the operator, and returns it as encoded by `encode`.
     pub(super) fn take<T>(
         &mut self,
         now: Instant,
@@ -281,7 +281,6 @@ pub type RelayNumbers = [u16; MOST];
 
 /// An event of the link to an autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum AutopilotEvent {
     /// First message of an autopilot.

@@ -19,11 +19,8 @@
 //! mode first, and is told so. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
 //! and no message of a neighbour.
 
-use crate::flight::autopilot::vehicle::Kind;
-
 /// Control state of the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// No autopilot is received.
     #[default]
@@ -83,9 +80,31 @@ impl State {
     }
 }
 
+/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
+const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
+
+/// Kind of autopilot.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Kind {
+    /// PX4: OFFBOARD grants control, for as long as targets are streamed.
+    Px4,
+    /// ArduCopter: GUIDED grants control, and a target holds for good.
+    ArduCopter,
+}
+
+impl Kind {
+    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`.
+    pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
+        match autopilot {
+            12 => Some(Self::Px4),
+            3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),
+            _ => None,
+        }
+    }
+}
+
 /// Flight mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FlightMode {
     /// OFFBOARD or GUIDED: the relay sets the target.
@@ -131,7 +150,6 @@ impl FlightMode {
 
 /// Reason for which the relay no longer controls the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ReleaseCause {
     /// Another mode was chosen, by the pilot or by a ground station.
@@ -146,7 +164,6 @@ pub enum ReleaseCause {
 
 /// Release of control: its cause, and the present mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Release {
     /// Cause of the release.
     pub cause: ReleaseCause,
@@ -178,7 +195,6 @@ impl Release {
 
 /// Reason for which the pilot cannot engage the drone, or for which the granted mode was not used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WaitReason {
     /// The autopilot is in its failsafe. It ends when the pilot chooses a mode.

@@ -4,7 +4,7 @@
 //!
 //! One request is outstanding at a time: an answer (COMMAND_ACK) does not name the message, so it belongs to that request.
 
-use super::vehicle::Kind;
+use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 

@@ -4,8 +4,8 @@
 //! radio cannot sign. An autopilot with a key ignores unsigned frames silently, so the firmware is told of each kind of mismatch,
 //! once. A mismatch is reported after three consecutive heartbeats of an autopilot.
 
+use super::state::Kind;
 use super::vehicle::AUTOPILOT;
-use super::vehicle::Kind;
 use crate::flight::mavlink::incoming::{Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
@@ -17,7 +17,6 @@ const IN_A_ROW: u8 = 3;
 
 /// Mismatch between the signatures of an autopilot and of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Mistrust {
     /// Signed autopilot, link without a key, no request answered. The autopilot seems to ignore unsigned frames.

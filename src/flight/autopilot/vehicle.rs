@@ -1,8 +1,7 @@
 //! State of the autopilot as received. It has the kind, reports and clock, the delay of the link, the drone's position, and the
 //! noise that a SiK radio measures.
 
-use super::state::FlightMode;
-use crate::flight::autopilot::state::Observed;
+use super::state::{FlightMode, Kind, Observed};
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::{Incoming, Received, noise_w};
@@ -15,7 +14,7 @@ use crate::time::{Duration, Instant};
 /// Silence after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Maximum age of a position that is used.
+/// Maximum age of the last position off the line.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
 /// Silence of the link that may have caused a failsafe of a PX4. A PX4 enters its failsafe after a second without a target, and a
@@ -98,7 +97,7 @@ pub(super) struct Vehicle {
     clock: RemoteClock,
     pub(super) echo: Echo,
     /// Measurement time of the last position, near the line or not.
-    told_at: Option<Instant>,
+    measured_at: Option<Instant>,
     position: Option<Position>,
 }
 
@@ -186,7 +185,7 @@ impl Vehicle {
                     Instant::from_micros(at.as_micros().saturating_sub(MEASURED.as_micros()))
                 });
                 let at = at.max(floor.unwrap_or(at)).min(now);
-                self.told_at = Some(at);
+                self.measured_at = Some(at);
                 if self.kind() == Some(Kind::Px4) {
                     self.chosen &= now.since(at) < STALE;
                 }
@@ -261,12 +260,12 @@ impl Vehicle {
 
     /// Returns true if messages of the autopilot may be older than they seem.
     pub(super) fn is_late(&self, now: Instant) -> bool {
-        self.echo.is_late(now) || self.told_at.is_none_or(|at| now.since(at) >= STALE)
+        self.echo.is_late(now) || self.measured_at.is_none_or(|at| now.since(at) >= STALE)
     }
 
     /// Returns true once a time stamp of the autopilot was received.
-    pub(super) const fn is_told(&self) -> bool {
-        self.told_at.is_some()
+    pub(super) const fn has_time_stamp(&self) -> bool {
+        self.measured_at.is_some()
     }
 
     /// Returns true while the autopilot is in a failsafe.
@@ -293,7 +292,7 @@ impl Vehicle {
         self.chosen = false;
         self.is_breached = false;
         self.echo.restart();
-        self.told_at = None;
+        self.measured_at = None;
         self.armed = false;
         self.in_air = false;
         self.position = None;
@@ -315,7 +314,7 @@ impl Vehicle {
         self.known.map(|(_, kind)| kind)
     }
 
-    /// Returns the drone's position if it is known and recent.
+    /// Returns the drone's last position, `None` if it is unknown or too old.
     pub(super) fn position(&self, now: Instant) -> Option<Position> {
         self.position
             .filter(|position| now.since(position.at) < STALE && !self.echo.is_late(now))
@@ -342,8 +341,8 @@ impl Vehicle {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
         let stale = self.position.map(|position| position.at + STALE);
-        let told = self.told_at.map(|at| at + STALE);
-        let all = [silent, gap, stale, told].into_iter().flatten();
+        let position_stale = self.measured_at.map(|at| at + STALE);
+        let all = [silent, gap, stale, position_stale].into_iter().flatten();
         all.chain(self.echo.next_timeout(now))
             .filter(|at| *at > now)
             .min()
@@ -372,30 +371,6 @@ impl RadioNoise {
     pub(super) fn take(&mut self) -> Option<Sample> {
         let (at, power_w) = self.0.take()?;
         Some(Sample::Heard { at, power_w })
-    }
-}
-
-/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
-const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
-
-/// Kind of autopilot.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Kind {
-    /// PX4: OFFBOARD grants control, for as long as targets are streamed.
-    Px4,
-    /// ArduCopter: GUIDED grants control, and a target holds for good.
-    ArduCopter,
-}
-
-impl Kind {
-    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`.
-    pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
-        match autopilot {
-            12 => Some(Self::Px4),
-            3 if COPTERS.contains(&vehicle) => Some(Self::ArduCopter),
-            _ => None,
-        }
     }
 }
 
@@ -484,7 +459,7 @@ impl Echo {
         self.asked_at
     }
 
-    /// Returns true while messages may be too old to rely on.
+    /// Returns true while the autopilot's messages may be older than `LATE`.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         match (self.asked_at, self.begun_at) {
             (Some(at), _) => now.since(at) >= LATE,
@@ -624,29 +599,29 @@ impl OffLine {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Astray {
     newest: Option<(Instant, Geodetic)>,
-    told_at: Option<Instant>,
-    /// True once it was reported on the ground.
-    told_on_ground: bool,
+    reported_at: Option<Instant>,
+    /// True once the position off the line was reported while the drone was on the ground.
+    reported_on_ground: bool,
 }
 
 impl Astray {
     /// Records a position off the line; returns true if it has to be reported.
     pub(super) fn hear(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
-        let is_wanted = is_in_air || !self.told_on_ground;
-        let is_due = self.told_at.is_none_or(|told| now.since(told) >= AGAIN);
+        let is_wanted = is_in_air || !self.reported_on_ground;
+        let is_due = self.reported_at.is_none_or(|at| now.since(at) >= AGAIN);
         if !is_wanted || !is_due {
             return false;
         }
-        self.told_at = Some(now);
-        self.told_on_ground |= !is_in_air;
+        self.reported_at = Some(now);
+        self.reported_on_ground |= !is_in_air;
         true
     }
 
     /// Records a position near the line.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
-        self.told_on_ground = false;
+        self.reported_on_ground = false;
     }
 
     /// Returns the newest position if it was off the line.

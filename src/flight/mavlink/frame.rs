@@ -73,7 +73,7 @@ pub mod id {
     pub const HEARTBEAT: u32 = 0;
     /// Position of the vehicle.
     pub const GLOBAL_POSITION_INT: u32 = 33;
-    /// Command with seven parameters.
+    /// Message COMMAND_LONG: a command with seven parameters.
     pub const COMMAND_LONG: u32 = 76;
     /// Reply to a command.
     pub const COMMAND_ACK: u32 = 77;
@@ -83,7 +83,7 @@ pub mod id {
     pub const SET_POSITION_TARGET_GLOBAL_INT: u32 = 86;
     /// Current target of the vehicle.
     pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
-    /// Signal and noise level of a radio.
+    /// Message RADIO_STATUS: signal and noise level of a radio.
     pub const RADIO_STATUS: u32 = 109;
     /// Clock value that is sent back.
     pub const TIMESYNC: u32 = 111;

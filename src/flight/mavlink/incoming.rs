@@ -55,7 +55,7 @@ const _: () = assert!(MAX_PAYLOAD <= u8::MAX as usize, "what a length says");
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Incoming {
-    /// HEARTBEAT.
+    /// HEARTBEAT: the sender's type, mode and status.
     Heartbeat {
         /// `MAV_TYPE`.
         kind: u8,
@@ -144,7 +144,7 @@ pub enum Incoming {
 }
 
 impl Incoming {
-    /// Decodes a payload; `None` for a message that a companion does not use.
+    /// Decodes the payload of message `id`; `None` for a message that a companion does not use.
     pub(super) fn read(id: u32, payload: Payload<'_>) -> Option<Self> {
         Some(match id {
             id::HEARTBEAT => Self::Heartbeat {
@@ -227,7 +227,7 @@ pub fn noise_w(noise: u8) -> Option<f32> {
 pub struct Received {
     /// Address of the sender.
     pub from: Address,
-    /// Content; `None` for a message that is only skipped, or that only a companion sends.
+    /// Decoded message; `None` for a kind that this crate skips, or that only companions send.
     pub message: Option<Incoming>,
     /// Message id.
     pub id: u32,

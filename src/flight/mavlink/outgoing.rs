@@ -60,7 +60,7 @@ pub enum Outgoing<'a> {
     },
     /// TIMESYNC request, which the autopilot sends back.
     TimeSync {
-        /// Value that is sent back.
+        /// Time stamp of the question, returned in the answer.
         asked: u64,
     },
     /// STATUSTEXT of at most 50 bytes; a longer text is truncated.

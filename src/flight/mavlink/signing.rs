@@ -163,7 +163,7 @@ impl Signing {
             return Err(Flaw::Unsigned);
         }
         self.advance(now);
-        let Some((covered, told)) = frame.split_last_chunk::<TAG>() else {
+        let Some((covered, tag)) = frame.split_last_chunk::<TAG>() else {
             return Err(Flaw::Key);
         };
         let Some((_, &[link, a, b, c, d, e, f])) = covered.split_last_chunk::<STAMPED>() else {
@@ -179,7 +179,7 @@ impl Signing {
             None => stamp.saturating_add(BEHIND) >= self.stamp,
         };
         // The key is checked first, since a wrong key is the more informative reason.
-        if !is_same(self.tag(covered), *told) {
+        if !is_same(self.tag(covered), *tag) {
             return Err(Flaw::Key);
         }
         if !is_new {

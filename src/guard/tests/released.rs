@@ -35,7 +35,7 @@ impl Row {
         row
     }
 
-    /// Exchanges all messages until there are none.
+    /// Exchanges messages between the relays until none is pending.
     fn talk(&mut self) {
         for _ in 0..8 {
             for k in 0..3 {
@@ -132,7 +132,7 @@ fn nobody_flies_through_a_drone_that_its_pilot_hovers_in_the_way() {
     }
 }
 
-/// A relay on its way stops before the drone, and stays there despite the noise of its reports.
+/// Checks that a moving relay stops before a drone in its way, and stays despite position noise.
 #[test]
 fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     let mut row = Row::new();
@@ -187,7 +187,7 @@ fn one_that_began_and_fell_silent_is_lost() {
     assert_eq!(reason, Some(HoldReason::Lost));
 }
 
-/// A late message from its time in the pilot's hands does not make a drone an obstacle again.
+/// Checks that a late message from a drone's manual flight does not make the drone an obstacle again.
 #[test]
 fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
     let mut row = Row::new();

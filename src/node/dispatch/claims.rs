@@ -95,7 +95,7 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the claim number if all sessions must be started again with it.
+    /// Returns the new claim number if all sessions must be restarted under that number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -121,7 +121,7 @@ impl Node {
         self.duplicate.rival(claim)
     }
 
-    /// Returns true while this relay is passive, because another one has its number.
+    /// Returns true while this relay is passive, because another node uses its number.
     pub(crate) const fn is_passive(&self) -> bool {
         self.duplicate.is_passive()
     }

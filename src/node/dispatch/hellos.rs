@@ -120,7 +120,7 @@ impl Node {
         there && (far.is_two_way(distance, now, settings) || far.joins_with(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this one. `far` is this relay's other side.
+    /// Returns the number of relays that a neighbour reaches through this relay. `far` is the opposite side.
     fn behind(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
@@ -219,7 +219,7 @@ impl Node {
         }
     }
 
-    /// Considers node `from` at `side` as the new neighbour there; one-way links are ignored.
+    /// Considers node `from` as the new neighbour on `side`; one-way links are ignored.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.beyond(side);

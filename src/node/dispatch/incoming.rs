@@ -250,7 +250,7 @@ impl Node {
         }
     }
 
-    /// Records that node `from` at `side` has the right key.
+    /// Records that node `from` at `side` signs with this relay's key.
     pub(crate) fn on_key_match(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         self.layers.neighbours.at_mut(side).on_key_match(distance);
@@ -289,7 +289,7 @@ impl Node {
         })
     }
 
-    /// Returns the side of `node` if it is a ground station that may be received here.
+    /// Returns the side of `node` if it is a ground station that this relay may receive.
     pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {
@@ -309,7 +309,7 @@ impl Node {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` at the port `through`. Received at both ports, its index is a duplicate.
+    /// Handles a frame of node `from` at port `through`: an index received at both ports is a duplicate.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

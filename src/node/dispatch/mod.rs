@@ -137,11 +137,12 @@ impl Node {
         self.telemetry.events.raise(event);
     }
 
+    #[inline(never)] // called from many places
     pub(super) fn raise_about(&mut self, about: About, side: Side, node: u16) {
         self.telemetry.events.raise_about(about, side, node);
     }
 
-    /// Applies the effects of one layer to the others, and to events and counters.
+    /// Applies the effects of one layer to the other layers, the events and the counters.
     pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
         for (happened, counter) in [
@@ -208,13 +209,13 @@ impl Node {
 
     /// Bases the active mission on the new interference estimate.
     fn apply_estimate(&mut self) {
-        let told = self.layers.round.sensing().estimate();
+        let estimate = self.layers.round.sensing().estimate();
         let Member {
             mission,
             interference,
             ..
         } = &self.member;
-        if let Ok(mission) = told.belief.mission(mission, *interference) {
+        if let Ok(mission) = estimate.estimate.mission(mission, *interference) {
             self.member.mission = mission;
             self.raise(Event::NewEstimate);
         }
@@ -274,7 +275,7 @@ impl Node {
         self.layers.view.record(self.member.digest)
     }
 
-    /// Records that `record` is stored.
+    /// Records that the firmware has stored `record`.
     pub(crate) const fn persisted(&mut self, record: &ViewRecord) {
         self.persisted = *record;
     }
@@ -331,7 +332,7 @@ impl Layers {
             member,
             latest: self.update.latest(),
             end: self.neighbours.at(onward).has_no_peer(),
-            held: self.lease.other_leases(now),
+            other_leases: self.lease.other_leases(now),
         }
     }
 

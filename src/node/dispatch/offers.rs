@@ -125,7 +125,7 @@ impl Node {
     /// Stores `upload` if it is newer. One without a valid line on earth, or beyond the geofence, is counted and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
-            Offered::Held => self.on_stored(now),
+            Offered::Stored => self.on_stored(now),
             Offered::Refused { why, is_new } => {
                 bump(&mut self.telemetry.stats.mission);
                 if is_new {

@@ -9,7 +9,7 @@ use crate::side::Side;
 use crate::time::Instant;
 
 impl Node {
-    /// Returns the agreed position, or without a quorum the one by `Settings::without_quorum`.
+    /// Returns the agreed position or, without a quorum, the position by `Settings::without_quorum`.
     fn wanted_place(&self) -> Option<Placement> {
         let agreed = self.layers.round.agreed_place()?;
         Some(if self.layers.view.has_no_quorum() {

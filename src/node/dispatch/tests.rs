@@ -276,7 +276,7 @@ fn an_offer_for_other_relays_is_refused() {
     );
 }
 
-/// Offers and hellos between two nodes must end if only one has selected the other as its neighbour.
+/// Checks that offers and hellos between two nodes end if only one node has selected the other one.
 #[test]
 fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();

@@ -94,7 +94,7 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Requests a new view if the neighbours differ from those of the last decision.
+    /// Requests a new view if the neighbours have changed since the last decision on a view.
     pub(super) fn review_neighbours(&mut self, now: Instant) {
         if self.layers.neighbours.have_changed(now) {
             self.layers.view.request.start(now);

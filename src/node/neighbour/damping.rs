@@ -89,6 +89,7 @@ impl Link {
     }
 
     /// Number of losses that are not forgotten yet.
+    #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
             0
@@ -107,7 +108,7 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss after `losses` earlier ones. `counted` is true if the new loss is added to them.
+    /// Records a loss after `losses` earlier losses. The number of losses grows if `counted` is true.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -140,7 +141,7 @@ impl Damping {
         }
     }
 
-    /// Starts at `now`, in place: a copy on the stack would be the largest one at start-up.
+    /// Starts the record at `now`, in place. A copy would need more stack than any other start-up step.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -208,7 +209,7 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links to those of the link that was lost last. All of them cross the same gap.
+    /// Raises the losses of all links to the losses of the last lost link. All links cross the same gap.
     fn share(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

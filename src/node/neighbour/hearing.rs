@@ -6,7 +6,7 @@ use crate::time::{Duration, Instant};
 /// Number of nodes on one side that are sent a hello.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Interval after which the same report is repeated.
+/// Interval after which a report about a node is repeated.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
 /// Consecutive occurrences of an event for each of the nearest nodes, nearest first.
@@ -109,7 +109,7 @@ impl Hearing {
     }
 }
 
-/// Candidates with a pending hello, and those whose hello requests an answer. Bit 0 is the nearest node.
+/// Candidates with a pending hello, and candidates whose hello requests an answer. Bit 0 is the nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     owed: u8,

@@ -70,7 +70,7 @@ impl Neighbours {
         [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
     }
 
-    /// Returns true if a neighbour differs from the one at the last decision on a view.
+    /// Returns true if a neighbour has changed since the last decision on a view.
     pub(crate) fn have_changed(&self, now: Instant) -> bool {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
@@ -81,7 +81,7 @@ impl Neighbours {
         self.downstream.leave();
     }
 
-    /// Records that a proposal was refused.
+    /// Records on both sides that a proposal was refused.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();

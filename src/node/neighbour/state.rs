@@ -38,7 +38,7 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Selected node that has selected this relay, too, as far as it has reported.
+    /// Selected node that, by its last report, has selected this relay, too.
     Linked,
     /// Selected node that has not selected this relay, or no longer.
     Pairing {
@@ -62,7 +62,7 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Selected node at the time the links were given up; 0 for none.
     given_up: u16,
-    /// Farther node that the selected one has replaced; 0 for none.
+    /// Farther node that was replaced by the selected node; 0 for none.
     replaced: u16,
     /// Start of the last search.
     searches_since: Instant,
@@ -228,7 +228,7 @@ impl Neighbour {
         self.found != told
     }
 
-    /// Excuses the silence of a neighbour in the same view. Returns true if there is one and it is not lost.
+    /// Restarts the silence of a neighbour in the same view; returns true if such a neighbour is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -440,11 +440,11 @@ pub(crate) struct Candidate {
     pub(crate) downstream: bool,
     /// True if the node has selected this relay.
     pub(crate) pairs: bool,
-    /// True if the node is nearer than the selected one.
+    /// True if the node is nearer than the selected node.
     pub(crate) nearer: bool,
     /// True if the node is heard by the node beyond it.
     pub(crate) ready: bool,
-    /// True if more relays are connected through this node than through the selected one.
+    /// True if this node connects more relays than the selected node.
     pub(crate) longer: bool,
 }
 
@@ -503,7 +503,7 @@ impl Neighbour {
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view.
     in_view: u16,
-    /// Neighbour at the last decision on a proposal, granted or refused.
+    /// Neighbour at the last granted or refused proposal.
     counted: u16,
     /// Node that sent the last proposal.
     proposer: u16,
@@ -582,12 +582,12 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if the neighbour here is linked, and less than `distance` places away.
+    /// Returns true if the neighbour on this side is linked and less than `distance` places away.
     pub(crate) fn joins_with(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if the neighbour here is linked, and more than `distance` places away.
+    /// Returns true if the neighbour on this side is linked and more than `distance` places away.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }

@@ -42,7 +42,7 @@ pub(super) enum PassKind {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
     /// Cross-section: position across the line.
-    pub(super) at: CrossSection,
+    pub(super) cross_section: CrossSection,
     /// Maximum x, m.
     pub(super) end_m: f32,
     /// True for a plain pass, in which no relay holds back.
@@ -55,7 +55,7 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True once a pass has started here, until that is reported.
+    /// True from the start of a pass at this relay until the start is reported.
     pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
@@ -64,7 +64,7 @@ pub(crate) struct Computation {
     /// Solution of the joint method in this view, once it is computed.
     pub(super) chosen: Option<JointPlace>,
     /// Cross-section of the agreed position.
-    pub(super) at: CrossSection,
+    pub(super) cross_section: CrossSection,
     /// Last reported position of the neighbour toward Rx.
     pub(super) after: Option<Placement>,
     pub(super) agreed_place: Option<Placement>,
@@ -94,7 +94,7 @@ impl Computation {
             profile,
             seats: Seats::UNKNOWN,
             chosen: None,
-            at: profile.on_line().at,
+            cross_section: profile.on_line().cross_section,
             after: None,
             agreed_place: None,
             meter: Meter::new(settings.measure),
@@ -116,7 +116,7 @@ impl Computation {
         self.seats = Seats::UNKNOWN;
         self.sensing.load();
         if self.agreed_place.is_none() {
-            self.at = profile.on_line().at;
+            self.cross_section = profile.on_line().cross_section;
         }
     }
 
@@ -151,9 +151,9 @@ impl Computation {
 
     /// Sets the agreed position to `place` and the cross-section to `at`.
     #[inline(never)]
-    pub(super) fn agree_on(&mut self, place: Placement, at: CrossSection) {
+    pub(super) fn agree_on(&mut self, place: Placement, cross_section: CrossSection) {
         self.agreed_place = Some(place);
-        self.at = at;
+        self.cross_section = cross_section;
         // Samples of the previous position do not count.
         self.meter.restart();
     }
@@ -273,7 +273,7 @@ impl Computation {
 
     pub(crate) const fn profile(&self) -> Profile {
         Profile {
-            altitude_m: self.at.altitude_m,
+            altitude_m: self.cross_section.altitude_m,
             power_w: self.profile.power_w,
         }
     }
@@ -282,7 +282,10 @@ impl Computation {
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
-            Some(JointPlace { at, .. }) if chosen => Station { at, ..given },
+            Some(JointPlace { cross_section, .. }) if chosen => Station {
+                cross_section,
+                ..given
+            },
             _ => given,
         }
     }
@@ -313,7 +316,7 @@ pub(crate) enum LeaderTask {
     Idle,
     /// Prediction of the chain's solution from the mission.
     Predicting(Planner),
-    /// Solution of the chain by the joint method; all relays compute it, not only the leader.
+    /// Computation of the chain by the joint method, which every relay runs.
     Solving(ChainSolver),
     /// Search for the highest target at the current cross-sections.
     Searching {
@@ -323,7 +326,7 @@ pub(crate) enum LeaderTask {
         /// True for a search at the configured altitudes, after one at the joint method's failed.
         given: bool,
     },
-    /// Rounds of Algorithm 2.
+    /// Algorithm 2 is running: the state of its rounds.
     Adjusting(Rounds),
 }
 

@@ -144,7 +144,7 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the profile of relay `index`, or the common one if the relay has not reported its own.
+    /// Returns the profile of relay `index`, or the common profile if the relay has not reported its own.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);
@@ -229,10 +229,14 @@ impl Computation {
         let index = context.index();
         let target = if let Ok(target) = solved {
             let end_m = chain.end_m(mission, &seat_of, index);
-            let (at, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
+            let (solved, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
             // The solver used the common profile, if this relay's own has not been collected yet.
-            let at = self.seat(context).room.nearest(at);
-            self.chosen = Some(JointPlace { at, end_m, plain });
+            let cross_section = self.seat(context).room.nearest(solved);
+            self.chosen = Some(JointPlace {
+                cross_section,
+                end_m,
+                plain,
+            });
             target
         } else {
             self.choose_configured(context);
@@ -254,7 +258,10 @@ impl Computation {
 
     fn choose_configured(&mut self, context: &Context<'_>) {
         self.chosen = Some(JointPlace {
-            at: self.seat(context).room.nearest(self.profile.on_line().at),
+            cross_section: self
+                .seat(context)
+                .room
+                .nearest(self.profile.on_line().cross_section),
             end_m: context.mission().end_for(context.index(), 0.0),
             plain: true,
         });

@@ -19,8 +19,8 @@ use crate::node::context::{Context, Member, Sensed};
 use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::sensing::Listen;
-use crate::sensing::belief::{Belief, Knowledge, Spread, Told, review};
 use crate::sensing::doubt::{Next, Trial, is_absurd, is_deaf, is_off};
+use crate::sensing::estimate::{InterferenceEstimate, Knowledge, NumberedEstimate, Spread, review};
 use crate::sensing::fit::{Unfit, expected_at};
 use crate::sensing::sums::{Average, Listener, left};
 use crate::sensing::sums::{EndsOff, Level, Levels, Sums, UNIT_W, is_level, terms};
@@ -114,9 +114,9 @@ impl Computation {
         let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Stale;
         };
-        if hearing.estimate != sensor.told || !holds {
+        if hearing.estimate != sensor.estimate || !holds {
             // Another estimate means other positions.
-            sensor.told = hearing.estimate;
+            sensor.estimate = hearing.estimate;
             self.task.clear();
             self.chosen = None;
         }
@@ -234,7 +234,7 @@ impl Computation {
         };
         let review = review(
             context.mission(),
-            &sensor.told.belief,
+            &sensor.estimate.estimate,
             &hearing.sums,
             &levels,
             &listen,
@@ -247,19 +247,19 @@ impl Computation {
         };
         sensor.ends = review.ends;
         sensor.known = review.known;
-        let Some(belief) = review.adopt else {
+        let Some(estimate) = review.adopt else {
             return false;
         };
-        sensor.told = Told {
-            number: sensor.told.number.wrapping_add(1),
-            belief,
+        sensor.estimate = NumberedEstimate {
+            number: sensor.estimate.number.wrapping_add(1),
+            estimate,
         };
         sensor.is_distributed = false;
         sensor.kept = 0;
-        sensor.wait = match belief {
+        sensor.wait = match estimate {
             // All three spreads have failed; relays that learn nothing shall move less and less often.
-            Belief::Unknown(Spread::Even) => (2 * sensor.wait).min(RAREST),
-            Belief::Unknown(_) => sensor.wait,
+            InterferenceEstimate::Unknown(Spread::Even) => (2 * sensor.wait).min(RAREST),
+            InterferenceEstimate::Unknown(_) => sensor.wait,
             _ => 1,
         };
         self.task.clear();
@@ -267,7 +267,7 @@ impl Computation {
         true
     }
 
-    /// Adds this relay's sums to those of the relays after it, and checks its receiver against the others.
+    /// Adds this relay's sums to the sums of later relays, and checks its receiver against these sums.
     ///
     /// A relay that is excluded checks if it fits again. One whose measurement is absurd excludes itself; one that measures
     /// nothing where the others measure much reports itself.
@@ -327,11 +327,11 @@ pub(crate) struct Sensing([SensorState; SENSING as usize]);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SensorState {
     pub(super) listener: Listener,
-    pub(super) told: Told,
+    pub(super) estimate: NumberedEstimate,
     /// Levels that the ground transmitter and receiver have reported to this relay.
     pub(super) transmitter: Average,
     pub(super) receiver: Average,
-    /// True while this relay excludes its own measurements, because they do not fit the others.
+    /// True while this relay excludes its own measurements, because they do not fit the other measurements.
     pub(super) off: bool,
     /// Node excluded from the last pass; 0 for none.
     pub(super) left_out: u16,
@@ -341,12 +341,13 @@ pub(super) struct SensorState {
     pub(super) trial: Trial,
     /// Leader only: ground ends whose measurements do not fit.
     pub(super) ends: EndsOff,
-    /// True if the last result was inconsistent, and the faulty relay is unknown.
+    /// True if the last measurements were inconsistent, and the faulty relay could not be identified.
     pub(super) contradicted: bool,
     /// True if this relay measures nothing although the others' sums predict interference.
     pub(super) deaf: bool,
-    /// Measurements in a row at or below the noise, and the position of the last one.
+    /// Number of consecutive measurements at or below the noise.
     pub(super) silent: u8,
+    /// Position of the last measurement at or below the noise.
     pub(super) silent_at: Placement,
     /// Leader only: true if the relays of the view have received the estimate.
     pub(super) is_distributed: bool,
@@ -361,9 +362,9 @@ pub(super) struct SensorState {
 }
 
 /// Initial estimate: the interference of the mission.
-const AS_LOADED: Told = Told {
+const AS_LOADED: NumberedEstimate = NumberedEstimate {
     number: 0,
-    belief: Belief::Mission,
+    estimate: InterferenceEstimate::Mission,
 };
 
 impl Sensing {
@@ -374,7 +375,7 @@ impl Sensing {
         };
         let sensor = SensorState {
             listener: Listener::new(half_life, now),
-            told: AS_LOADED,
+            estimate: AS_LOADED,
             transmitter: Average::NONE,
             receiver: Average::NONE,
             off: false,
@@ -415,11 +416,11 @@ impl Sensing {
         }
     }
 
-    /// Loads another mission, and uses its interference.
+    /// Handles the load of another mission: its interference becomes the estimate.
     pub(super) const fn load(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
-            sensor.told.belief = Belief::Mission;
-            sensor.told.number = sensor.told.number.wrapping_add(1);
+            sensor.estimate.estimate = InterferenceEstimate::Mission;
+            sensor.estimate.number = sensor.estimate.number.wrapping_add(1);
             // Its ground ends may be at other places.
             sensor.transmitter = Average::NONE;
             sensor.receiver = Average::NONE;
@@ -439,9 +440,9 @@ impl Sensing {
             .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
     }
 
-    pub(crate) const fn estimate(&self) -> Told {
+    pub(crate) const fn estimate(&self) -> NumberedEstimate {
         match self.sensor() {
-            Some(sensor) => sensor.told,
+            Some(sensor) => sensor.estimate,
             None => AS_LOADED,
         }
     }
@@ -466,7 +467,7 @@ impl Sensing {
 
     pub(super) fn findings(&self) -> Findings {
         Findings {
-            told: self.estimate(),
+            estimate: self.estimate(),
             unfit: self.unfit(),
             off: self.sensor().map_or(0, |sensor| sensor.named),
             ends: self.sensor().map_or(EndsOff::NONE, |sensor| sensor.ends),
@@ -539,7 +540,7 @@ pub(super) struct Sense {
 /// Results of sensing, of which changes are reported.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Findings {
-    pub(super) told: Told,
+    pub(super) estimate: NumberedEstimate,
     pub(super) unfit: Option<Unfit>,
     /// Node whose measurements do not fit, as of the last pass; 0 for none.
     pub(super) off: u16,
@@ -548,7 +549,8 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Returns what has changed since `before`. Of the faulty nodes, 0 is the transmitter and `all` + 1 the receiver.
+    /// Returns the differences from `before`. As a faulty node, 0 is the transmitter and `all` + 1 the receiver.
+    #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {
             Some(self.off)
@@ -560,7 +562,7 @@ impl Findings {
             (self.ends.transmitter && !before.ends.transmitter).then_some(0)
         };
         Sensed {
-            new_estimate: self.told != before.told,
+            new_estimate: self.estimate != before.estimate,
             unclear: self.unfit.is_some() && self.unfit != before.unfit,
             off,
         }

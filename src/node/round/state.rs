@@ -28,7 +28,7 @@ pub enum Phase {
     Planning,
     /// A pass or a proposal has been forwarded, and its result is not known yet.
     Waiting,
-    /// The last pass has completed without an agreement.
+    /// The last pass of the leader has completed without an agreement.
     Answered,
     /// The chain has agreed; the relay holds its position.
     Holding,
@@ -46,7 +46,7 @@ pub(crate) enum Action {
     Nothing,
     /// Count a stale message.
     Stale,
-    /// Discard pending messages; call `work` after a pause.
+    /// Discard the pending messages, and call `work` again after a pause.
     Work,
     /// Call `work` after a pause; pending messages stay.
     Think,
@@ -100,7 +100,7 @@ const INCARNATION: u16 = 64;
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass was started or received in this view, or since the start.
+    /// True once a pass was started or received in this view; in the loaded view, since the relay's start.
     begun: bool,
     late_messages: LateMessages,
 }

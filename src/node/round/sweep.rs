@@ -7,7 +7,7 @@ use crate::node::context::Context;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::pass::{Behind, Link, Verdict, close};
-use crate::optimiser::spacing::Stand;
+use crate::optimiser::spacing::RequiredPosition;
 use crate::place::Station;
 use crate::settings::Method;
 use crate::wire::message::{Answer, Sweep};
@@ -113,8 +113,8 @@ impl Computation {
                 let most = search.most(&sweep_pass.verdict.slacks);
                 self.bound = most.filter(|_| !chosen && !given);
             }
-            let at = self.station_for(chosen).at;
-            self.agree_on(at.at(x_m), at);
+            let cross_section = self.station_for(chosen).cross_section;
+            self.agree_on(cross_section.at(x_m), cross_section);
             self.target = Some(target);
             if let LeaderTask::Searching { search, .. } = &mut self.task
                 && !search.accept(target)
@@ -178,7 +178,7 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if relays use the joint method's cross-sections.
     pub(crate) chosen: bool,
-    /// True if a relay after this one has a profile of its own.
+    /// True if a later relay of the pass has its own profile.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Reaches of the previous relay, m.
@@ -191,7 +191,7 @@ pub(crate) struct SweepPass {
     /// Position of this relay by the verdict, m along x.
     place: Option<f32>,
     /// Required position of the previous relay, m; `None` for its own reach.
-    stand: Option<f32>,
+    required_x_m: Option<f32>,
 }
 
 impl SweepPass {
@@ -210,7 +210,7 @@ impl SweepPass {
                 slacks: PerTarget::new(),
             },
             place: None,
-            stand: None,
+            required_x_m: None,
         }
     }
 
@@ -223,7 +223,7 @@ impl SweepPass {
         self.done = false;
         self.own = false;
         self.place = None;
-        self.stand = None;
+        self.required_x_m = None;
     }
 
     /// Computes a portion of the reaches, and at the last relay the verdict. Returns true when all are computed.
@@ -243,7 +243,7 @@ impl SweepPass {
         self.done
     }
 
-    /// Accepts a verdict, and returns true, if its target is met and this relay can take a position for it.
+    /// Accepts a verdict if this relay meets its target and has a position for it. Returns true if accepted.
     pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &Answer) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
@@ -256,7 +256,8 @@ impl SweepPass {
         if !(self.done && fits) {
             return false;
         }
-        let stand = |(_, reach): (f32, f32)| match (answer.required_x_m, link.mission.heading()) {
+        let position = |(_, reach): (f32, f32)| match (answer.required_x_m, link.mission.heading())
+        {
             (None, _) => Some(reach),
             (Some(x_m), Heading::TowardRx) => (x_m <= reach).then_some(x_m),
             (Some(x_m), Heading::TowardTx) => (reach..=link.mission.config().distance_m)
@@ -265,7 +266,7 @@ impl SweepPass {
         };
         self.verdict = verdict.clone();
         self.own = answer.own;
-        let place = self.committed().and_then(stand);
+        let place = self.committed().and_then(position);
         self.settle(&link, place);
         true
     }
@@ -276,16 +277,18 @@ impl SweepPass {
             return;
         };
         let before = self.from.get(usize::from(commit)).copied();
-        let stand = match (self.committed(), before, place) {
-            (Some((target, _)), Some(from_m), Some(place)) => link.stand(target, from_m, place),
+        let required = match (self.committed(), before, place) {
+            (Some((target, _)), Some(from_m), Some(place)) => {
+                link.required_position(target, from_m, place)
+            }
             _ => None,
         };
-        match stand {
-            Some(stand) => {
+        match required {
+            Some(required) => {
                 self.place = place;
-                self.stand = match stand {
-                    Stand::AtReach => None,
-                    Stand::At(x_m) => Some(x_m),
+                self.required_x_m = match required {
+                    RequiredPosition::AtReach => None,
+                    RequiredPosition::At(x_m) => Some(x_m),
                 };
             }
             None => self.verdict.commit = None,
@@ -307,7 +310,7 @@ impl SweepPass {
     }
 
     pub(crate) const fn required_x_m(&self) -> Option<f32> {
-        self.stand
+        self.required_x_m
     }
 
     pub(crate) const fn is_done(&self) -> bool {
@@ -325,11 +328,14 @@ impl SweepPass {
 
 /// Returns a checksum of the previous relay's sweep data, equal in duplicates unless it has restarted.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
-    let held = behind.map_or([0.0; 3], |behind| {
-        let Station { at, power_w } = behind.relay;
-        [at.y_m, at.altitude_m, power_w]
+    let values = behind.map_or([0.0; 3], |behind| {
+        let Station {
+            cross_section,
+            power_w,
+        } = behind.relay;
+        [cross_section.y_m, cross_section.altitude_m, power_w]
     });
-    held.iter().chain(from).fold(0, |sum: u32, value| {
+    values.iter().chain(from).fold(0, |sum: u32, value| {
         sum.rotate_left(5).wrapping_add(value.to_bits())
     })
 }

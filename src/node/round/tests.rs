@@ -8,7 +8,7 @@ use super::computation::PassKind;
 use super::state::Phase;
 use crate::mission::Mission;
 use crate::mission::tests::paper;
-use crate::node::context::Held;
+use crate::node::context::OtherLeases;
 use crate::node::context::{Context, Effects, Member, Peer};
 use crate::optimiser::search::Schedule;
 use crate::sensing::Listen;
@@ -58,7 +58,7 @@ impl Line {
             member,
             latest: member.active,
             end: member.index == RELAYS,
-            held: Held {
+            other_leases: OtherLeases {
                 lease_left: Duration::from_micros(0),
                 view: ViewId::LOADED,
                 rest: None,

@@ -137,18 +137,19 @@ impl Computation {
     }
 }
 
-/// State of the token at one relay.
+/// State of Algorithm 2's pass at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Action of this pass, and the SIR of the chain before it.
+    /// Action of this pass, and the chain's SIR before the pass.
     pub(crate) turn: AdjustStep,
     pub(crate) sir: f32,
     /// Node before this relay, and its gain.
     pub(crate) before: HopEnd,
     pub(crate) gain_in: PowerRatio,
     search: Option<LocalSearch>,
-    /// True if this relay or one after it has moved; the worst SIR from this relay on.
+    /// True if this relay or a later relay of the pass has moved.
     pub(crate) any: bool,
+    /// Worst SIR of the hops from this relay on, linear.
     pub(crate) worst: f32,
 }
 
@@ -200,7 +201,7 @@ impl TurnPass {
         self.search.is_some()
     }
 
-    /// Continues the search for at most `budget` evaluations and the rest of a grid row.
+    /// Continues the search for at most `budget` evaluations, and then to the end of the grid row.
     ///
     /// Ready with the better position, if any.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {

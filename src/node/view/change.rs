@@ -41,7 +41,7 @@ pub(crate) struct ViewChange {
     /// Latest known view.
     pub(super) newest: ViewId,
     pub(crate) request: ViewRequest,
-    /// True if the last decision was that there is no quorum.
+    /// True if the last decision refused a view because of a missing quorum.
     pub(super) refused: bool,
     pub(super) late_messages: LateMessages,
 }
@@ -101,6 +101,7 @@ impl ViewChange {
 
     /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message. One message could otherwise
     /// use up all view numbers; a relay that was away for long repeats its view often enough.
+    #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
             self.newest = self.newest.toward(view, LEAP);
@@ -184,13 +185,13 @@ impl ViewChange {
             self.circulation.on_duplicate(context.now, path);
             return Effects::DUPLICATE.by(Proposer::Neighbour);
         }
-        let told = Some(proposal.poll);
+        let received = Some(proposal.poll);
         let effects = self.propose(
             context,
             proposal.proposed_view,
             proposal.mission_id,
             proposal.place,
-            told,
+            received,
         );
         if let Some(effects) = effects {
             return effects.by(Proposer::Neighbour);
@@ -213,10 +214,12 @@ impl ViewChange {
         view: ViewId,
         mission_id: MissionId,
         place: u16,
-        told: Option<Poll>,
+        received: Option<Poll>,
     ) -> Option<Effects> {
         let node = context.member.node;
-        let poll = self.electorate.vote(node, view, told, context.held)?;
+        let poll = self
+            .electorate
+            .vote(node, view, received, context.other_leases)?;
         // No limit on the advance here, because this relay has voted on the view.
         self.newest = self.newest.max(view);
         self.late_messages = LateMessages::NONE;
@@ -461,7 +464,7 @@ impl ViewChange {
         if alone
             && self
                 .electorate
-                .is_refused_alone(node, view, all, context.held)
+                .is_refused_alone(node, view, all, context.other_leases)
         {
             self.retry_after_refusal(context);
             return Effects::NONE;
@@ -487,7 +490,7 @@ pub(crate) struct Proposed {
     pub(crate) view: ViewId,
     /// Mission of the view.
     pub(crate) mission_id: MissionId,
-    /// Place of this relay on the proposal's path, from 1 at the leader.
+    /// Number of this relay on the proposal's path; the first relay is 1.
     pub(crate) place: u16,
     /// Poll including this relay's vote.
     pub(super) poll: Poll,
@@ -511,11 +514,11 @@ pub(super) struct ViewVerdict {
     pub(super) usable_in: u16,
 }
 
-/// State of this relay's view request, and the time of the next one.
+/// State of this relay's view request, and the time of the next request.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
     asks: bool,
-    /// Number of requests so far.
+    /// Number of view requests sent without a result.
     tries: u8,
     at: Option<Instant>,
     /// Number of consecutive refusals.

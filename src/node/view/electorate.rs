@@ -38,7 +38,7 @@
 //! view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it decides beside
 //! the two that remember. A relay that loses its record during a proposal may also forward the proposal on a second route.
 
-use crate::node::context::{Held, tenths};
+use crate::node::context::{OtherLeases, tenths};
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
@@ -87,34 +87,34 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on `proposal` and returns the poll with this vote. `None` if a later one, or this one, was promised before. `told` is
-    /// the poll so far (`None` at the proposer), `held` the remaining leases of other relays.
+    /// Votes on `proposal` and returns the poll with this vote. `None` if a later one, or this one, was promised before. `received` is
+    /// the poll so far (`None` at the proposer), `other_leases` the remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
         node: u16,
         proposal: ViewId,
-        told: Option<Poll>,
-        held: Held,
+        received: Option<Poll>,
+        other_leases: OtherLeases,
     ) -> Option<Poll> {
         if proposal <= self.promised {
             return None;
         }
         self.promised = proposal;
         self.remember(proposal);
-        let told = told.unwrap_or(Poll::of(self.agreed));
-        if told.agreed.id > self.agreed.id {
-            self.learn(told.agreed);
+        let received = received.unwrap_or(Poll::of(self.agreed));
+        if received.agreed.id > self.agreed.id {
+            self.learn(received.agreed);
         }
-        let newer = self.agreed.id > told.agreed.id;
+        let newer = self.agreed.id > received.agreed.id;
         let before = if newer {
             // Earlier voters were not members of the newer view, as far as they know.
             Poll::of(self.agreed)
         } else {
-            told
+            received
         };
         let successor = match (before.successor, self.accepted) {
-            (Some(told), Some(own)) if told.proposal >= own.proposal => Some(told),
-            (told, own) => own.or(told),
+            (Some(received), Some(own)) if received.proposal >= own.proposal => Some(received),
+            (received, own) => own.or(received),
         };
         let proposer = match self.agreed.id {
             ViewId::LOADED => self.initial_leader,
@@ -128,8 +128,10 @@ impl Electorate {
             // A poll with more votes than members would be rejected by its receivers.
             poll.votes = poll.votes.saturating_add(1).min(poll.agreed.relays);
             poll.proposer |= proposer == node;
-            poll.lease_left = poll.lease_left.min(tenths(held.lease_left));
-            poll.earlier_lease_left = poll.earlier_lease_left.min(held.rest_of(self.agreed.id));
+            poll.lease_left = poll.lease_left.min(tenths(other_leases.lease_left));
+            poll.earlier_lease_left = poll
+                .earlier_lease_left
+                .min(other_leases.rest_of(self.agreed.id));
         }
         Some(poll)
     }
@@ -140,10 +142,10 @@ impl Electorate {
         node: u16,
         proposal: ViewId,
         all: u16,
-        held: Held,
+        other_leases: OtherLeases,
     ) -> bool {
         let mut asked = *self;
-        let poll = asked.vote(node, proposal, None, held);
+        let poll = asked.vote(node, proposal, None, other_leases);
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
@@ -243,7 +245,7 @@ impl Electorate {
         self.member = true;
     }
 
-    /// Returns true if this relay has voted on `proposal`, which may become a view.
+    /// Returns true if this relay has voted for `proposal`, which may still become a view.
     pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
         self.voted.contains(&proposal)
     }

@@ -29,7 +29,7 @@ use std::{format, println, vec};
 use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::circulation::{Circulation, LateMessages, Stage};
-use crate::node::context::Held;
+use crate::node::context::OtherLeases;
 use crate::node::context::{Context, Effects, LayerEvent, Member, ProposalOutcome};
 use crate::node::view::change::{ViewChange, ViewRequest};
 use crate::settings::Settings;
@@ -38,7 +38,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks chains of `relays` relays with so many cuts, proposals and reboots. `heals`: every state is healed.
+/// Checks chains of `relays` relays with the given numbers of cuts, proposals and reboots. `heals`: every state is healed.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,
@@ -121,7 +121,7 @@ pub(super) struct Frame {
     pub(super) body: Body,
 }
 
-/// State of one relay.
+/// State of one relay in the model.
 #[derive(Clone, Debug)]
 pub(super) struct Unit {
     pub(super) change: ViewChange,
@@ -193,7 +193,7 @@ pub(super) enum Happens {
     Forgets(usize),
 }
 
-/// Inserts `one` into a sorted list, unless it is already there.
+/// Inserts `one` into the sorted list `all`, unless the list contains it.
 pub(super) fn put<T: Ord>(all: &mut Vec<T>, one: T) {
     if let Err(at) = all.binary_search(&one) {
         all.insert(at, one);
@@ -288,11 +288,11 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Every present relay votes, and the quorum is half of the newest view known to any of them.
+    /// Every present relay votes; the quorum is half of the newest view that any present relay knows.
     Everybody,
 }
 
-/// Configuration of a check: rule and bounds on the events.
+/// Configuration of a model check: the quorum rule, and bounds on the number of events.
 #[derive(Clone, Debug)]
 pub(super) struct Check {
     pub(super) rule: Rule,
@@ -357,7 +357,7 @@ impl Check {
             member,
             latest: member.active,
             end: chain.after(at).is_none(),
-            held: Held::NONE,
+            other_leases: OtherLeases::NONE,
         }
     }
 

@@ -42,7 +42,7 @@ pub enum RecordError {
 impl core::fmt::Display for RecordError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Base => "the record is of a relay that was loaded with another mission",
+            Self::Base => "the record was written by a relay that was loaded with another mission",
             Self::Begun => "the record must be restored before the relay starts",
         })
     }
@@ -226,7 +226,7 @@ mod tests {
     use super::{Electorate, RecordError, ViewRecord};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
-    use crate::node::context::Held;
+    use crate::node::context::OtherLeases;
     use crate::relay::Relay;
     use crate::settings::{Identity, Settings, Wiring};
     use crate::time::Instant;
@@ -241,12 +241,16 @@ mod tests {
     fn busy() -> Electorate {
         let mut electorate = Electorate::new(3, 1);
         let first = view(1, 1);
-        electorate.vote(2, first, None, Held::NONE).unwrap();
+        electorate.vote(2, first, None, OtherLeases::NONE).unwrap();
         let relays = 3;
         let base = electorate.agreed();
         assert!(electorate.accept(first, base, Some(View { id: first, relays })));
-        electorate.vote(2, view(2, 3), None, Held::NONE).unwrap();
-        electorate.vote(2, view(3, 1), None, Held::NONE).unwrap();
+        electorate
+            .vote(2, view(2, 3), None, OtherLeases::NONE)
+            .unwrap();
+        electorate
+            .vote(2, view(3, 1), None, OtherLeases::NONE)
+            .unwrap();
         electorate
     }
 

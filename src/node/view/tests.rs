@@ -3,7 +3,7 @@
 use crate::mission::Mission;
 use crate::mission::tests::paper;
 use crate::node::circulation::{SUSPICIOUS, Stage};
-use crate::node::context::Held;
+use crate::node::context::OtherLeases;
 use crate::node::context::{Context, Effects, LayerEvent, Member, ProposalOutcome, Proposer};
 use crate::node::view::change::{Proposed, ViewChange};
 use crate::node::view::electorate::Electorate;
@@ -117,7 +117,7 @@ pub(super) fn context(member: &Member, latest: MissionId, end: bool, now: Instan
         member,
         latest,
         end,
-        held: Held::NONE,
+        other_leases: OtherLeases::NONE,
     }
 }
 
@@ -310,7 +310,9 @@ fn a_refusal_says_which_view_was_agreed_on() {
         relays: 3,
     };
     let voted = |mut electorate: Electorate, node| {
-        electorate.vote(node, view.id, None, Held::NONE).unwrap();
+        electorate
+            .vote(node, view.id, None, OtherLeases::NONE)
+            .unwrap();
         let base = electorate.agreed();
         assert!(electorate.accept(view.id, base, Some(view)));
         electorate
@@ -372,7 +374,7 @@ fn a_decision_is_of_the_mission_that_was_proposed() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// A newer mission has replaced the proposed one, which can not be flown any more.
+/// Checks that a decision is ignored if the relay has replaced the proposed mission by a newer one.
 #[test]
 fn who_has_lost_the_mission_has_no_part_in_its_view() {
     let mut relay = Relay::second();
@@ -396,7 +398,7 @@ fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
     relay
         .view
         .electorate
-        .vote(4, first.id, None, Held::NONE)
+        .vote(4, first.id, None, OtherLeases::NONE)
         .unwrap();
     let base = relay.view.electorate.agreed();
     assert!(relay.view.electorate.accept(first.id, base, Some(first)));

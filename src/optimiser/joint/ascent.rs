@@ -131,7 +131,7 @@ impl Ascent {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Reduces the limit of the slack that counts if there is a penalty; returns true if it did.
+    /// Reduces the limit on the counted slack if a penalty applies; returns true if the limit changed.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -204,7 +204,7 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if a chain after its last step may still meet the target.
+    /// Returns true while the real chain, after its last step, may still meet the nominal target.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }

@@ -154,7 +154,7 @@ pub(crate) enum Coordinate {
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
-    /// Returns this coordinate first, then the other two in their order.
+    /// Returns the coordinates reordered: the coordinate `self` first, then the other two in their order.
     #[inline(never)] // called from many places
     pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
         match self {

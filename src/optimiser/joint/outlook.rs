@@ -16,11 +16,11 @@ use crate::sir::square;
 pub(crate) struct Outlook {
     /// First derivatives by x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// Second derivatives by x, y and h, 1/m; symmetric.
+    /// Second derivatives of the value by x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
     /// Derivative by the logarithm of the target, m.
     pub(crate) by_target: f32,
-    /// Expected gain of slack by the steps of all relays after it, m. This part is proportional to the fraction of the step.
+    /// Expected gain of slack by steps of later relays, m: the part proportional to the step's fraction.
     pub(crate) linear: f32,
     /// Part of the expected gain that is proportional to the square of the fraction, m.
     pub(crate) square: f32,
@@ -157,7 +157,7 @@ pub(crate) struct Policy {
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature that a step is divided by, relative to the largest one. Flatter directions are noise.
+/// Minimum curvature by which a step is divided, relative to the largest curvature. Flatter directions are noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {

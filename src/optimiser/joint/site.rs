@@ -67,7 +67,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the same relay without a minimum distance to its sender.
+    /// Returns this site without the minimum separation from its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -128,7 +128,7 @@ impl<'a> Site<'a> {
             return self.disk_by(&Tangent::free(c, e), from_m, x_m);
         }
         let [sx, sy, _] = self.source();
-        let from = self.sender.at;
+        let from = self.sender.cross_section;
         let mut s = square(sx - from_m) + square(from.y_m - sy) + square(from.altitude_m);
         let mut disk = None;
         for _ in 0..TANGENTS {
@@ -150,7 +150,7 @@ impl<'a> Site<'a> {
         if !(e > 0.0) {
             return None;
         }
-        let (m, from) = (self.interferer, self.sender.at);
+        let (m, from) = (self.interferer, self.sender.cross_section);
         let (ahead, aside, above) = (m.x_m - from_m, from.y_m - m.y_m, from.altitude_m);
         let squared = square(ahead) + square(aside) + square(above);
         // Distance by which the centre is before `x_m`, or beyond Rx.
@@ -167,7 +167,7 @@ impl<'a> Site<'a> {
 
     /// Returns the farthest reachable position toward `wanted`, by bisection. The path begins at the sender's cross-section.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
-        let near = self.room.nearest(self.sender.at);
+        let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
             y_m: near.y_m + share * (wanted.y_m - near.y_m),
             altitude_m: near.altitude_m + share * (wanted.altitude_m - near.altitude_m),
@@ -276,7 +276,7 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate of the end of the hop `tangent` for the other two, `at`.
+/// Returns the first coordinate of the hop's end, whose other two coordinates are `a` and `b`.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -388,7 +388,7 @@ impl Room {
         }
     }
 
-    /// Returns the same room at a single altitude.
+    /// Returns this room limited to the altitude `altitude_m`.
     pub const fn at_altitude(self, altitude_m: f32) -> Self {
         Self {
             band: Band::at(altitude_m),

@@ -23,7 +23,7 @@ pub(super) enum Start {
     /// Arch to the side, with altitudes interpolated between relays with a fixed altitude.
     ///
     /// Before the first and after the last of those relays the chain is `level`, or goes down to Tx and Rx.
-    Held { aside: f32, level: bool },
+    FixedAltitudes { aside: f32, level: bool },
     /// Relays at the outer corner of the room and one minimum separation beside it, alternately. For relays without room for a row.
     Turns,
     /// Low, from a target so high that no hop leaps over the interferer.
@@ -32,7 +32,7 @@ pub(super) enum Start {
     Far,
 }
 
-/// Arches: aside, up.
+/// Offsets (aside, up) of the arches.
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
@@ -70,7 +70,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Path about the interferer. The logarithm of the distance to it changes linearly with the direction.
+/// Spiral path about the interferer: the logarithm of the distance changes linearly with the direction.
 struct Way {
     to: Triple,
     angle: f32,
@@ -122,7 +122,7 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the cross-section of the relay after one at `from` on a spiral.
+    /// Returns the cross-section of the next relay on a spiral, after a relay at `from`.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -217,7 +217,7 @@ impl Start {
                     return Some(fits((aside, up)).then_some(Self::Through { aside, up }));
                 }
                 let &(aside, level) = HELD.get(past - THROUGH)?;
-                Some(fits((aside, 0.0)).then_some(Self::Held { aside, level }))
+                Some(fits((aside, 0.0)).then_some(Self::FixedAltitudes { aside, level }))
             }
         }
     }
@@ -226,7 +226,7 @@ impl Start {
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
-            Self::Held { aside, .. } => (aside, 0.0),
+            Self::FixedAltitudes { aside, .. } => (aside, 0.0),
             Self::Near | Self::Far | Self::Turns | Self::Around { .. } => (0.0, 0.0),
         };
         let t = (x_m / distance_m).clamp(0.0, 1.0);
@@ -238,10 +238,10 @@ impl Start {
     }
 }
 
-/// Search for the highest feasible target, in ln gamma.
+/// Bisection for the highest feasible target, in ln gamma.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest feasible target, and true if relays have to hold back for it.
+    /// Highest target found feasible, and true if relays have to hold back to meet it.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -302,11 +302,11 @@ impl Seek {
         true
     }
 
-    /// Returns the highest feasible target, and true if relays have to hold back for it.
+    /// Returns the highest target found feasible, and true if relays have to hold back to meet it.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }
 }
 
-/// Maximum step, in e-folds of the target.
+/// Maximum step of the search, in units of ln gamma.
 const MOST_STEP: f32 = 40.0;

@@ -19,7 +19,7 @@
 
 use crate::mission::{Heading, MAX_RELAYS, Mission, Profile};
 use crate::optimiser::pass::{Walk, before};
-use crate::optimiser::spacing::Stand;
+use crate::optimiser::spacing::RequiredPosition;
 use crate::place::Placement;
 #[cfg(feature = "internals")]
 use crate::root::sqrt;
@@ -223,7 +223,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let (slack, mut place) = chain.ends(|index, reach| {
         if let Some(own) = places.get_mut(slot(index)) {
-            *own = chain.link(index).own.at.at(reach);
+            *own = chain.link(index).own.cross_section.at(reach);
         }
     })?;
     if !(slack >= 0.0) {
@@ -240,9 +240,12 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
             Some(index) => places.get(slot(index))?.x_m,
             None => crate::optimiser::pass::origin(chain.mission),
         };
-        place = match chain.link(at).stand(chain.target, from_m, place)? {
-            Stand::AtReach => from_m,
-            Stand::At(x_m) => x_m,
+        place = match chain
+            .link(at)
+            .required_position(chain.target, from_m, place)?
+        {
+            RequiredPosition::AtReach => from_m,
+            RequiredPosition::At(x_m) => x_m,
         };
         let Some(index) = before else { return Some(()) };
         at = index;

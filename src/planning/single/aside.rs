@@ -86,7 +86,7 @@ const HALVINGS: u8 = 48;
 pub enum AsideCase {
     /// Touching position of the level circles of both SIRs, at the lowest altitude.
     Touching,
-    /// Maximum of SIR_1, at the lowest altitude: the first hop is the worse one even there.
+    /// Position of maximum SIR_1 at the lowest altitude, where the first hop is worse than the second.
     Hilltop,
     /// Position above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,

@@ -102,9 +102,9 @@ pub enum PlaceCase {
     HillAboveRx = 8,
     /// x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level = 9,
-    /// x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Position x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned = 10,
-    /// Maximum that follows the minimum of SIR_1, or the crossing beyond it; with noise.
+    /// Second maximum of SIR_1, or the crossing of both SIRs beyond it; only with noise.
     SecondHill = 11,
 }
 

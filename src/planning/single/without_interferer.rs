@@ -68,7 +68,7 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
     }
 }
 
-/// Returns the best position of [`low`, `high`], on which E(SIR_1) is monotone.
+/// Returns the position in [`low`, `high`] with the best worst-hop SIR. E(SIR_1) is monotone there.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {

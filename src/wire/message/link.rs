@@ -41,7 +41,7 @@ pub struct Hello {
     pub active_in_view: bool,
     /// True if a relay refuses that mission. The sender itself, which then flies another one, or one beyond it.
     pub refused: bool,
-    /// Number for the offer that answers this hello; 0 if the sender accepts none.
+    /// Number that an answering offer has to repeat; 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
 

@@ -33,10 +33,6 @@ const LONG: usize = if cfg!(feature = "sensing") {
     SWEEP
 };
 
-/// Length of an upload as a body and as stored, bytes: an offer without its last two bytes.
-#[cfg(feature = "upload")]
-pub use self::offer::UPLOAD_LENGTH;
-
 /// Maximum body: an offer, measurements, or without those features a sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
@@ -76,7 +72,7 @@ pub enum Message {
     Sense(Heard),
     /// Reply to a sensing pass: measurements of the relays from the sender on.
     Sensed(Heard),
-    /// Onward message: token of Algorithm 2.
+    /// Onward message: turn of the relays in Algorithm 2.
     Token(Token),
     /// Reply to a token: its result.
     Moved(Moved),
@@ -102,7 +98,7 @@ pub enum Message {
     Offer {
         /// Uploaded mission.
         upload: Upload,
-        /// Number of the destination's hello that it answers, 0 for none.
+        /// Number of the destination's hello that the offer answers, 0 for none.
         offer_number: u16,
     },
     /// Ground to relay: interference level at that end of the chain.

@@ -8,10 +8,7 @@ use crate::geodetic::{SITES_LENGTH, Sites};
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
-/// Length of an encoded upload, bytes: its tag and the fixed-size fields of its wire form.
-pub const UPLOAD_LENGTH: usize = size_of::<u8>() + size_of::<OfferBody>();
-
-pub(super) const LENGTH: usize = UPLOAD_LENGTH + size_of::<Word>();
+pub(super) const LENGTH: usize = Upload::LENGTH + size_of::<Word>();
 
 pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
     let body = (tag::OFFER, OfferBody::of(upload), Word::new(answer));
@@ -26,6 +23,9 @@ pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
 
 /// Stored form of an upload: an offer without `answer`.
 impl Upload {
+    /// Length of an encoded upload, bytes: its tag and the fixed-size fields of its wire form.
+    pub const LENGTH: usize = size_of::<u8>() + size_of::<OfferBody>();
+
     /// Encodes the upload for storage, [`Upload::LENGTH`] bytes, into `buffer`; `None` if it does not fit.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         write(&(tag::OFFER, OfferBody::of(self)), buffer)
@@ -43,7 +43,7 @@ impl Upload {
 }
 
 /// Wire form: version and base, the numbers in the order of the digest, and the sites. It is packed, so its size in memory is
-/// that on the wire, from which [`UPLOAD_LENGTH`] is computed.
+/// that on the wire, from which [`Upload::LENGTH`] is computed.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {

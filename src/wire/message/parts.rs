@@ -61,7 +61,7 @@ pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> 
         .map(|written| written.len())
 }
 
-/// Decodes the start of `bytes`, and returns the rest.
+/// Decodes a value from the start of `bytes`; returns the value and the remaining bytes.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
     postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
 }
@@ -168,8 +168,10 @@ pub enum MessageError {
 impl core::fmt::Display for MessageError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Encoding => "the body is not a message",
-            Self::Value => "a number in the message is outside its range",
+            Self::Encoding => {
+                "the message body is not in the canonical encoding, or has extra bytes"
+            }
+            Self::Value => "a number in the message is not finite or outside its range",
         })
     }
 }

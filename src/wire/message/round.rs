@@ -10,7 +10,7 @@ use crate::optimiser::ladder::{Ladder, TARGETS};
 use crate::optimiser::local::Local;
 use crate::optimiser::pass::Verdict;
 use crate::place::{CrossSection, Placement, Station};
-use crate::sensing::belief::{Belief, Spread, Told};
+use crate::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use crate::sensing::sums::{Level, SUMS, Sums, is_level, is_power};
 use crate::wire::MAX_NODE;
 use crate::wire::message::parts::{
@@ -29,7 +29,7 @@ pub struct Sweep {
     pub ladder: Ladder,
     /// Cross-section and power of the sender.
     pub relay: Station,
-    /// True if relays use the joint method's cross-sections instead of their configured ones.
+    /// True if relays use the cross-sections of the joint method instead of the configured cross-sections.
     pub chosen: bool,
     /// Upsilon measured by the sender at its position, 1/W, in a closed loop.
     pub measured_per_w: Option<f32>,
@@ -61,7 +61,7 @@ impl SweepHead {
             },
             gap,
             growth,
-            altitude_m: sweep.relay.at.altitude_m,
+            altitude_m: sweep.relay.cross_section.altitude_m,
             power_w: sweep.relay.power_w,
         }
     }
@@ -72,7 +72,10 @@ impl Sweep {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
-            _ if self.chosen => write(&(tag::ASIDE, head, self.relay.at.y_m, reaches), buffer),
+            _ if self.chosen => write(
+                &(tag::ASIDE, head, self.relay.cross_section.y_m, reaches),
+                buffer,
+            ),
             None => write(&(tag::SWEEP, head, reaches), buffer),
             Some(upsilon_per_w) => write(&(tag::MEASURED, head, upsilon_per_w, reaches), buffer),
         }
@@ -111,7 +114,7 @@ fn checked(
         view_digest: head.pass.digest(),
         ladder,
         relay: Station {
-            at: CrossSection {
+            cross_section: CrossSection {
                 y_m: y_m.unwrap_or(0.0),
                 altitude_m: own.altitude_m,
             },
@@ -134,7 +137,7 @@ pub struct Answer {
     pub verdict: Verdict,
     /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
     pub required_x_m: Option<f32>,
-    /// True if the sender or a relay after it has a profile of its own.
+    /// True if the sender or a later relay of the pass has its own profile.
     pub own: bool,
 }
 
@@ -156,9 +159,9 @@ impl Answer {
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let ((pass, own, commit), rest): ((PassId, bool, Option<u8>), _) = take(body)?;
         let (slacks, rest) = take_targets(rest)?;
-        let stand: Option<f32> = read(rest)?;
+        let required_x_m: Option<f32> = read(rest)?;
         let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
-        let placed = stand.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
+        let placed = required_x_m.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
         if !(in_range(&slacks, -FARTHEST_M) && known && placed) {
             return Err(MessageError::Value);
         }
@@ -167,7 +170,7 @@ impl Answer {
             view_digest: pass.digest(),
             verdict: Verdict { commit, slacks },
             own,
-            required_x_m: stand,
+            required_x_m,
         })
     }
 }
@@ -198,7 +201,7 @@ pub struct Roster {
     pub view_digest: u16,
     /// Index of the last relay in earlier passes; 0 in the first pass.
     pub after: u16,
-    /// Profiles of the relays after that one. If the roster is full, the next pass collects the rest.
+    /// Profiles of the relays after that index. If the roster is full, the next pass collects the other profiles.
     pub seats: OwnSeats,
 }
 
@@ -381,7 +384,7 @@ pub struct Moved {
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender or any relay after it has moved.
+    /// True if the sender or a later relay of the pass has moved.
     pub position_changed: bool,
     /// SIR of the worst hop after the sender, linear.
     pub worst_sir: f32,
@@ -424,7 +427,7 @@ pub struct Heard {
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub view_digest: u16,
     /// New estimate for all relays.
-    pub estimate: Told,
+    pub estimate: NumberedEstimate,
     /// Sums of the measurements.
     pub sums: Sums,
     /// Level at the receiver.
@@ -435,7 +438,7 @@ pub struct Heard {
 
 /// Estimate as one byte and four numbers, which are 0 if unused.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-struct BeliefBody {
+struct EstimateBody {
     number: Word,
     kind: u8,
     source: [f32; 3],
@@ -448,45 +451,47 @@ const TOWARD_TX: u8 = 2;
 const TOWARD_RX: u8 = 3;
 const SOURCE: u8 = 4;
 
-impl BeliefBody {
-    const fn of(told: Told) -> Self {
-        let (kind, source, receiver_w) = match told.belief {
-            Belief::Mission => (MISSION, [0.0; 3], 0.0),
-            Belief::Unknown(Spread::Even) => (EVEN, [0.0; 3], 0.0),
-            Belief::Unknown(Spread::TowardTx) => (TOWARD_TX, [0.0; 3], 0.0),
-            Belief::Unknown(Spread::TowardRx) => (TOWARD_RX, [0.0; 3], 0.0),
-            Belief::Source { source, receiver_w } => {
+impl EstimateBody {
+    const fn of(estimate: NumberedEstimate) -> Self {
+        let (kind, source, receiver_w) = match estimate.estimate {
+            InterferenceEstimate::Mission => (MISSION, [0.0; 3], 0.0),
+            InterferenceEstimate::Unknown(Spread::Even) => (EVEN, [0.0; 3], 0.0),
+            InterferenceEstimate::Unknown(Spread::TowardTx) => (TOWARD_TX, [0.0; 3], 0.0),
+            InterferenceEstimate::Unknown(Spread::TowardRx) => (TOWARD_RX, [0.0; 3], 0.0),
+            InterferenceEstimate::Source { source, receiver_w } => {
                 (SOURCE, [source.power_w, source.x_m, source.y_m], receiver_w)
             }
         };
         Self {
-            number: Word::new(told.number),
+            number: Word::new(estimate.number),
             kind,
             source,
             receiver_w,
         }
     }
 
-    fn checked(self) -> Option<Told> {
+    fn checked(self) -> Option<NumberedEstimate> {
         let [power_w, x_m, y_m] = self.source;
         let bare = self.source.map(f32::to_bits) == [0; 3] && self.receiver_w.to_bits() == 0;
-        let belief = match self.kind {
-            MISSION if bare => Belief::Mission,
-            EVEN if bare => Belief::Unknown(Spread::Even),
-            TOWARD_TX if bare => Belief::Unknown(Spread::TowardTx),
-            TOWARD_RX if bare => Belief::Unknown(Spread::TowardRx),
+        let estimate = match self.kind {
+            MISSION if bare => InterferenceEstimate::Mission,
+            EVEN if bare => InterferenceEstimate::Unknown(Spread::Even),
+            TOWARD_TX if bare => InterferenceEstimate::Unknown(Spread::TowardTx),
+            TOWARD_RX if bare => InterferenceEstimate::Unknown(Spread::TowardRx),
             SOURCE => {
                 let source = Interferer { power_w, x_m, y_m };
-                (source.is_valid() && is_power(self.receiver_w)).then_some(Belief::Source {
-                    source,
-                    receiver_w: self.receiver_w,
-                })?
+                (source.is_valid() && is_power(self.receiver_w)).then_some(
+                    InterferenceEstimate::Source {
+                        source,
+                        receiver_w: self.receiver_w,
+                    },
+                )?
             }
             _ => return None,
         };
-        Some(Told {
+        Some(NumberedEstimate {
             number: self.number.number(),
-            belief,
+            estimate,
         })
     }
 }
@@ -499,12 +504,12 @@ impl Heard {
         let pass = PassId::new(self.number, self.view_digest);
         let [a, b, c, d, e, f, g, h, i, rest @ ..] = self.sums.numbers;
         let sums: SumsBody = ([a, b, c, d, e, f, g, h, i], rest);
-        let told = BeliefBody::of(self.estimate);
+        let estimate = EstimateBody::of(self.estimate);
         write(
             &(
                 tag,
                 pass,
-                told,
+                estimate,
                 sums,
                 [self.receiver.power_w, self.receiver.count],
                 Word::new(self.excluded),
@@ -514,9 +519,9 @@ impl Heard {
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, told, (head, rest), [power_w, count], off): (
+        let (pass, estimate, (head, rest), [power_w, count], off): (
             PassId,
-            BeliefBody,
+            EstimateBody,
             SumsBody,
             [f32; 2],
             Word,
@@ -526,7 +531,7 @@ impl Heard {
         let sums = Sums {
             numbers: [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r],
         };
-        let told = told.checked().ok_or(MessageError::Value)?;
+        let estimate = estimate.checked().ok_or(MessageError::Value)?;
         let off = off.number();
         let receiver = Level { power_w, count };
         if !(sums.is_sound() && receiver.is_sound() && off <= MAX_NODE) {
@@ -535,7 +540,7 @@ impl Heard {
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
-            estimate: told,
+            estimate,
             sums,
             receiver,
             excluded: off,

@@ -17,7 +17,7 @@ pub struct Proposal {
     pub proposed_view: ViewId,
     /// Number of relays that the proposal has reached, including the sender: 1 to 1000.
     pub place: u16,
-    /// Result of the poll so far.
+    /// Result of the poll of the relays up to the sender.
     pub poll: Poll,
 }
 
@@ -255,7 +255,7 @@ impl Decision {
     }
 }
 
-/// Lease renewal by the view's leader; sent onward.
+/// Lease renewal of the view's leader; sent from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
@@ -275,7 +275,7 @@ pub struct Pulsed {
     pub number: u16,
     /// Digest of the mission and the view.
     pub view_digest: u16,
-    /// True if the renewal has reached the last relay and has been acknowledged by it.
+    /// True if the last relay has received and acknowledged the renewal.
     pub done: bool,
 }
 

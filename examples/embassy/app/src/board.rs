@@ -33,7 +33,7 @@ pub struct Storage<F> {
 }
 
 impl<F: NorFlash> Board<F> {
-    /// Creates a board with a block in its flash; the block is blank if it can not be read.
+    /// Creates a board and reads the configuration block from its flash. A read error gives a blank block.
     pub fn new(seed: u32, mut storage: Storage<F>) -> Self {
         let mut block = [0xFF; LEN];
         if storage.flash.read(storage.block, &mut block).is_err() {

@@ -45,7 +45,7 @@ impl Default for Room {
     }
 }
 
-/// Reason why a drone takes no part.
+/// Reason why a drone does not join the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Refused {
     /// Invalid block.

@@ -84,7 +84,7 @@ impl<const IN: usize> Buffers<IN> {
 /// Longest time between two feedings of the watchdog while the relay makes progress.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Longest delay of a relay's timer with which the watchdog is fed.
+/// Maximum delay of a relay's timer; with a longer one the watchdog is not fed, and resets the board.
 const LATE: uav_relay::Duration = uav_relay::Duration::from_millis(watchdog::LATE_MS);
 
 /// Calls `feed` every [`TURN`], so that the watchdog does not restart a board that takes no part.

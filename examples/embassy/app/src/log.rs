@@ -6,6 +6,7 @@ use defmt::{Debug2Format, error, info, warn};
 use uav_relay::asynch::{AsyncAutopilot, AsyncRelay};
 use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::{Event, Relay};
 use uav_relay_block::Config;
 use uav_relay_chip::reset::Reset;
@@ -111,7 +112,7 @@ pub(crate) async fn events(
         if let Some(autopilot) = autopilot {
             autopilot.handle_event(event);
         }
-        info!("event {}", event);
+        info!("{}", event);
         if event == Event::SetpointChanged
             && let Some(place) = relay.look(Relay::setpoint).flatten()
         {
@@ -127,33 +128,22 @@ pub(crate) async fn events(
 /// Logs the events of the autopilot link.
 pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
     loop {
-        match link.next_event().await {
-            AutopilotEvent::State(State::Silent) => {
-                warn!(
-                    "autopilot: no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2"
-                );
+        let event = link.next_event().await;
+        match event {
+            AutopilotEvent::Mistrusted(Mistrust::SignsOnly) => info!("autopilot: {}", event),
+            AutopilotEvent::Mistrusted(_) => error!("autopilot: {}", event),
+            AutopilotEvent::Restarted
+            | AutopilotEvent::Refused
+            | AutopilotEvent::Released(_)
+            | AutopilotEvent::Waits(_)
+            | AutopilotEvent::LostCleared { .. }
+            | AutopilotEvent::ClearRefused { .. }
+            | AutopilotEvent::FenceBreached
+            | AutopilotEvent::OffLine(_)
+            | AutopilotEvent::State(State::Silent | State::Blind) => {
+                warn!("autopilot: {}", event);
             }
-            AutopilotEvent::State(State::Engaged) => {
-                info!("autopilot: setpoint control engaged");
-            }
-            AutopilotEvent::State(State::Blind) => {
-                warn!("autopilot: no position; keeps the last target");
-            }
-            AutopilotEvent::Released(release) => warn!("autopilot: released, {}", release),
-            AutopilotEvent::Waits(reason) => warn!("autopilot: cannot be engaged, {}", reason),
-            AutopilotEvent::LostCleared { relays, from, .. } => {
-                warn!("relays {} are cleared, by MAVLink {}", relays, from);
-            }
-            AutopilotEvent::ClearRefused { relays, from } => warn!(
-                "relays {} are not cleared: name all lost relays of one side; by MAVLink {}",
-                relays, from
-            ),
-            AutopilotEvent::FenceBreached => warn!("autopilot: fence breached"),
-            AutopilotEvent::Refused => warn!(
-                "autopilot: flies to another target than it was sent; is the setpoint outside its fence?"
-            ),
-            AutopilotEvent::Mistrusted(why) => error!("autopilot: signatures, {}", why),
-            other => info!("autopilot: {}", other),
+            _ => info!("autopilot: {}", event),
         }
     }
 }

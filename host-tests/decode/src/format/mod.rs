@@ -36,7 +36,7 @@ pub enum Kind {
     Array(usize, Box<Kind>),
     /// 00 for none; 01 and an item.
     Option(Box<Kind>),
-    /// A varint count, at most this one, and the items.
+    /// List: a varint count, at most the given number, and the items.
     List(u64, Box<Kind>),
     /// Consecutive fields.
     Group(Vec<Field>),

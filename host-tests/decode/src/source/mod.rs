@@ -28,7 +28,7 @@ pub struct Packet<'a> {
     pub interface: &'a str,
     /// Direction.
     pub direction: Direction,
-    /// Comment; empty for none.
+    /// Comment of the captured packet; empty if the packet has no comment.
     pub comment: &'a str,
     /// Bytes on the wire, possibly truncated.
     pub wire: &'a [u8],

@@ -76,7 +76,9 @@ fn wrong_input_is_one_line_that_names_it() {
     );
     assert_eq!(
         refusal(&["--key", file], &[]),
-        format!("--key {file}: must be 64 hexadecimal digits, as of `openssl rand -hex 32`\n")
+        format!(
+            "--key {file}: must be 64 hexadecimal digits, as printed by `openssl rand -hex 32`\n"
+        )
     );
     #[cfg(unix)]
     {

@@ -31,7 +31,7 @@ const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
 const MOVED: [f64; 3] = [47.408, 8.556, 440.0];
 
-/// Lengths of a degree of latitude and of longitude there, m.
+/// Lengths of a degree of latitude and of a degree of longitude at the sites, m.
 const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
 
 struct Link {
@@ -50,7 +50,7 @@ fn line_to(rx: [f64; 3]) -> Option<Axis> {
     Axis::try_new(site(TX)?, site(rx)?).ok()
 }
 
-/// Reads the rest of the input as operations on a link.
+/// Reads the rest of `input` as operations on an autopilot link, and checks the link after each.
 pub(super) fn operate(input: &mut Input<'_>, signs: bool) {
     let Some(mut link) = Link::new(input, signs) else {
         return;
@@ -339,7 +339,7 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame without its signature; `covered_flags` are the flags in its checksum.
+    /// Checks a frame without its signature. The frame's checksum was computed with `covered_flags`.
     fn look_at(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()

@@ -16,7 +16,7 @@ pub struct Known {
     pub flown: u16,
     /// Newest mission held.
     pub held: MissionId,
-    /// Agreed view.
+    /// View that the relay under test has agreed on.
     pub view: ViewId,
     /// Number of the current pass.
     pub number: u16,
@@ -35,7 +35,7 @@ pub(super) struct Body<'a, 'b> {
 }
 
 impl Body<'_, '_> {
-    /// Appends the number of the current pass, the next, an earlier one, or any.
+    /// Appends a pass number: that of the current, the next or an earlier pass, or any number.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
             0..96 => self.known.number.wrapping_add(1),
@@ -210,7 +210,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the relay's own association number on that side, a small one, or any.
+    /// Appends an association number: the number known from the relay, a small number, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),

@@ -10,7 +10,7 @@ use super::number::number_of;
 /// Range of a shared channel, nodes.
 const NEAR: u16 = 4;
 
-/// Network number of every relay here.
+/// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
 /// Last contents of a relay's frames.

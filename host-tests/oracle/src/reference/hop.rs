@@ -130,7 +130,7 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// Returns the last point from `inside` towards `outside` at which `holds` is true. Either direction, metres.
+/// Returns the last x from `inside` towards `outside`, m, at which `holds` is true. `outside` may be smaller.
 ///
 /// `holds` must be true at `inside`, false at `outside`, and change once. Exact to adjacent f64 values.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {

@@ -14,7 +14,7 @@ use wasm_bindgen_cli_support::Bindgen;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// Scripts of the page, each after those that it needs.
+/// Scripts of the page, in an order in which each follows the scripts that it needs.
 const SCRIPTS: [&str; 7] = [
     "drawing.js",
     "wish.js",
@@ -48,7 +48,7 @@ Usage: cargo page
 It has no options but -h, --help; the target folder is that of CARGO_TARGET_DIR, else `target`
 ";
 
-/// Returns the answer to command line arguments, and true if they are valid; `None` without arguments.
+/// Returns the text to print for command line arguments, and true for valid arguments. `None` without arguments.
 fn answer(arguments: &[String]) -> Option<(String, bool)> {
     match arguments {
         [] => None,

@@ -52,7 +52,7 @@ pub struct Hostile {
     /// --deaf, --soak, --air, --fly, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
-    /// Connect each relay to its neighbours by wires even then. A failure is reported, but the gap is not closed
+    /// Connect each relay to its neighbours by wires, even where --shared is the default. A failure is reported, but the gap is not closed
     #[arg(long)]
     wires: bool,
     #[command(flatten)]
@@ -120,7 +120,7 @@ impl Hostile {
         {
             let after = part.after;
             let line = match uavs {
-                1 => format!("--partition {after}@..: one relay cannot be parted"),
+                1 => format!("--partition {after}@..: one relay alone cannot be partitioned"),
                 _ => format!(
                     "--partition {after}@..: relay must be within 1 to {}",
                     uavs - 1
@@ -200,7 +200,7 @@ impl Hostile {
             .chain(self.flight.begins());
         match all.find(|(_, at)| *at >= end) {
             Some((option, _)) => Err(Failure::input(format!(
-                "{option}: would be ignored: the run ends before, see --soak {}",
+                "{option}: would be ignored, because the run ends earlier: see --soak {}",
                 seconds(end)
             ))),
             None => Ok(()),
@@ -253,7 +253,7 @@ fn partition(text: &str) -> Result<Partition, String> {
     let after = after.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be K@S-T with T after S".to_owned());
+        return Err("must be K@S-T with an end T after the start S".to_owned());
     }
     Ok(Partition { after, from, until })
 }
@@ -388,7 +388,7 @@ fn deaf(text: &str) -> Result<OneWayFailure, String> {
     let of: u16 = of.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be J:I@S-E with E after S".to_owned());
+        return Err("must be J:I@S-E with an end E after the start S".to_owned());
     }
     if by == of {
         return Err("must be J:I@S-E with two different relays".to_owned());
@@ -512,7 +512,7 @@ fn takeover(text: &str) -> Result<Takeover, String> {
     let relay = relay.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be I@S-E with E after S".to_owned());
+        return Err("must be I@S-E with an end E after the start S".to_owned());
     }
     Ok(Takeover {
         relay,

@@ -133,7 +133,9 @@ impl Options {
             }
         }
         if self.closed_loop.is_some() && !self.method.is_for_fields() {
-            let line = format!("--closed-loop: there is nothing to measure with --method {method}");
+            let line = format!(
+                "--closed-loop: would be ignored: with --method {method} relays measure nothing"
+            );
             return Err(Failure::input(line));
         }
         Ok(())

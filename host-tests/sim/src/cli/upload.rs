@@ -93,12 +93,12 @@ const KEYS: [(&str, Key, f64, f64); 20] = [
 ];
 
 impl Uploads {
-    /// Returns true if uploads are requested.
+    /// Returns true if the command line requests an upload.
     pub fn are_planned(&self) -> bool {
         !self.upload.is_empty()
     }
 
-    /// Returns true if relays persist uploads.
+    /// Returns true if simulated relays keep an uploaded mission over a restart.
     pub fn are_stored(&self) -> bool {
         !self.no_store
     }

@@ -28,7 +28,7 @@ pub struct AttackReport {
     pub forged: StruckReport,
     /// Replayed frames.
     pub replayed: StruckReport,
-    /// True if the run ended differently from the same run without the attack.
+    /// True if the run with the attack ended differently from the run without the attack.
     pub ended_otherwise: bool,
     /// Relays whose final position or target differs from the run without the attack.
     pub moved: u64,

@@ -65,7 +65,7 @@ pub struct ChainReport {
     /// SIR of the chain before Algorithm 2 and after each round, linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<f64>,
-    /// Relays of the chain, from the transmitter, if all of them have a position.
+    /// Relays of the chain in order from the transmitter; empty unless every relay has a position.
     pub relays: Vec<RelayReport>,
     /// SIR at the receiver, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -447,7 +447,7 @@ pub struct AirReport {
 }
 
 impl AirReport {
-    /// Report of a run of `setup`; `None` without a shared channel, or with an ideal one.
+    /// Returns the channel's report of a run; `None` for wires and for an ideal channel.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let access = match (setup.settings.wiring, setup.access) {
             (Wiring::Shared, Access::Csma) => "csma",
@@ -475,16 +475,16 @@ impl AirReport {
     }
 }
 
-/// Statistics over the whole run; all absent if not recorded.
+/// Statistics of the availability over the whole run. All are absent in a run that does not record them.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct AvailabilityReport {
     /// Time of the first agreement, s: all relays of a view hold their positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_agreement_s: Option<f64>,
-    /// Share of the time since then in which a longest possible chain held its optimum.
+    /// Share of the time after the first agreement in which a longest possible chain held its optimum.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub availability: Option<f64>,
-    /// Longest continuous time since then without that, s.
+    /// Longest time after the first agreement without a longest possible chain at its optimum, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_outage_s: Option<f64>,
     /// Largest number of groups that held separate agreements at the same time.
@@ -549,7 +549,7 @@ pub struct DroneReport {
     pub h_m: f64,
     /// True if the relay controls the drone.
     pub flown: bool,
-    /// Distance from the relay's setpoint, m, if there is one.
+    /// Distance of the drone from the relay's setpoint, m; absent without a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
 }

@@ -27,7 +27,7 @@ pub struct RelayReport {
     /// Absent if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back: Option<f64>,
-    /// Version of the relay's mission, 0 for the original one; absent without uploads.
+    /// Version of the relay's mission, 0 for the loaded mission; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
 }
@@ -71,7 +71,7 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
             sender.sir_at(mission, from_m, *place).min(f32::MAX),
         ));
         let relay = Station {
-            at: place.cross_section(),
+            cross_section: place.cross_section(),
             power_w: profile.power_w,
         };
         sender = Sender::relay(mission, relay);
@@ -100,7 +100,7 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
         .collect()
 }
 
-/// Formats the relays, the lost ones and Rx as a table; with a y column if `room` is true.
+/// Formats all relays, including lost relays, and Rx as a table; with a y column if `room` is true.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

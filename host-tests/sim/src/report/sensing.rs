@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay::sensing::belief::Belief;
+use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Interference, Interferer, Mission, MissionConfig};
 
 use super::hops::db;
@@ -37,7 +37,7 @@ pub struct SensingReport {
     /// Final SIR of the remaining relays against the true interferers, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub true_sir: Option<f64>,
-    /// Final SIR of the same relays if they knew the interferer, linear; for a single interferer.
+    /// Final SIR of the same relays with a known interferer, linear; only for a single interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
     /// Ratio `true_sir` / `optimum_sir`.
@@ -52,10 +52,10 @@ impl SensingReport {
     /// Report of a run of `setup`; `None` if the relays did not measure.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let sky = setup.sky.as_ref()?;
-        let believed = outcome.relays.first().map(|relay| relay.believed.belief);
+        let believed = outcome.relays.first().map(|relay| relay.believed.estimate);
         let mut report = Self {
             believed: match believed {
-                Some(Belief::Source { source, .. }) => Some(BelievedReport {
+                Some(InterferenceEstimate::Source { source, .. }) => Some(BelievedReport {
                     power_w: source.power_w,
                     x_m: source.x_m,
                     y_m: source.y_m,

@@ -190,38 +190,30 @@ impl Group {
 
     /// Describes the group in a few words, for a picture.
     fn words(&self) -> String {
-        let who = list(&self.relays);
+        let who = named(&self.relays);
         let one = &self.sample;
+        let (relay, other) = (one.relay, one.other.unwrap_or_default());
         match one.what {
             "silent" => format!("{who} silent"),
-            "switched on" => format!("{who} on again"),
-            "lost" => format!("{} lost", one.other.unwrap_or_default()),
-            "found" => format!("{} and {} linked", one.relay, one.other.unwrap_or_default()),
-            "view accepted" => format!("view: {} relays", one.relays.unwrap_or_default()),
-            "converged" => one
-                .sir
-                .map_or_else(|| "spread".to_owned(), |sir| format!("SIR {sir:.3}")),
-            "partition" => format!("partition after {}", one.relay),
-            "partition ended" => format!("partition after {} ended", one.relay),
-            "does not receive" => format!(
-                "{} does not receive {}",
-                one.relay,
-                one.other.unwrap_or_default()
+            "switched on" => format!("{who} switched on"),
+            "lost" => format!("relay {other} lost"),
+            "found" => format!("relays {relay} and {other} linked"),
+            "view accepted" => format!("view of {}", count(one.relays.unwrap_or_default().into())),
+            "converged" => one.sir.map_or_else(
+                || "relays spread evenly".to_owned(),
+                |sir| format!("SIR {sir:.3}"),
             ),
-            "receives again" => format!(
-                "{} receives {} again",
-                one.relay,
-                one.other.unwrap_or_default()
-            ),
-            "not received by" => {
-                format!("{} does not receive {who}", one.other.unwrap_or_default())
-            }
-            "mission mismatch" => format!("{}: another mission", one.other.unwrap_or_default()),
-            "key mismatch" => format!("{}: another key", one.other.unwrap_or_default()),
-            "epoch went back" => format!("{}: old epoch", one.other.unwrap_or_default()),
-            "duplicate index" => format!("duplicate number {}", one.other.unwrap_or_default()),
+            "partition" => format!("partition after relay {relay}"),
+            "partition ended" => format!("partition after relay {relay} ended"),
+            "does not receive" => format!("relay {relay} does not receive {other}"),
+            "receives again" => format!("relay {relay} receives {other} again"),
+            "not received by" => format!("relay {other} does not receive {}", list(&self.relays)),
+            "mission mismatch" => format!("relay {other} has another mission"),
+            "key mismatch" => format!("relay {other} has another key"),
+            "epoch went back" => format!("relay {other} has an old epoch"),
+            "duplicate index" => format!("duplicate relay number {other}"),
             "engaged" | "released" if self.relays.len() > 1 => {
-                format!("{} {}", self.relays.len(), one.what)
+                format!("{} {}", count(self.relays.len()), one.what)
             }
             "engaged" | "released" | "blind" => format!("{who} {}", one.what),
             "restarted" => format!("{who}: autopilot restarted"),
@@ -235,11 +227,7 @@ impl Group {
     /// Describes the group as a line of text.
     fn line(&self) -> String {
         let many = self.relays.len() > 1;
-        let who = format!(
-            "{} {}",
-            if many { "relays" } else { "relay" },
-            list(&self.relays)
-        );
+        let who = named(&self.relays);
         let one = &self.sample;
         let other = one.other.unwrap_or_default();
         let relay = one.relay;
@@ -257,20 +245,23 @@ impl Group {
             ),
             "lease expired" => format!("{who}: lease expired"),
             "not received by" => format!("relay {other} does not receive {who}"),
-            "mission mismatch" => format!("{who}: relay {other} flies another mission"),
+            "mission mismatch" => format!("{who}: relay {other} has another mission"),
             "key mismatch" => format!("{who}: relay {other} signs with another key"),
             "epoch went back" => format!("{who}: the epoch of relay {other} went back"),
             "duplicate index" => format!("{who}: duplicate relay number {other}"),
-            "engaged" if many => format!("{who}: setpoint control engaged"),
             "engaged" => format!("{who}: setpoint control engaged"),
             "released" => format!("{who} released: the pilot took control"),
-            "blind" => format!("{who}: no position of its drone"),
+            "blind" => format!("{who}: the autopilot reports no position"),
             "restarted" => format!("{who}: autopilot restarted"),
-            "no quorum" => format!("{who}: no quorum, holding position"),
+            "no quorum" => format!("{who}: no quorum, so the position is held"),
             "new estimate" => format!("{who}: new interference estimate"),
-            "interferer unclear" => format!("{who}: the measurements do not fit one interferer"),
+            "interferer unclear" => {
+                format!("{who}: the measurements do not fit a single interferer")
+            }
             "sensor off" => {
-                format!("{who}: the measurements of relay {other} do not fit those of the others")
+                format!(
+                    "{who}: the measurements of relay {other} do not fit those of the other nodes"
+                )
             }
             "converged" if one.sir.is_none() => {
                 format!(
@@ -318,6 +309,12 @@ pub(super) fn list(relays: &[u16]) -> String {
     }
 }
 
+/// Formats relays by their numbers: "relay 3", "relays 3 and 5".
+fn named(relays: &[u16]) -> String {
+    let noun = if relays.len() > 1 { "relays" } else { "relay" };
+    format!("{noun} {}", list(relays))
+}
+
 /// Formats a count: "1 relay", "8 relays".
 fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
@@ -333,7 +330,12 @@ pub(super) fn text(timeline: &[MomentReport]) -> String {
     for (number, group) in groups.iter().enumerate() {
         if number >= ENDS && groups.len() > 2 * ENDS && number + ENDS < groups.len() {
             if number == ENDS {
-                _ = writeln!(text, "{:>12}  {} more", "...", groups.len() - 2 * ENDS);
+                _ = writeln!(
+                    text,
+                    "{:>12}  {} more lines",
+                    "...",
+                    groups.len() - 2 * ENDS
+                );
             }
             continue;
         }
@@ -474,7 +476,7 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
         .find(|moment| moment.what == TimelineEvent::Offered(version))
 }
 
-/// Returns the time of the event that removed relays from the view, or brought them back.
+/// Returns the time of the first event that removed relays of `lost` or brought back relays of `back`.
 fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {
@@ -517,7 +519,7 @@ fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Mom
     later.iter().rfind(placed).filter(|_| all)
 }
 
-/// Returns the sweeps that `members` began in `span`, as far as the log tells.
+/// Returns the number of sweeps that `members` began during `span`, by the sweep counts in the log.
 fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant)) -> u32 {
     let begun = |relay: u16, by: Instant| {
         let mut story = moments.iter().rev();
@@ -561,12 +563,7 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
         );
     }
     if same > 0 {
-        let times = if same == 1 {
-            "once"
-        } else {
-            &format!("{same} times")
-        };
-        _ = writeln!(text, "accepted {times} with the same relays");
+        _ = writeln!(text, "views with unchanged relays: {same}");
     }
     text
 }
@@ -580,24 +577,20 @@ impl RecoveryReport {
         if let Some(detected) = self.detected_s {
             _ = write!(
                 text,
-                "view accepted {:.3} s later, ",
+                "view accepted {:.3} s after the detection, ",
                 self.formed_s - detected
             );
         }
         if let Some(offered) = self.offered_s {
             let after = self.formed_s - offered;
-            _ = if self.detected_s.is_some() {
-                write!(text, "adopted {after:.3} s after the upload began, ")
-            } else {
-                write!(text, "adopted after {after:.3} s, ")
-            };
+            _ = write!(text, "adopted {after:.3} s after the upload began, ");
         }
         let Some(converged) = self.converged_s else {
-            return text + "another view came before it converged";
+            return text + "replaced by another view before convergence";
         };
         _ = write!(
             text,
-            "converged {:.3} s after that",
+            "converged {:.3} s after the view",
             converged - self.formed_s
         );
         if let Some(sweeps) = self.sweeps {

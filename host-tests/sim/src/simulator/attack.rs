@@ -81,7 +81,7 @@ impl Attacker {
         }
     }
 
-    /// Times and kinds of all frames, unsorted.
+    /// Returns the time and the kind of every frame of the attack, unsorted.
     pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, AttackKind)> {
         let Attack {
             forged,
@@ -327,7 +327,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     frame.get(..len).unwrap_or_default().to_vec()
 }
 
-/// Returns a newer-looking mission with another interferer position. `None` in a field, where uploads do not exist.
+/// Returns a forged upload with a newer version and another interferer. `None` in a field, which has no uploads.
 fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     let config = mission.config();
     let at = mission.interferer()?;

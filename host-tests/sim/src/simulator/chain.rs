@@ -117,7 +117,7 @@ impl Chain {
         self.finish()
     }
 
-    /// Returns the outcome of the run so far.
+    /// Ends the run and returns its outcome.
     pub fn finish(mut self) -> Outcome {
         self.outcome.ended = self.now;
         self.outcome.sweeps = self.progress().0;
@@ -147,7 +147,7 @@ impl Chain {
                 relays: member.relay.mission().relays(),
                 view: member.relay.view().number(),
                 version: member.relay.version(),
-                believed: member.relay.belief(),
+                believed: member.relay.interference_estimate(),
                 sites: member.relay.sites(),
                 seen: Seen::of(&member.relay, member.killed.is_none()),
             })
@@ -320,7 +320,7 @@ pub struct Chain {
     outcome: Outcome,
     now: Instant,
     happenings: u64,
-    /// Number of `Converged` events so far.
+    /// Number of `Converged` events of this relay.
     holding: usize,
     /// Planned kills, boots, partitions, uploads and attacker frames that are still pending.
     ahead: usize,

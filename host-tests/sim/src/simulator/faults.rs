@@ -180,7 +180,7 @@ pub struct LinkSpec {
 }
 
 impl Default for LinkSpec {
-    /// 115 200 baud and 2 ms, as of a telemetry radio at short range.
+    /// Returns 115 200 baud and a latency of 2 ms, as of a telemetry radio at short range.
     fn default() -> Self {
         Self {
             baud: 115_200,

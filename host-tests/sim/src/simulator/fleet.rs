@@ -227,7 +227,7 @@ impl Vehicle {
         self.landed != ON_GROUND
     }
 
-    /// Returns true unless the pilot has taken over.
+    /// Returns true while the pilot lets the relay control the drone.
     pub(super) fn is_lent(&self, now: Instant) -> bool {
         !self.pilot.has_sticks(now)
     }
@@ -506,7 +506,7 @@ impl Pilot {
         now >= self.arms_at
     }
 
-    /// Handles the end of the climb.
+    /// Ends the drone's initial climb. The pilot then hands control to the relay.
     fn is_up(&mut self, now: Instant) {
         // Keep a later hand-over time: the autopilot may have restarted during the climb.
         let looked = now + Duration::from_millis(1_000 * LOOKS_S);

@@ -318,7 +318,7 @@ pub const LEAST_EXPONENT: u32 = 3;
 /// Largest back-off exponent, `macMaxBE`: each busy channel doubles the bound, up to 2^5 - 1 slots. Retries are unlimited.
 pub const MOST_EXPONENT: u32 = 5;
 
-/// Frames that a radio holds, including the one being sent. A full queue drops the newest frame, as modems do.
+/// Number of frames that a radio queues, including the frame in transmission. A full queue drops the newest frame, as modems do.
 pub const QUEUE: usize = 4;
 
 /// Counters of a channel.
@@ -354,7 +354,7 @@ enum State {
 #[derive(Debug, Default)]
 struct Radio {
     state: State,
-    /// Queued frames, without the one being sent.
+    /// Queued frames, without the frame in transmission.
     queue: VecDeque<Vec<u8>>,
 }
 
@@ -364,7 +364,7 @@ impl Radio {
         matches!(self.state, State::Turnaround { .. } | State::Sending)
     }
 
-    /// Returns the number of frames held, including the one being sent.
+    /// Returns the number of queued frames, including the frame in transmission.
     fn held(&self) -> usize {
         self.queue.len() + usize::from(self.state == State::Sending)
     }

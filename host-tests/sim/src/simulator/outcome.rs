@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use uav_relay::sensing::belief::Told;
+use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
 
 use super::attack::Struck;
@@ -22,7 +22,7 @@ pub enum TimelineEvent {
     Booted,
     /// The relay lost its neighbour at that side.
     Lost(Side),
-    /// The relay received its lost neighbour, or a new one, at that side.
+    /// The relay receives its lost neighbour, or a new neighbour, at this side.
     Found(Side),
     /// The relay accepted a new view.
     ViewAccepted {
@@ -39,27 +39,27 @@ pub enum TimelineEvent {
     NoQuorum,
     /// The relay's lease expired.
     LeaseLapsed,
-    /// The other node reports that it does not receive the relay.
+    /// Another node reports that it does not receive the relay.
     NotHeard,
-    /// The other node has a different mission.
+    /// Another node has a different mission.
     MissionMismatch,
-    /// The other node signs with a different key.
+    /// Another node signs with a different key.
     KeyMismatch,
-    /// The other node's epoch went back.
+    /// Another node's epoch went back.
     EpochWentBack,
     /// The number of the relay or of the other node is used twice.
     DuplicateIndex,
     /// The relay accepted its position in an agreement.
     Converged,
-    /// The leader found that no target can be met.
+    /// The leader found that the chain can meet no target SIR.
     Infeasible,
-    /// A partition begins between the relay and the next one.
+    /// A partition begins between this relay and the next relay toward Rx.
     Partitioned,
-    /// The partition between the relay and the next one ends.
+    /// The partition between this relay and the next relay toward Rx ends.
     PartitionEnded,
-    /// The relay stops receiving the other node.
+    /// The relay stops receiving another node.
     Deaf,
-    /// The relay receives the other node again.
+    /// The relay receives another node again.
     Hears,
     /// A ground station offers a mission of this version. Tx counts as relay 0, Rx as the relay after the last.
     Offered(u16),
@@ -79,7 +79,7 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The other node's measurements contradict those of all others.
+    /// The measurements of another node contradict the measurements of all other nodes.
     SensorOff,
 }
 
@@ -96,7 +96,7 @@ pub struct Moment {
     pub other: Option<u16>,
     /// Target SIR of the relay's position, linear.
     pub target: Option<f32>,
-    /// Sweeps that the relay has begun so far.
+    /// Number of sweeps that the relay has begun until this time.
     pub sweeps: u32,
 }
 
@@ -142,7 +142,7 @@ pub struct RelayEnd {
     /// Version of its mission.
     pub version: u16,
     /// Interference estimate of the relay.
-    pub believed: Told,
+    pub believed: NumberedEstimate,
     /// Sites of the relay's mission; `None` for those loaded before take-off.
     pub sites: Option<Sites>,
     /// Observed state.
@@ -154,9 +154,9 @@ pub struct RelayEnd {
 pub struct Watched {
     /// Time of the first agreement: all relays of a view hold their positions.
     pub first_agreement: Option<Instant>,
-    /// Share of the time since then in which a longest possible chain held its optimum. 0 without an agreement.
+    /// Share of the time after the first agreement in which a longest possible chain held its optimum.
     pub availability: Option<f64>,
-    /// Longest continuous time since then without that.
+    /// Longest time after the first agreement without a longest possible chain at its optimum.
     pub longest_wrong: Option<Duration>,
     /// Largest number of groups that held separate agreements at the same time.
     pub most_flying: usize,
@@ -250,7 +250,7 @@ pub struct Shot {
     pub is_on: bool,
     /// Setpoint, if any; a relay that is switched off keeps its last one.
     pub place: Option<Placement>,
-    /// Frames sent on all links so far.
+    /// Number of frames sent on all links until this time.
     pub messages: u64,
 }
 
@@ -279,7 +279,7 @@ pub struct Film {
 pub enum Link {
     /// The shared channel.
     Shared,
-    /// The link between this node and the next one; Tx is node 0.
+    /// Link between this node and the next node toward Rx; Tx is node 0.
     After(u16),
 }
 

@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Beta, Distribution as _, Gamma, StandardNormal};
-use uav_relay::sensing::belief::Told;
+use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, Placement, Sample};
 use uav_relay_scenario::scene::{Place, Scene};
 
@@ -169,15 +169,15 @@ fn decibel(db: f64) -> f64 {
 pub struct Stand {
     /// Time of the snapshot.
     pub at: Instant,
-    /// Living relays, by index from 1.
+    /// Indices of the living relays, from 1.
     pub nodes: Vec<u16>,
     /// Position of each living relay that has one. Its drone's, or its setpoint if drones are not simulated.
     pub places: Vec<Placement>,
     /// Setpoints; `None` unless every relay has one.
     pub goals: Option<Vec<Placement>>,
     /// Interference estimate of relay 1.
-    pub believed: Told,
-    /// Number of agreements on new positions so far.
+    pub believed: NumberedEstimate,
+    /// Number of agreements on new positions until this time.
     pub agreements: u32,
 }
 

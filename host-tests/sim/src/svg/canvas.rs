@@ -361,7 +361,7 @@ impl Labels {
         }
     }
 
-    /// Marks an area as occupied.
+    /// Marks an area as occupied, so that no label is placed in it.
     pub(super) fn take(&mut self, area: Area) {
         self.taken.push(area);
     }

@@ -45,7 +45,7 @@ pub fn draw(picture: &Picture) -> String {
     canvas.finish()
 }
 
-/// Returns the scales: x contains the chain and all near interferers, h starts at the ground.
+/// Returns the scales of the axes. x includes the chain and all near interferers; h starts at the ground.
 fn frame(picture: &Picture) -> Frame {
     let distance = length(picture);
     let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);

@@ -105,14 +105,14 @@ const UNKNOWN: (&str, f64) = ("#999999", 2.4);
 
 const SIR_SIZE: f64 = 10.0;
 
-/// Distance of a number from its line, more than a relay's radius.
+/// Distance of an SIR label from its hop's line, larger than the radius of a relay's circle.
 const GAP: f64 = 4.6;
 
 /// Candidate positions of a number: share of the hop's length, and distance above (negative: below).
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
-/// Largest number of hops with stacked numbers; more are thinned out.
+/// Largest number of hops whose SIR labels are all drawn. Pictures of longer chains omit some labels.
 const FEW: usize = 21;
 
 pub(super) struct Hop {

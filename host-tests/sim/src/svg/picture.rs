@@ -26,7 +26,7 @@ pub struct Picture {
     pub interferers: Vec<(f64, f64, f64)>,
     /// Former or estimated interferers, drawn faint if they are in the plot's range.
     pub others: Vec<(f64, f64, f64)>,
-    /// Kind of the interferers in `others`.
+    /// Meaning of the interferers in `others`: the previous mission, or the estimate.
     pub others_are: OtherInterferers,
     /// Relays from Tx to Rx: x and altitude, m; non-finite positions are omitted.
     pub nodes: Vec<(f64, f64)>,

@@ -13,10 +13,10 @@ const CROWD: usize = 8;
 /// Largest number of lines about far interferers.
 const FAR_LINES: usize = 4;
 
-/// Power, W, with x and y, m.
+/// Interferer: power, W, and x and y, m.
 type Source = (f64, f64, f64);
 
-/// Splits the interferers into those within the plot's range and those beyond it.
+/// Splits interferers into a list within the plot's range and a list beyond it.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
     all.iter()
@@ -66,7 +66,7 @@ fn whole((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
-/// Returns the former or estimated interferers to draw, with coordinates. Present markers hide former ones.
+/// Returns the former or estimated interferers to draw: those not hidden by a present interferer.
 fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));
@@ -105,7 +105,7 @@ pub(super) fn label_others(
     }
 }
 
-/// Labels the interferers on the ground, after everything else there.
+/// Labels the interferers on the ground, after all other objects on the ground.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (mut inside, _) = sorted(&picture.interferers, length(picture));
     let ground = frame.h.at(0.0);

@@ -313,11 +313,11 @@ fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
     let output = chain(&format!("{options} --svg {name}"));
     assert!(output.status.success(), "{output:?}");
     let svg = std::fs::read_to_string(&file).unwrap();
-    assert!(svg.contains(">spread<"), "{svg}");
+    assert!(svg.contains(">relays spread e...<"), "{svg}");
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 
-/// The SIR and the optimum are those of the remaining relays.
+/// Checks that SIR and optimum of a report are computed for the remaining relays only.
 #[test]
 fn a_lost_relay_does_not_count() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";

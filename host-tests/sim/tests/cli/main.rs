@@ -339,7 +339,7 @@ fn who_has_a_scenario_is_told_its_keys() {
     assert_eq!(most["uavs"], 250);
 }
 
-/// A mission that was adopted is never reported as not adopted.
+/// Checks that the report of an adopted mission never says that the mission was not adopted.
 #[test]
 fn what_was_adopted_is_not_denied() {
     for (arguments, is_denied) in [

@@ -100,7 +100,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
         " s  relays 1 to 8 stored mission 1",
         " s  mission 1 adopted: 8 relays",
         "converged: 8 relays, SIR 1.582",
-        "view 1, mission 1 uploaded: adopted after 0.",
+        "view 1, mission 1 uploaded: adopted 0.",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }
@@ -133,7 +133,7 @@ fn of_two_uploads_the_later_one_is_flown() {
     assert_eq!(versions, [1, 2]);
 }
 
-/// An upload of every parameter gives the result of a scenario file with the same values.
+/// Checks that an upload of every parameter gives the same result as a scenario file with these values.
 #[test]
 fn every_key_is_that_of_a_scenario_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,7 +153,7 @@ fn every_key_is_that_of_a_scenario_file() {
     assert_eq!(report["relays"][0]["h_m"].as_f64(), Some(60.0));
 }
 
-/// A rebooted relay flies the uploaded mission, from its own storage or from its neighbours.
+/// Checks that a rebooted relay gets the uploaded mission from its own storage or its neighbours.
 #[test]
 fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     let folder = tempfile::tempdir().unwrap();

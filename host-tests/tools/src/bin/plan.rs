@@ -438,7 +438,7 @@ fn write_out(
     ))
 }
 
-/// Loads the other sections of the scenario file; its number of relays must be that of the plan.
+/// Loads the other sections of the scenario file, which must state the plan's number of relays or none.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());

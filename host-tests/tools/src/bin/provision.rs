@@ -75,7 +75,7 @@ fn run(options: &Options) -> Result<String, String> {
         (_, _, Some(dir)) => asked.folder(&flight, flown.as_ref(), dir)?,
         _ => {
             return Err(
-                "--index and --out, or --all and --out-dir: one of both is needed".to_owned(),
+                "either --index with --out, or --all with --out-dir must be given".to_owned(),
             );
         }
     };
@@ -233,7 +233,7 @@ impl<'a> Asked<'a> {
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
-                    "{}: [plan] is of another scenario: relays in this one reach no agreement",
+                    "{}: [plan] was computed for another scenario: relays in this scenario reach no agreement",
                     self.name
                 )),
                 None => Ok(None),
@@ -268,7 +268,8 @@ impl<'a> Asked<'a> {
         let epoch = self.options.epoch.or_else(seconds);
         Ok(Some(Secret {
             key: key::load("--key-file", file)?,
-            epoch: epoch.ok_or("--epoch: is needed where the clock says no time")?,
+            epoch: epoch
+                .ok_or("--epoch: is required, because this machine's clock has no valid time")?,
         }))
     }
 
@@ -496,7 +497,7 @@ fn chosen_method(
             let said = format!("{method:?}").to_lowercase();
             if is_planned {
                 return Err(format!(
-                    "{name}: network.method = \"{text}\": must be \"{said}\", as its [plan] has it, or plan again"
+                    "{name}: network.method = \"{text}\": must be \"{said}\", the method of its [plan]; or compute the plan again"
                 ));
             }
             command::complain(&format!(

@@ -46,11 +46,11 @@ struct Row {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
-    /// SIR above the line at the lowest altitude, linear.
+    /// Best SIR of a relay above the line at the lowest altitude, linear.
     line_sir_linear: f32,
     /// SIR above the line at a free altitude, linear.
     altitude_sir_linear: f32,
-    /// SIR with free lateral position at the lowest altitude, linear.
+    /// Best SIR with a free lateral position at the lowest altitude, linear.
     side_sir_linear: f32,
     both_sir_linear: f32,
     both_altitude_m: f32,

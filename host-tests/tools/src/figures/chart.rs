@@ -203,7 +203,7 @@ const ROUNDING: f64 = 1e-9;
 /// Kind of axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// Linear.
+    /// Linear axis.
     Linear,
     /// Logarithmic; all values above 0.
     Log,

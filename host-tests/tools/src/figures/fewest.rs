@@ -93,7 +93,7 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     )
 }
 
-/// Returns the figure by position of the interferer.
+/// Returns the figure of the smallest number of relays by the interferer's position.
 pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     let rows = by_place(&all_targets())?;
     let at = |target: u16| {

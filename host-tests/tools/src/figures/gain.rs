@@ -23,7 +23,7 @@ struct Row {
     sir_linear: f64,
     /// Mean SIR of the worst hop over random chains, linear.
     random_sir_linear: f64,
-    /// Standard error of that mean, linear.
+    /// Standard error of `random_sir_linear`, linear.
     random_error_linear: f64,
     /// SIR of the worst hop of the interference-blind chain, linear.
     blind_sir_linear: f64,

@@ -26,7 +26,7 @@ struct Row {
     common_altitude_m: f64,
     /// SIR at the best common altitude by Algorithm 1, linear.
     common_sir_linear: f64,
-    /// SIR after Algorithm 2 from there, linear.
+    /// SIR after Algorithm 2 from the common altitude, linear.
     adjust_sir_linear: f64,
     /// Messages of both algorithms together.
     adjust_messages: u64,
@@ -36,7 +36,7 @@ struct Row {
     joint_messages: u64,
     /// Gain of Algorithm 2 over the common altitude, percent.
     adjust_gain_percent: f64,
-    /// Gain of the joint method over the common altitude, percent.
+    /// SIR gain of the joint method over the best common altitude, percent.
     joint_gain_percent: f64,
 }
 

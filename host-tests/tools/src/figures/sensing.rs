@@ -12,7 +12,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 /// Random scenes per line.
 pub const SCENES: u64 = 60;
-/// Random scenes per speed of a moving interferer.
+/// Number of random scenes for each speed of a moving interferer.
 pub const PASSES: u64 = 6;
 
 /// Speeds of the interferer, m/s.
@@ -89,7 +89,7 @@ fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the figure.
+/// Returns the figure of the SIR lost by the number of agreements, and of the share kept by speed.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {

@@ -36,7 +36,7 @@ pub struct Sheet {
 pub struct Table {
     /// Name of its file without `.csv`.
     pub name: &'static str,
-    /// CSV text: head, then rows.
+    /// CSV text: a header line, then the rows.
     pub rows: String,
 }
 
@@ -92,7 +92,7 @@ pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
     Ok(())
 }
 
-/// Writes `index.html` with these figures to `dir` and returns its path.
+/// Writes `index.html` with the figures of `sheets` to `dir`; returns the file's path.
 pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, FigureError> {
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>uav-relay: figures</title>\n\

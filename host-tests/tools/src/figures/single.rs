@@ -102,7 +102,7 @@ fn row(tx_w: f64, relay_w: f64, altitude_m: u32, draws: u32) -> Option<Row> {
 // The paper prints an average gain in SIR of 30.14 % over a random position and of 25.73 % over the interference-blind method,
 // and up to 65 %, without the powers. This file computes many powers and several ways of averaging.
 
-/// Powers of Tx, W.
+/// Transmit powers of Tx in the figure, W.
 pub const TX_W: [f64; 17] = [
     5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 31.5, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0,
     200.0,

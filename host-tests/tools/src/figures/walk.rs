@@ -21,7 +21,7 @@ pub struct Chain {
     pub sir: f64,
 }
 
-/// Returns the chain with every hop as long as `target` (linear, > 0) allows. `None` if a hop cannot meet it.
+/// Returns the chain with every hop as long as `target` (linear, > 0) allows. `None` if a hop cannot meet the target.
 ///
 /// If the target is too high, the chain ends short of its end, with a lower SIR on the last hop. Work: N reaches.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {

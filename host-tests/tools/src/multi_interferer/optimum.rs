@@ -173,7 +173,7 @@ fn altitudes(least: f64, most: f64) -> Vec<f64> {
     altitudes
 }
 
-/// Returns the best argument of a golden-section search on [`low`, `high`], and the value there.
+/// Returns the best argument found by golden-section search on [`low`, `high`], and its value.
 pub(super) fn golden(
     mut low: f64,
     mut high: f64,
@@ -220,7 +220,7 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// A target that every hop except the first can meet.
+/// Stages of the dynamic program for one target, which every hop except the first can meet.
 pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
@@ -341,7 +341,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns `wish` if `holds` is true there. Otherwise returns the last such point on the way from `sure`, where it is true.
+/// Returns the last point from `sure` toward `wish` at which `holds` is true. `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(wish) {
         wish

@@ -7,7 +7,7 @@ use core::task::Poll;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::optimiser::pass::{Behind, Link};
-use uav_relay::optimiser::spacing::Stand;
+use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
@@ -48,7 +48,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
     let own_of = |index| {
         let seat = seat_of(index);
         Station {
-            at: solver.at(index, seat),
+            cross_section: solver.at(index, seat),
             power_w: seat.power_w,
         }
     };
@@ -69,14 +69,16 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         let from_m = places.last().map_or(0.0, |place| place.x_m);
         let mut reaches = PerTarget::new();
         link_of(index).extend(&[target], &[from_m], &mut reaches);
-        places.push(own_of(index).at.at(*reaches.first()?));
+        places.push(own_of(index).cross_section.at(*reaches.first()?));
     }
     for index in (2..=mission.relays()).rev() {
         let before = usize::from(index) - 2;
         let [from, place] = places.get_mut(before..before + 2)? else {
             return None;
         };
-        if let Stand::At(x_m) = link_of(index).stand(target, from.x_m, place.x_m)? {
+        if let RequiredPosition::At(x_m) =
+            link_of(index).required_position(target, from.x_m, place.x_m)?
+        {
             from.x_m = x_m;
         }
     }

@@ -17,7 +17,7 @@ pub struct Flown {
     pub plan: Plan,
     /// Best SIR (linear) of the worst hop that the planner finds for the same number of relays.
     pub best_sir: f64,
-    /// True if one hypothetical interferer stands for all interferers of the scenario on board.
+    /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
 }
 

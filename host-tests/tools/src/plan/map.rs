@@ -59,7 +59,7 @@ impl fmt::Display for Number {
 /// A plan as map features.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
-    /// Sites, relays, interferers, then the hops from Tx on.
+    /// Features of the map: sites, relays and interferers, then the hops in order from Tx.
     pub features: Vec<Feature>,
     /// Height of the mean sea level above the ellipsoid, m, if the scenario states it.
     pub geoid_m: Option<f64>,

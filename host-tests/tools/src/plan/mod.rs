@@ -157,10 +157,10 @@ impl Why {
                 let (target, most) = (unit.asked(*target), unit.say(*most));
                 match relays {
                     Some(relays) => format!(
-                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the most is {most}, with {relays}"
+                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR is {most}, with {relays}"
                     ),
                     None => format!(
-                        "no number of relays that was tried, up to {limit}, gives every hop an SIR of {target}: the most found is {most}"
+                        "no tried number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR found is {most}"
                     ),
                 }
             }

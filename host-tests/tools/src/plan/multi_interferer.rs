@@ -280,7 +280,7 @@ impl Candidates {
 }
 
 impl Best {
-    /// Creates the chain at the f32 positions that relays use.
+    /// Creates the chain at `places`, rounded to the f32 numbers that relays use.
     fn new(scene: &Scene, places: &[impl Copy + Into<Place>], proven: bool) -> Self {
         let places: Vec<Placement> = places
             .iter()

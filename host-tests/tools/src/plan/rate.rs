@@ -68,7 +68,7 @@ pub struct BestRate {
     pub best_rate_bps: f64,
     /// Numbers tried: 1 to this one.
     pub tried_uavs: u16,
-    /// True if no larger number can carry more, because the SIR at the receiver is bounded.
+    /// True if a larger number of relays is proven not to carry more.
     pub best_is_proven: bool,
 }
 
@@ -149,7 +149,7 @@ impl Rates {
     }
 }
 
-/// Returns the largest number of relays to try.
+/// Returns the largest number of relays for which the planner computes the data rate.
 fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     let is_several =
         matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);

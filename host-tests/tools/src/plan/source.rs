@@ -39,7 +39,7 @@ pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPl
     } else {
         first(&mission, profile)
     }
-    .ok_or_else(|| NoPlan::Wrong("the place is not between Tx and Rx".to_owned()))?;
+    .ok_or_else(|| NoPlan::Wrong("the relay's position is not between Tx and Rx".to_owned()))?;
     if !(found.sir > 0.0) {
         return Err(nothing());
     }

@@ -37,45 +37,45 @@ impl fmt::Display for BlockError {
             Self::Refused(refusal) => refusal.fmt(f),
             Self::Points(points) => write!(
                 f,
-                "field: a drone has room for {MAX_POINTS} points, and these are {points}"
+                "the field has {points} points: a drone's block holds at most {MAX_POINTS}"
             ),
             Self::Config(ConfigError::Index) => {
-                f.write_str("index must be within 1 to the number of relays")
+                f.write_str("the relay's index must be within 1 to the number of relays")
             }
             Self::Config(ConfigError::Profile) => {
-                f.write_str("altitude or power of that relay is out of range")
+                f.write_str("the relay's altitude must be within the mission's band and 0.1 to 1e5 m, its power within 1e-6 to 1e6 W")
             }
-            Self::Config(ConfigError::Method) => f.write_str("method must be align in a field"),
+            Self::Config(ConfigError::Method) => f.write_str("the method must be align in a scenario with a [field]"),
             Self::Config(ConfigError::Adjust) => {
-                f.write_str("rounds must be within 1 to 65535, explore within 0 to 1e5")
+                f.write_str("the number of rounds must be within 1 to 65535, explore within 0 to 1e5 m")
             }
             Self::Config(ConfigError::Measure) => {
-                f.write_str("samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6")
+                f.write_str("the number of samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6 W")
             }
             Self::Config(ConfigError::Listen) => f.write_str(
-                "listen: is for a scenario with [[interferer]] or none, not with a [field]",
+                "[listen] needs a scenario with [[interferer]] or without interference, not one with a [field]",
             ),
             Self::Config(ConfigError::Secret) => {
-                f.write_str("the key must not be all 0, the epoch within 1 to 4294967294")
+                f.write_str("the key must contain a byte other than 0, and the epoch must be within 1 to 4294967294")
             }
             Self::Config(ConfigError::Speed) => {
-                f.write_str("the greatest speed must be within 0.1 to 20, of a drone with sites")
+                f.write_str("the maximum speed must be within 0.1 to 20 m/s, and needs a scenario with a [site]")
             }
             Self::Config(ConfigError::AutopilotKey) => {
-                f.write_str("an autopilot's key is for a drone with sites")
+                f.write_str("an autopilot's key needs a scenario with a [site]")
             }
             Self::Course(CourseError::Axis(error)) => error.fmt(f),
             Self::Course(CourseError::Distance(along)) => {
                 write!(
                     f,
-                    "the sites are {along:.3} m apart, but the mission's distance differs"
+                    "the sites are {along:.3} m apart: the mission's distance must be the same"
                 )
             }
             Self::Course(error) => error.fmt(f),
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
             Self::Config(_) | Self::Changed => {
-                f.write_str("the block does not reproduce the mission")
+                f.write_str("the drone would read another mission from this block than that of the scenario")
             }
         }
     }

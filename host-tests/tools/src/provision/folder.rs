@@ -103,7 +103,7 @@ fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String
 pub struct Heading {
     /// Name of the scenario.
     pub scenario: String,
-    /// Number of relays.
+    /// Number of relays in the provisioned chain.
     pub uavs: u16,
     /// Network number.
     pub network: u16,

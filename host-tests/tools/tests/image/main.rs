@@ -157,7 +157,7 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
     }
 }
 
-/// A block inside the image would be overwritten by the next image.
+/// Checks that each board's block is outside its image, so that flashing an image keeps the block.
 #[test]
 fn a_board_has_its_block_where_its_memory_says_that_no_image_reaches() {
     let embassy = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/embassy");

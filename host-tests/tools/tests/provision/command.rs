@@ -231,7 +231,7 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
         ),
         (
             joint + &planned,
-            "network.method = \"joint\": must be \"align\", as its [plan] has it",
+            "network.method = \"joint\": must be \"align\", the method of its [plan]",
         ),
     ] {
         let output = run(&sections, "");
@@ -441,7 +441,7 @@ fn all_or_none_is_written() {
         dir.display()
     );
     let line = refusal(&wide);
-    assert!(line.contains("a drone has room for 16 points"), "{line}");
+    assert!(line.contains("a drone's block holds at most 16"), "{line}");
     assert!(!dir.exists());
     // A folder with the name of a block cannot be replaced: files renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();

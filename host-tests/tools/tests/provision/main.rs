@@ -83,7 +83,7 @@ fn provision(arguments: &str) -> Output {
         .unwrap()
 }
 
-/// Returns the single line on standard error of a run that exits with status 2.
+/// Runs `provision`, which must exit with status 2, and returns its one error line.
 fn refusal(arguments: &str) -> String {
     let output = provision(arguments);
     let text = String::from_utf8(output.stderr).unwrap();

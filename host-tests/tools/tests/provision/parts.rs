@@ -99,7 +99,7 @@ fn a_bad_key_is_named_and_not_shown() {
     let good = "0123456789abcdef".repeat(4);
     assert!(key::parse(&good).is_ok());
     let length = "64 hexadecimal digits";
-    let digits = "hexadecimal digits and nothing else";
+    let digits = "must contain only hexadecimal digits";
     for (content, words) in [
         ("", length),
         (&good[1..], length),

@@ -4,15 +4,15 @@ extern crate std;
 
 use std::vec::Vec;
 
-use super::{Electorate, Held, VOTES, decide};
+use super::{Electorate, OtherLeases, VOTES, decide};
 use crate::time::Duration;
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-const fn left(lease_left: u16) -> Held {
-    Held {
+const fn left(lease_left: u16) -> OtherLeases {
+    OtherLeases {
         lease_left: Duration::from_millis(100 * lease_left as u64),
-        ..Held::NONE
+        ..OtherLeases::NONE
     }
 }
 
@@ -32,7 +32,7 @@ impl Chain {
         Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
     }
 
-    /// Makes the relay at place `at`, from 0, accept `view`; returns true if it does.
+    /// Makes the relay with list index `at` accept `view`; returns true if the relay accepts.
     fn accept(&mut self, at: usize, view: View) -> bool {
         let base = self.0[at].agreed();
         self.0[at].accept(view.id, base, Some(view))

@@ -33,7 +33,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         let power_w = (self.seat_of)(index - 1).power_w;
         let common = power_w.to_bits() == self.mission.config().common.power_w.to_bits();
         Sender {
-            at: from.cross_section(),
+            cross_section: from.cross_section(),
             gain: if common {
                 self.gain
             } else {
@@ -77,7 +77,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns the solver's description of relay `index`, whose sender is at `from`.
+    /// Returns the parameters of relay `index` and of its hop from a sender at `from`.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
@@ -89,7 +89,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         site::tail(self.mission, power_w, room, target, at)
     }
 
-    /// Returns the ceiling of the chain, in ln gamma: the smaller of those of the first and the last hop.
+    /// Returns the highest possible target of the chain, in ln gamma. It is the smaller bound of the first and the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;

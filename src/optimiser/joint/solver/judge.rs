@@ -35,7 +35,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let met = slack.is_some_and(|slack| slack >= 0.0);
         if met && self.pass.holds_back {
             let place_m = self.pass.from.x_m;
-            self.work = Work::Stand(last_of(chain.mission), place_m, seek, purpose);
+            self.work = Work::HoldBack(last_of(chain.mission), place_m, seek, purpose);
             return Poll::Pending;
         }
         self.tried(chain, seek, purpose, met.then_some(false))
@@ -43,7 +43,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Checks one more segment, from the last to the first, for positions that let all relays hold back. `place_m` is the
     /// required x of the segment's last relay. Bounded by twenty relays.
-    pub(super) fn stand(
+    pub(super) fn try_hold_back(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
@@ -52,11 +52,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
         match (
-            self.stands(chain, segment, place_m, libm::expf(seek.sigma)),
+            self.held_back_x_m(chain, segment, place_m, libm::expf(seek.sigma)),
             segment.checked_sub(1),
         ) {
             (Some(place_m), Some(before)) => {
-                self.work = Work::Stand(before, place_m, seek, purpose);
+                self.work = Work::HoldBack(before, place_m, seek, purpose);
                 Poll::Pending
             }
             (place_m, _) => self.tried(chain, seek, purpose, place_m.map(|_| true)),
@@ -137,7 +137,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         };
         self.ascent.penalty = self.pass.penalty;
         self.restart();
-        self.held = None;
+        self.loaded_segment = None;
         let Some(slack) = slack else {
             self.work = self.given_up();
             return Poll::Pending;
@@ -193,7 +193,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Returns true if no start can be better than the best one, which meets the ceiling.
+    /// Returns true if the best start meets the ceiling, so that no other start can be better.
     pub(super) fn is_complete(&self, ceiling: f32) -> bool {
         self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }
@@ -300,7 +300,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Starts the next start, or ends the search.
+    /// Begins the ascent from the next start chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -336,7 +336,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             self.number += 1;
             return Poll::Pending;
         }
-        if matches!(start, Start::Held { .. }) && !chain.holds() {
+        if matches!(start, Start::FixedAltitudes { .. }) && !chain.holds() {
             self.number += 1;
             return Poll::Pending;
         }
@@ -360,7 +360,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             | Start::Around { .. }
             | Start::Far
             | Start::Through { .. }
-            | Start::Held { .. } => {
+            | Start::FixedAltitudes { .. } => {
                 Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start)
             }
         };
@@ -372,7 +372,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the cross-section of relay `index` in a pass without changes or in an initial one.
+    /// Returns the cross-section of relay `index` in an unchanged chain or in a start chain.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -404,7 +404,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                     room,
                 )
             }
-            start @ Start::Held { level, .. } => CrossSection {
+            start @ Start::FixedAltitudes { level, .. } => CrossSection {
                 altitude_m: chain.altitude_between(index, level),
                 ..start.across(chain.distance_m(), self.pass.from.x_m, room)
             },

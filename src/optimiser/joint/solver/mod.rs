@@ -34,8 +34,9 @@ pub use chain::Seat;
 struct ForwardPass {
     /// Relays that the pass has completed.
     done: u16,
-    /// New and previous position of the last of them.
+    /// New position of the last relay computed in this pass.
     from: Placement,
+    /// Position of that relay before this pass.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -51,7 +52,7 @@ enum Work {
     /// Compute the chain for one target, and store it.
     Settle(f32, Purpose),
     /// Check that relays can hold back: segment, required x of its last relay, m, and the search.
-    Stand(u8, f32, Seek, Purpose),
+    HoldBack(u8, f32, Seek, Purpose),
     /// Try the next move of the polish; the chain meets this target.
     Polish(f32),
     /// Backward pass at this segment.
@@ -66,7 +67,7 @@ enum Purpose {
     Start,
     /// Higher target during an ascent.
     Raise,
-    /// Slack after its limit has been reduced.
+    /// Slack is computed again after its limit was reduced.
     Tighten,
     /// Result of an ascent.
     Judge,
@@ -94,7 +95,7 @@ impl Purpose {
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     number: u8,
     start: Start,
-    /// Best target so far, in ln gamma, and the number of its start.
+    /// Best target found, in ln gamma, and the number of its start.
     best: Option<(f32, u8)>,
     /// Result of that start's ascent before it was judged, in ln gamma.
     highest: f32,
@@ -104,7 +105,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     best_judged: Option<f32>,
     /// Target at which the current start was judged, in ln gamma.
     judged_at: Option<f32>,
-    /// True while the current ascent is the same as without a best start to compare it with.
+    /// True while the current ascent has not been affected by the comparison with the best start.
     is_whole: bool,
     /// True once the best start is judged more finely, and polished.
     again: bool,
@@ -120,7 +121,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     moved: u8,
     kept: Cell,
     /// Segment whose policies are in memory.
-    held: Option<u8>,
+    loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
     cells: [Cell; RELAYS],
@@ -148,7 +149,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             moving: 0,
             moved: 0,
             kept: Cell::default(),
-            held: None,
+            loaded_segment: None,
             stages: [Stage::default(); STAGES],
             marks: [Mark::default(); SEGMENTS],
             cells: [Cell::default(); RELAYS],
@@ -191,8 +192,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             Work::Begin => self.begin(&chain),
             Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
             Work::Settle(sigma, purpose) => self.settle(&chain, sigma, purpose),
-            Work::Stand(segment, place_m, seek, purpose) => {
-                self.stand(&chain, segment, place_m, seek, purpose)
+            Work::HoldBack(segment, place_m, seek, purpose) => {
+                self.try_hold_back(&chain, segment, place_m, seek, purpose)
             }
             Work::Polish(sigma) => self.polish(&chain, sigma),
             Work::Back(segment) => {

@@ -11,7 +11,7 @@ use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site::{Cell, Room, Site};
 use crate::optimiser::joint::starts::Start;
-use crate::optimiser::spacing::{Hop, Stand};
+use crate::optimiser::spacing::{Hop, RequiredPosition};
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use core::task::Poll;
@@ -63,7 +63,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             self.stages.get_mut(k)?.policy = Brief::of(&policy);
             to = from;
         }
-        self.held = Some(segment);
+        self.loaded_segment = Some(segment);
         Some(outlook)
     }
 
@@ -121,7 +121,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             let slack = slack.min(self.ascent.spare_m()) - self.pass.penalty;
             let turn = if kept {
                 self.ascent.penalty = self.pass.penalty;
-                self.held = None;
+                self.loaded_segment = None;
                 self.ascent.taken(share, sigma, slack)
             } else if self.ascent.is_gain(sigma, slack) {
                 self.restart();
@@ -134,7 +134,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return;
         }
         let segment = u8::try_from(usize::from(self.pass.done) / SEGMENT).unwrap_or(u8::MAX);
-        if self.held != Some(segment) {
+        if self.loaded_segment != Some(segment) {
             if self.recall(chain, segment, self.pass.old).is_none() {
                 self.work = self.next(AscentStep::Over, chain);
             }
@@ -325,7 +325,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Returns the required x of the relay before `segment`; `place_m` is that of the segment's last relay.
-    pub(super) fn stands(
+    pub(super) fn held_back_x_m(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u8,
@@ -350,10 +350,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             let (from_m, end_m) = *before.get(k)?;
             place_m = match self
                 .hop(chain, index, end_m)
-                .stand(target, from_m, place_m)?
+                .required_position(target, from_m, place_m)?
             {
-                Stand::AtReach => from_m,
-                Stand::At(x_m) => x_m,
+                RequiredPosition::AtReach => from_m,
+                RequiredPosition::At(x_m) => x_m,
             };
         }
         Some(place_m)

@@ -95,7 +95,7 @@ pub(crate) struct Bench {
     wiring: Wiring,
     others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// Bytes from the drone, and to it.
+    /// Bytes on the wire from the drone, and to the drone.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,

@@ -10,7 +10,7 @@ use crate::bench::{Pipe, SITES};
 const STEP_M: f32 = 0.008;
 
 pub(crate) struct Vehicle {
-    /// Bytes to the relay, and from it.
+    /// Bytes from the autopilot to the relay, and from the relay.
     uart: [Pipe; 2],
     axis: Axis,
     millis: u32,

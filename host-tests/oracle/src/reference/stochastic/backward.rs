@@ -10,7 +10,7 @@ pub struct Backward {
     pub gamma: f64,
     /// Positions of the relays from Tx to Rx, m.
     pub places: Vec<f64>,
-    /// Number of targets tried, this one included.
+    /// Number of targets tried, including the final one.
     pub iterations: usize,
 }
 

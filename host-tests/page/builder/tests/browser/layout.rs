@@ -139,7 +139,7 @@ fn median(mut all: Vec<f64>) -> f64 {
     all[all.len() / 2]
 }
 
-/// Returns the computing time of a run without recording, as during dragging, ms.
+/// Returns the computing time, ms, of a run without recording, as the page makes it during dragging.
 fn took(browser: &mut Browser, times: u32) -> f64 {
     let all = (0..times).map(|_| {
         let runs = number(browser, "window.last.runs");

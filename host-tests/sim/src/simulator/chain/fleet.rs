@@ -15,7 +15,7 @@ const STEP: Duration = Duration::from_millis(50);
 /// Largest distance of a drone from its setpoint that counts as arrived, m.
 const THERE_M: f64 = 1.0;
 
-/// Period of the operator's checks.
+/// Period of the simulated operator's checks for lost relays that have landed.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
 /// Traffic margin, m: no hand-over while another drone moves within the separation plus this.
@@ -25,7 +25,7 @@ const TRAFFIC_M: f64 = 30.0;
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
-    /// Creates the drones on the ground, if any.
+    /// Creates the drones, on the ground, if the run simulates drones.
     pub(super) fn line_up(&mut self) {
         if let Some(spec) = &self.setup.fleet {
             let all = 0..self.members.len();

@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use uav_relay::ground::{Ground, Progress};
-use uav_relay::sensing::belief::Told;
+use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, MAX_FRAME, Phase, Placement, Port, Sample, Side, Wiring};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
@@ -165,7 +165,7 @@ impl Station {
     pub(super) fn is_busy(&self) -> bool {
         matches!(
             self.ground.progress(),
-            Progress::Offering | Progress::Held { .. } | Progress::Adopted { .. }
+            Progress::Offering | Progress::Stored { .. } | Progress::Adopted { .. }
         )
     }
 }
@@ -273,7 +273,9 @@ impl Chain {
         }
         let leader = self.members.first();
         self.outcome.stands.push(Stand {
-            believed: leader.map_or_else(Told::default, |leader| leader.relay.belief()),
+            believed: leader.map_or_else(NumberedEstimate::default, |leader| {
+                leader.relay.interference_estimate()
+            }),
             at: self.now,
             nodes,
             places,

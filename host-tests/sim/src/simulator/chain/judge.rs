@@ -234,7 +234,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all relays hold their positions for the same target.
+/// Returns true if all relays of `part` have positions agreed on for the same target.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()

@@ -23,7 +23,7 @@ const SETS: [&str; 7] = [
     "guard,flight",
     "mavlink-signing",
     "altitude,adjust",
-    "field,guard,auth",
+    "field,noise,guard,auth",
     "guard,upload",
 ];
 
@@ -281,7 +281,7 @@ fn embassy() -> Vec<Step> {
     steps
 }
 
-/// Returns the step that tests the library and flies a chain with only these features.
+/// Returns the step that tests the library and a simulated chain with the features of `set` only.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
@@ -319,7 +319,7 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that need a nightly compiler: every fuzz target, and the corpora under Miri.
+/// Returns the steps that need a nightly compiler: all fuzz targets, and Miri runs of their corpora.
 ///
 /// A fuzz target starts with its corpus.
 fn nightly() -> Vec<Step> {

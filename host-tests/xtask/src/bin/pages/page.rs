@@ -223,7 +223,7 @@ impl Shell {
         Ok((status.code(), said))
     }
 
-    /// Runs a script with a time limit, s; returns its exit status and output.
+    /// Runs `script` for at most `limit_s` seconds; returns its exit status and output.
     fn ended(&self, script: &str, limit_s: u32) -> Result<(ExitStatus, String), String> {
         let limit = format!("{limit_s}");
         let script = format!("exec 2>&1\n{}\n{script}\n", self.before);

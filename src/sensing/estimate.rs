@@ -26,7 +26,7 @@ use crate::time::{Duration, Instant};
 /// Interference estimate of the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Belief {
+pub enum InterferenceEstimate {
     /// Interference of the mission.
     #[default]
     Mission,
@@ -41,7 +41,7 @@ pub enum Belief {
     },
 }
 
-impl Belief {
+impl InterferenceEstimate {
     /// Returns `mission` with this interference, or with `own` if the estimate refers to the mission.
     ///
     /// # Errors
@@ -70,9 +70,9 @@ pub enum Spread {
     /// Equal hops.
     #[default]
     Even,
-    /// The first hop half as long as the others.
+    /// First hop half as long as the other hops.
     TowardTx,
-    /// The last hop half as long as the others.
+    /// Last hop half as long as the other hops.
     TowardRx,
 }
 
@@ -89,11 +89,11 @@ impl Spread {
 /// Estimate with its sequence number, which the leader increments and which wraps.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Told {
+pub struct NumberedEstimate {
     /// Sequence number, 0 for the initial estimate.
     pub number: u16,
     /// Interference estimate.
-    pub belief: Belief,
+    pub estimate: InterferenceEstimate,
 }
 
 /// Mean square relative change that is not worth an agreement, even with more information.
@@ -102,11 +102,11 @@ const WORTH: f64 = 1e-5;
 /// Mean square relative change that counts as a change of the interference.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of such a change to the expected variance. For a stationary interferer, and for one that moves.
+/// Minimum ratio of a change to the expected variance, for a stationary and for a moving interferer.
 const BEYOND_CHANCE: f64 = 8.0;
 const FOLLOWED: f64 = 1.5;
 
-/// The factor once a chain has settled. A larger change means another interferer, for which the estimation starts again.
+/// Ratio above which a settled chain assumes another interferer and starts the estimation again.
 const ANOTHER: f64 = 64.0;
 
 /// `CHANGE` for the receiver's own measurement.
@@ -126,7 +126,7 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 /// Mean square relative error above which the measurements contradict an estimate.
 const CONTRADICTED: f64 = 0.25;
 
-/// The limit for the mission's interference, relative to the expected variance of a measurement.
+/// Contradiction limit for the mission's interference, relative to the variance of a measurement.
 const GUESSED: f64 = 16.0;
 
 /// Information at the time at which an estimate was adopted.
@@ -136,7 +136,7 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Expected mean square relative error of the estimate.
     chance: f64,
-    /// Number of refinements for the same interferer. For a moving one, of those because of more information.
+    /// Number of refinements for the same interferer. For a moving interferer, only refinements by more information.
     refined: u8,
     track: Track,
 }
@@ -152,18 +152,18 @@ impl Knowledge {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Review {
-    pub(crate) adopt: Option<Belief>,
+    pub(crate) adopt: Option<InterferenceEstimate>,
     pub(crate) known: Knowledge,
     pub(crate) unfit: Option<Unfit>,
-    /// Transmitter or receiver whose measurements do not fit those of the relays.
+    /// Transmitter or receiver whose measurements do not fit the relays' measurements.
     pub(crate) ends: EndsOff,
 }
 
-/// Reviews the estimate `belief` with the chain's `sums` and the `levels` of its ends. `mission` is based on `belief`. `before` is
-/// the information when `belief` was adopted.
+/// Reviews the estimate `estimate` with the chain's `sums` and the `levels` of its ends. `mission` is based on `estimate`. `before` is
+/// the information when `estimate` was adopted.
 pub(crate) fn review(
     mission: &Mission,
-    belief: &Belief,
+    estimate: &InterferenceEstimate,
     sums: &Sums,
     levels: &Levels,
     listen: &Listen,
@@ -177,7 +177,7 @@ pub(crate) fn review(
         Err(unfit) => {
             return Review {
                 ends: levels.off,
-                ..at_a_loss(mission, belief, sums, listen, before, unfit)
+                ..at_a_loss(mission, estimate, sums, listen, before, unfit)
             };
         }
     };
@@ -210,7 +210,7 @@ pub(crate) fn review(
         ends,
     };
     let adopt = |refined| Review {
-        adopt: Some(Belief::Source { source, receiver_w }),
+        adopt: Some(InterferenceEstimate::Source { source, receiver_w }),
         known: Knowledge {
             information,
             chance: fit.chance(),
@@ -226,8 +226,8 @@ pub(crate) fn review(
         &coefficients(mission, &source),
         &coefficients(mission, &known),
     );
-    let receiver = match belief {
-        Belief::Source {
+    let receiver = match estimate {
+        InterferenceEstimate::Source {
             receiver_w: before, ..
         } if receiver_w > 0.0 || *before > 0.0 => {
             // If only one of the two has a measurement, the whole difference is new.
@@ -377,7 +377,7 @@ fn at_receiver(
 
 fn at_a_loss(
     mission: &Mission,
-    belief: &Belief,
+    estimate: &InterferenceEstimate,
     sums: &Sums,
     listen: &Listen,
     before: Knowledge,
@@ -385,21 +385,21 @@ fn at_a_loss(
 ) -> Review {
     let known = mission.known_source();
     let expected = f64::from(listen.relative_error) * f64::from(listen.relative_error);
-    let allowed = match belief {
+    let allowed = match estimate {
         // The mission's interference was not measured, so its limit is stricter.
-        Belief::Mission => GUESSED * expected,
+        InterferenceEstimate::Mission => GUESSED * expected,
         _ => CONTRADICTED,
     };
     let contradicted =
         known.is_none_or(|known| misfit(sums, &coefficients(mission, &known)) > allowed);
-    let spread = match belief {
-        Belief::Unknown(spread) => spread.next(),
-        Belief::Mission if known.is_none() => Spread::Even.next(),
+    let spread = match estimate {
+        InterferenceEstimate::Unknown(spread) => spread.next(),
+        InterferenceEstimate::Mission if known.is_none() => Spread::Even.next(),
         _ => Spread::Even,
     };
     let heard = sums.count() > 0.0;
     Review {
-        adopt: (heard && contradicted).then_some(Belief::Unknown(spread)),
+        adopt: (heard && contradicted).then_some(InterferenceEstimate::Unknown(spread)),
         known: if contradicted {
             Knowledge::NOTHING
         } else {

@@ -1,0 +1,235 @@
+//! Texts that `defmt` prints for events and their reasons. An image stores their numbers only, so the texts take no flash.
+
+#![expect(
+    clippy::match_same_arms,
+    reason = "the texts differ, which the linter does not see in interned strings"
+)]
+
+use crate::event::Event;
+use crate::geodetic::LineError;
+use crate::side::Side;
+
+/// Implements `defmt::Format` for an enum, with one text for each variant.
+macro_rules! texts {
+    ($type:ty { $($variant:pat => $text:literal),* $(,)? }) => {
+        impl defmt::Format for $type {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                let text = match *self {
+                    $($variant => defmt::intern!($text),)*
+                };
+                defmt::write!(f, "{=istr}", text);
+            }
+        }
+    };
+}
+
+impl defmt::Format for Event {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        let (node, text) = match *self {
+            Self::SetpointChanged => (None, defmt::intern!("the setpoint has changed")),
+            Self::Converged => (None, defmt::intern!("the relays have agreed on positions")),
+            Self::Infeasible => (
+                None,
+                defmt::intern!("no target SIR can be met: all relays keep their positions"),
+            ),
+            Self::NeighbourLost {
+                side: Side::Upstream,
+                node,
+            } => (
+                Some(node),
+                defmt::intern!("upstream does not reply: look for that drone"),
+            ),
+            Self::NeighbourLost { node, .. } => (
+                Some(node),
+                defmt::intern!("downstream does not reply: look for that drone"),
+            ),
+            Self::NeighbourBack {
+                side: Side::Upstream,
+                node,
+            } => (Some(node), defmt::intern!("upstream is received")),
+            Self::NeighbourBack { node, .. } => {
+                (Some(node), defmt::intern!("downstream is received"))
+            }
+            Self::NotHeard { node } => (
+                Some(node),
+                defmt::intern!(
+                    "does not receive this relay: check this relay's transmitter and that node's receiver"
+                ),
+            ),
+            Self::MissionMismatch { node } => (
+                Some(node),
+                defmt::intern!("has another mission: load the same mission into both"),
+            ),
+            Self::KeyMismatch { node } => (
+                Some(node),
+                defmt::intern!(
+                    "signs with another key, or an attacker uses its number: give both the same key"
+                ),
+            ),
+            Self::EpochWentBack { node } => (
+                Some(node),
+                defmt::intern!(
+                    "has an old epoch, and its frames are rejected: increase its epoch and restart it"
+                ),
+            ),
+            Self::DuplicateIndex { node } => (
+                Some(node),
+                defmt::intern!("shares its number with another node: land one of the two"),
+            ),
+            Self::SensorOff { node } => (
+                Some(node),
+                defmt::intern!(
+                    "measures what does not fit the others, and is ignored: check its receiver"
+                ),
+            ),
+            Self::ViewAccepted => (
+                None,
+                defmt::intern!("a new view has been accepted: new positions follow"),
+            ),
+            Self::LeaseLapsed => (
+                None,
+                defmt::intern!(
+                    "the lease has expired because not all relays are reachable: this relay keeps its setpoint"
+                ),
+            ),
+            Self::NoQuorum => (
+                None,
+                defmt::intern!(
+                    "no quorum: bring the missing relays into range, or land the reachable ones"
+                ),
+            ),
+            Self::Uploaded => (None, defmt::intern!("a newer mission has been received")),
+            Self::UploadRefused { why } => {
+                return defmt::write!(f, "a newer mission was rejected: {}", why);
+            }
+            Self::NewEstimate => (
+                None,
+                defmt::intern!("the interference estimate has changed: new positions follow"),
+            ),
+            Self::InterfererUnclear => (
+                None,
+                defmt::intern!(
+                    "the measurements do not fit one interferer, or are too few: the last estimate is kept"
+                ),
+            ),
+            Self::Adopted => (None, defmt::intern!("the chain flies the uploaded mission")),
+        };
+        if let Some(node) = node {
+            defmt::write!(f, "node {=u16} {=istr}", node, text);
+        } else {
+            defmt::write!(f, "{=istr}", text);
+        }
+    }
+}
+
+texts!(LineError {
+    LineError::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has none",
+    LineError::Sites => "the sites must be on earth, 10 m to 100 km apart",
+    LineError::Altitude => "the altitudes must be within the relay's own geofence",
+    LineError::Lateral => "the lateral range must be within the relay's own geofence",
+    LineError::Length => "the distance must be within the relay's own geofence",
+});
+
+/// Texts about the autopilot.
+#[cfg(feature = "flight")]
+mod autopilot {
+    use crate::flight::autopilot::state::{FlightMode, Release, ReleaseCause, State, WaitReason};
+    use crate::flight::autopilot::trust::Mistrust;
+    use crate::flight::autopilot::{AutopilotEvent, Kind};
+
+    texts!(Kind {
+        Kind::Px4 => "PX4",
+        Kind::ArduCopter => "ArduCopter",
+    });
+
+    texts!(State {
+        State::Silent => "no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2",
+        State::Grounded => "on the ground, or not armed",
+        State::Standby => "in the air, not controlled by the relay",
+        State::Engaged => "setpoint control engaged",
+        State::Blind => "no position; keeps the last target",
+    });
+
+    texts!(ReleaseCause {
+        ReleaseCause::Chosen => "the pilot or a ground station chose another mode",
+        ReleaseCause::Failsafe => "failsafe of the autopilot",
+        ReleaseCause::Fence => "fence of the autopilot breached",
+        ReleaseCause::Link => "the link was interrupted or late",
+    });
+
+    texts!(FlightMode {
+        FlightMode::Companion => "still OFFBOARD or GUIDED",
+        FlightMode::Sticks => "a manual mode",
+        FlightMode::Hold => "Hold or LOITER",
+        FlightMode::Brake => "BRAKE",
+        FlightMode::Return => "RTL",
+        FlightMode::Land => "LAND",
+        FlightMode::Other => "a mode unknown to the relay",
+    });
+
+    impl defmt::Format for Release {
+        fn format(&self, f: defmt::Formatter<'_>) {
+            defmt::write!(f, "{}; the mode is {}", self.cause, self.mode);
+        }
+    }
+
+    texts!(WaitReason {
+        WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
+        WaitReason::Link => "messages from the autopilot arrive late",
+        WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started; choose another mode first",
+        WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported since the relay started",
+        WaitReason::Position => "there is no position near the line",
+        WaitReason::NotReady => "the relay is not in order with its neighbours",
+    });
+
+    texts!(Mistrust {
+        Mistrust::NoKey => "signs its frames and ignores unsigned ones; this relay has no key",
+        Mistrust::SignsOnly => "signs its frames but answers unsigned ones; this relay has no key",
+        Mistrust::Unsigned => "does not sign its frames, which are ignored; this relay has a key",
+        Mistrust::OtherKey => "signs with another key than this relay's; its frames are ignored",
+        Mistrust::Old => "signs with an old timestamp; its frames are ignored",
+    });
+
+    impl defmt::Format for AutopilotEvent {
+        fn format(&self, f: defmt::Formatter<'_>) {
+            match self {
+                Self::Found(kind) => defmt::write!(f, "found, {}", kind),
+                Self::Restarted => defmt::write!(f, "restarted"),
+                Self::State(state) => defmt::write!(f, "{}", state),
+                Self::Released(release) => defmt::write!(f, "released: {}", release),
+                Self::Waits(reason) => defmt::write!(f, "cannot be engaged: {}", reason),
+                Self::Ready => defmt::write!(f, "ready: its pilot may choose OFFBOARD or GUIDED"),
+                Self::Refused => defmt::write!(
+                    f,
+                    "flies to another target than it was sent; is the setpoint outside its fence?"
+                ),
+                Self::FenceBreached => defmt::write!(f, "fence breached"),
+                Self::OffLine(off) => defmt::write!(
+                    f,
+                    "the drone is {=u32} m from the line between transmitter and receiver",
+                    off.away_m
+                ),
+                Self::LostCleared { relays, from, .. } => defmt::write!(
+                    f,
+                    "lost relays {} are cleared, by MAVLink system {=u8}, component {=u8}",
+                    named(relays),
+                    from.system,
+                    from.component
+                ),
+                Self::ClearRefused { relays, from } => defmt::write!(
+                    f,
+                    "lost relays {} are not cleared: name all lost relays of one side; by MAVLink system {=u8}, component {=u8}",
+                    named(relays),
+                    from.system,
+                    from.component
+                ),
+                Self::Mistrusted(why) => defmt::write!(f, "{}", why),
+            }
+        }
+    }
+
+    /// Returns the relay numbers without their padding.
+    fn named(relays: &[u16]) -> &[u16] {
+        relays.split(|node| *node == 0).next().unwrap_or_default()
+    }
+}
