@@ -5,11 +5,14 @@
 //! every further loss, up to six times `dead_after`. Hellos omit links that are held down, so that no other relay makes room for
 //! a node that could not be linked.
 //!
+//! A gap is a silence of more than `dead_after`. While the side has no neighbour and hears nobody, it is one of more than four
+//! times `dead_after`: such a side asks every `dead_after` only, so one lost frame makes a silence of that length.
+//!
 //! | state of the side | event | losses |
 //! | --- | --- | --- |
 //! | linked | neighbour lost, few frames lost on the channel | one more for its link |
 //! | linked | neighbour lost, many frames lost on the channel | unchanged, unless the link is held down or its node is then silent for longer than `dead_after` |
-//! | without a neighbour | candidate heard again after a silence of more than `dead_after` | one more for its link |
+//! | without a neighbour | candidate heard again after a gap | one more for its link |
 //! | without a neighbour | first answer of any candidate, `probe_after` after the search began or later | all links: at least those of the link that was lost last |
 //!
 //! The last row is a partition: all links of the side were down together. If each link were counted alone, the chain would close
@@ -42,12 +45,10 @@ struct Heard {
 }
 
 impl Heard {
-    /// Updates the record with a frame at `now`. A silence of more than `dead_after` or another node restarts it.
-    fn again(known: Option<Self>, distance: u16, now: Instant, settings: &Settings) -> Self {
+    /// Updates the record with a frame at `now`. A silence of more than `gap` or another node restarts it.
+    fn again(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
-            Some(known)
-                if known.distance == distance && now.since(known.last) <= settings.dead_after =>
-            {
+            Some(known) if known.distance == distance && now.since(known.last) <= gap => {
                 known.since
             }
             _ => now,
@@ -175,11 +176,12 @@ impl Damping {
     }
 
     /// Records a frame from the node `distance` places away. `asks` is the start of the search while the side has no neighbour: a
-    /// candidate that has answered the search and is then silent for longer than `dead_after` counts as lost.
+    /// candidate that has answered the search and is then silent for longer than `gap` counts as lost.
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
         asks: Option<Instant>,
+        gap: Duration,
         now: Instant,
         settings: &Settings,
     ) {
@@ -190,17 +192,18 @@ impl Damping {
             return;
         };
         let last = link.back.map_or(link.lost_at, |back| back.last);
-        if now.since(last) > settings.dead_after {
-            if link.back.is_some() && asks.is_some_and(|asks| last >= asks) {
+        let silence = now.since(last);
+        if link.back.is_some() {
+            if silence > gap && asks.is_some_and(|asks| last >= asks) {
                 link.record_loss(link.recent(now, settings), true, now);
                 link.was_down = true;
-            } else if link.back.is_none() && (link.losses > 0 || link.excused) {
-                link.was_down = true;
-                link.losses = link.losses.saturating_add(u8::from(link.excused));
-                link.excused = false;
             }
+        } else if silence > settings.dead_after && (link.losses > 0 || link.excused) {
+            link.was_down = true;
+            link.losses = link.losses.saturating_add(u8::from(link.excused));
+            link.excused = false;
         }
-        link.back = Some(Heard::again(link.back, distance, now, settings));
+        link.back = Some(Heard::again(link.back, distance, now, gap));
     }
 
     /// Returns true if no candidate has answered since the search began. It began at `since`, at least `probe_after` ago.
@@ -269,7 +272,7 @@ impl Damping {
         {
             return false;
         }
-        let heard = Heard::again(self.candidate, distance, now, settings);
+        let heard = Heard::again(self.candidate, distance, now, settings.dead_after);
         self.candidate = Some(heard);
         now.since(heard.since) >= settings.probe_after.max(more)
     }
@@ -298,10 +301,10 @@ mod tests {
         for _ in 0..40 {
             *now = *now + seconds(1);
             for distance in heard {
-                side.record_hello(*distance, Some(search), *now, settings);
+                side.record_hello(*distance, Some(search), settings.dead_after, *now, settings);
             }
         }
-        side.record_hello(1, Some(search), *now, settings);
+        side.record_hello(1, Some(search), settings.dead_after, *now, settings);
     }
 
     #[test]
@@ -314,7 +317,7 @@ mod tests {
         for _ in 0..15 {
             assert!(side.is_held_down(1, now, &settings));
             now = now + seconds(1);
-            side.record_hello(1, None, now, &settings);
+            side.record_hello(1, None, settings.dead_after, now, &settings);
         }
         assert!(!side.is_held_down(1, now, &settings));
     }
@@ -344,17 +347,40 @@ mod tests {
         let search = now;
         for second in 0..180 {
             now = now + seconds(1);
-            side.record_hello(2, Some(search), now, &settings);
+            side.record_hello(2, Some(search), settings.dead_after, now, &settings);
             // The nearest node answers for 20 s and is silent for 40 s.
             if second % 60 < 20 {
-                side.record_hello(1, Some(search), now, &settings);
+                side.record_hello(1, Some(search), settings.dead_after, now, &settings);
             }
         }
         assert!(!side.is_held_down(1, now, &settings));
         now = now + seconds(1);
-        side.record_hello(1, Some(search), now, &settings);
+        side.record_hello(1, Some(search), settings.dead_after, now, &settings);
         assert!(side.is_held_down(1, now, &settings));
         assert!(!side.is_held_down(2, now, &settings));
+    }
+
+    #[test]
+    fn a_silence_between_two_rare_questions_is_no_loss() {
+        let (mut side, mut now, settings) = begun();
+        let (search, gap) = (now, settings.dead_after.times(4));
+        for _ in 0..10 {
+            now = now + seconds(40);
+            side.record_hello(1, Some(search), gap, now, &settings);
+        }
+        assert_eq!(side.held_down_nodes(now, &settings), 0);
+        for _ in 0..3 {
+            now = now + seconds(61);
+            side.record_hello(1, Some(search), gap, now, &settings);
+        }
+        assert_eq!(side.held_down_nodes(now, &settings), 0b0001);
+        // The silences between rare answers do not restart the hold-down.
+        now = now + seconds(14);
+        side.record_hello(1, Some(search), gap, now, &settings);
+        assert_eq!(side.held_down_nodes(now, &settings), 0b0001);
+        now = now + seconds(40);
+        side.record_hello(1, Some(search), gap, now, &settings);
+        assert_eq!(side.held_down_nodes(now, &settings), 0);
     }
 
     #[test]
@@ -362,7 +388,7 @@ mod tests {
         let (mut side, mut now, settings) = begun();
         for _ in 0..5 {
             now = now + seconds(60);
-            side.record_hello(1, None, now, &settings);
+            side.record_hello(1, None, settings.dead_after, now, &settings);
         }
         assert_eq!(side.held_down_nodes(now, &settings), 0);
     }
@@ -371,20 +397,38 @@ mod tests {
     fn a_loss_is_an_outage_after_a_silence_of_more_than_dead_after() {
         let (mut side, now, settings) = begun();
         side.record_loss(1, false, now, &settings);
-        side.record_hello(1, Some(now), now + seconds(15), &settings);
+        side.record_hello(
+            1,
+            Some(now),
+            settings.dead_after,
+            now + seconds(15),
+            &settings,
+        );
         assert!(!side.was_down(1));
         side.record_loss(1, false, now + seconds(20), &settings);
         let again = now + seconds(36);
-        side.record_hello(1, Some(now + seconds(20)), again, &settings);
+        side.record_hello(
+            1,
+            Some(now + seconds(20)),
+            settings.dead_after,
+            again,
+            &settings,
+        );
         assert!(side.was_down(1));
     }
 
     #[test]
     fn a_link_that_was_never_lost_was_not_down() {
         let (mut side, now, settings) = begun();
-        side.record_hello(1, Some(now), now + seconds(100), &settings);
+        side.record_hello(
+            1,
+            Some(now),
+            settings.dead_after,
+            now + seconds(100),
+            &settings,
+        );
         assert!(!side.was_down(1));
-        side.record_hello(2, None, now + seconds(200), &settings);
+        side.record_hello(2, None, settings.dead_after, now + seconds(200), &settings);
         assert!(!side.was_down(2));
     }
 }

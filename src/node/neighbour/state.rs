@@ -319,6 +319,17 @@ impl Neighbour {
         lost
     }
 
+    /// Returns the silence of a node after which its link counts as down.
+    ///
+    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only, so a silence of that length
+    /// is one lost frame.
+    fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
+        let asks_rarely = self.has_no_peer() && !self.is_near(now, settings);
+        settings
+            .dead_after
+            .times(if asks_rarely { RARE_GAPS } else { 1 })
+    }
+
     fn is_near(&self, now: Instant, settings: &Settings) -> bool {
         self.near
             .is_some_and(|near| now.since(near) <= settings.dead_after)
@@ -565,6 +576,9 @@ impl Signs {
     };
 }
 
+/// Silence without a neighbour after which a link counts as down, in units of `dead_after`.
+const RARE_GAPS: u32 = 4;
+
 /// Consecutive reports of a node that it does not hear this relay: an answer or two may be lost.
 const UNHEARD: u8 = 8;
 
@@ -626,8 +640,9 @@ impl Neighbour {
         settings: &Settings,
     ) {
         self.hearing.add(distance, now, settings);
+        let (asks, gap) = (self.searching_since(), self.longest_gap(now, settings));
         self.damping
-            .record_hello(distance, self.searching_since(), now, settings);
+            .record_hello(distance, asks, gap, now, settings);
         if taken {
             self.liveness.record_frame();
         }
