@@ -50,10 +50,14 @@ fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
         let took = story(&fleet.lines, *drone, place).unwrap();
         println!("drone {drone}: agreed {took} us after it was counted");
     }
-    // Only drone 3 was lost.
-    let lost = |drone| {
-        let mut lines = fleet.of_drone(drone);
-        lines.any(|line| line.text.contains("does not reply"))
-    };
-    assert_eq!([1, 2, 4, 5].map(lost), [false, true, true, false]);
+    // Only drone 3 was lost. A drone may select the one past it before its own wait is over, and then reports no loss.
+    let lost = fleet.lines.iter();
+    let lost = lost.filter(|line| line.text.contains("does not reply"));
+    let lost: Vec<(u16, &str)> = lost.map(|line| (line.drone, line.text.as_str())).collect();
+    let of_three = [
+        (2, "node 3 downstream does not reply: look for that drone"),
+        (4, "node 3 upstream does not reply: look for that drone"),
+    ];
+    assert!(!lost.is_empty());
+    assert!(lost.iter().all(|loss| of_three.contains(loss)), "{lost:?}");
 }
