@@ -1,7 +1,7 @@
 //! Random schedules of faults for simulated chains, and the ledger that judges their results.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Mission, MissionConfig, Wiring};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, RelayEnd};

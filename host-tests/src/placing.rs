@@ -1,7 +1,7 @@
 //! Placement by the crate compared with the f64 reference, for chains without and with noise.
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::plan::{self, Agreed};
 use uav_relay::optimiser::spacing::Hop;
 use uav_relay::sir::Sender;

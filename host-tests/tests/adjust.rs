@@ -2,10 +2,10 @@
 
 use core::task::Poll;
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::settle;
 use host_tests::placing::{reference, setpoints};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::local::{HopEnd, Hops, LocalSearch};
 use uav_relay::sir::{Sender, at_receiver};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};

@@ -1,7 +1,7 @@
 //! Baseline placements, compared with values of a separate program and with brute force.
 
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::{self, Chain, Style};

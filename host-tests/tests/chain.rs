@@ -1,9 +1,9 @@
 //! Simulated chains: optimum, cost, and independence from faults.
 
+use chacha20::ChaCha8Rng;
 use host_tests::fixtures::mission;
 use host_tests::flights::settle;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Profile, Schedule, Side};
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};

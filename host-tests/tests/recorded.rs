@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 use std::iter::successors;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random::joint::judged::{COUNT, numbered, optima};
 use uav_relay_oracle::random::{log_uniform, seed};

@@ -1,7 +1,7 @@
 //! Corrected Algorithm 3 for one relay in a field, compared with a dense search in f64.
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::Mission;
 use uav_relay::planning::single::without_interferer::{best_in_field, stepped};
 use uav_relay_oracle::mission::of_stochastic_link;

@@ -8,8 +8,8 @@
     reason = "as every test may"
 )]
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{
     Auth, Event, Ground, Identity, Instant, Interference, Interferer, Key, MAX_FRAME, Mission,
     MissionConfig, Port, Progress, Relay, Settings, Side, Upload, Wiring,

@@ -13,8 +13,8 @@ use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{env, thread};
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Mission, Phase};
 use uav_relay_scenario::{Scenario, mission};
 use uav_relay_sim::report::seconds;

@@ -1,7 +1,7 @@
 //! Mock of two flash sectors in RAM. Writes only clear bits, places may be worn, and power may fail during any operation.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::journal::{BLANK, Flash};
 

@@ -1,7 +1,7 @@
 //! Throughput of pure and slotted ALOHA, compared with Abramson (1970) and Roberts (1975).
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::*;
 

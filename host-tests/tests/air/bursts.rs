@@ -1,7 +1,7 @@
 //! Losses in bursts.
 
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay_sim::simulator::faults::Bursts;
 
 const FRAMES: usize = 1_000_000;

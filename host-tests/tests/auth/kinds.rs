@@ -1,9 +1,9 @@
 //! Kinds of attacks, and the counter that each must increment according to `FORMAT.md`.
 
+use chacha20::ChaCha8Rng;
 use host_tests::fixtures::NETWORK;
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Port, Stats};
 use uav_relay_decode::vectors::Vectors;
 use uav_relay_oracle::random::seed;

@@ -1,8 +1,8 @@
 //! Fuzz test of the link: targets are finite, near the line, and sent only in states that permit them.
 
+use chacha20::ChaCha8Rng;
 use mavlink::dialects::common::MavLandedState;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::vehicle::Mode;
 use super::*;

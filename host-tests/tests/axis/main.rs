@@ -1,8 +1,8 @@
 //! Coordinates along a line on earth, compared with geodesics.
 
+use chacha20::ChaCha8Rng;
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;

@@ -1,7 +1,7 @@
 //! Checks of the f64 reference for chains in stochastic interference by independent values and methods.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};

@@ -1,7 +1,7 @@
 //! Accuracy of the estimator over hundreds of seeds: its error, and the validity of its standard error.
 
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::FieldPoint;
 use uav_relay::field::estimate::{Estimate, Estimator};
 use uav_relay_oracle::random::seed;

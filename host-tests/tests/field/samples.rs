@@ -1,10 +1,10 @@
 //! Accepted samples, and finite estimates from any stream of samples.
 
+use chacha20::ChaCha8Rng;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::field::estimate::{Estimate, Estimator};
 use uav_relay::field::{Field, FieldPoint};
 use uav_relay_oracle::random::seed;

@@ -1,7 +1,7 @@
 //! Table of Upsilon: validation, interpolation and extrapolation.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::field::{Field, FieldError, FieldPoint};
 use uav_relay_oracle::random::{log_uniform, seed};
 

@@ -1,10 +1,10 @@
 //! Epoch in a drone's flash: it rises at every start, whatever fails.
 
+use chacha20::ChaCha8Rng;
 use host_tests::firmware::epoch::{KEY, WORDS, begin};
 use host_tests::firmware::journal::{AROUND, Journal};
 use host_tests::firmware::ram::Ram;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::seed;
 
 const ENTRY: usize = WORDS + AROUND;

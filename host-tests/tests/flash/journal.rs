@@ -1,9 +1,9 @@
 //! Journal in the flash: the last record survives any power failure.
 
+use chacha20::ChaCha8Rng;
 use host_tests::firmware::journal::{AROUND, BLANK, Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::seed;
 
 const KEY: u32 = 0xB10C_B10C;

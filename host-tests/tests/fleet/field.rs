@@ -1,7 +1,7 @@
 //! Numbers and optima of identical relays in a field.
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::fleet::{self, Fewest};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;

@@ -1,8 +1,8 @@
 //! Numbers of relays with one interferer.
 
+use chacha20::ChaCha8Rng;
 use host_tests::placing::profile_of;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::fleet::{Fewest, Most};
 use uav_relay::{Mission, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};

@@ -9,9 +9,9 @@ mod leave;
 mod moved;
 mod storms;
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::{eight_apart, end_at, in_a_row, seconds};
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::GuardConfig;
 use uav_relay::Instant;
 use uav_relay_sim::simulator::drones::FlightSpec;

@@ -1,7 +1,7 @@
 //! Targets on random bytes and on mutated inputs of the corpus.
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_fuzz::TARGETS;
 use uav_relay_oracle::random::seed;
 

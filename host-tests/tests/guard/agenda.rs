@@ -1,7 +1,7 @@
 //! Random events of a flight and their times.
 
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::GuardConfig;
 use uav_relay::Side;
 

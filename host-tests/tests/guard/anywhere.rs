@@ -12,8 +12,8 @@
 //! | reboots | a relay with 20 % |
 //! | uploads | the line turns by up to 85 degrees once in 50 % of the flights, received by each relay up to 5 s late |
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::guard::{Fence, Guard};

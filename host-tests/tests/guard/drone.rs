@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::GuardConfig;
 use uav_relay::guard::Guard;
 use uav_relay::{Instant, Placement, Side};

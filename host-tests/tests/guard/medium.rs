@@ -1,7 +1,7 @@
 //! Medium that loses, duplicates, reorders and delays messages.
 
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::Side;
 use uav_relay::guard::Fence;
 

@@ -19,8 +19,8 @@
 //!
 //! In the final phase the medium loses up to 30 %, all drones fly, and all relays receive the same agreement.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Side};
 use uav_relay::{Geofence, GuardConfig};
 

@@ -1,7 +1,7 @@
 //! Drones, the medium between them, and the distance check at every step.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::GuardConfig;
 use uav_relay::Side;
 use uav_relay::guard::Fence;

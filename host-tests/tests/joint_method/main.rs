@@ -1,9 +1,9 @@
 //! Joint choice of positions, sides and altitudes: quality, cost, and independence from faults.
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::{settle, with_room};
 use host_tests::placing::{reference, setpoints};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Instant, Method, Side};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::joint::{CROWDED, ROOMY, scenario};

@@ -2,9 +2,9 @@
 
 use std::task::Poll;
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::unharmed;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
 use uav_relay_oracle::mission::as_relays_know_it;

@@ -10,8 +10,8 @@ mod theirs;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::flight::mavlink::frame::Address;
 use uav_relay::flight::mavlink::incoming::{Parser, Received};
 

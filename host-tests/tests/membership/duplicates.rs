@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use chacha20::ChaCha8Rng;
 use host_tests::bench::{Bench, between_neighbours};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
 
 use super::*;

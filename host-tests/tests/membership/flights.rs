@@ -1,8 +1,8 @@
 //! Flights with a guard. No two drones come nearer than the separation, whatever is lost, late or silent.
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::{APART_M, SEPARATION_M, eight_apart, guard};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 

@@ -1,9 +1,9 @@
 //! Random schedules of faults for eight relays.
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::{bad_day, own_profiles};
 use host_tests::ledger::{lose_relays, run_all};
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::seed;
 
 use super::*;

@@ -1,7 +1,7 @@
 //! Missions of the model test. 2 to 6 relays, every method, drawn like those of the random placement tests.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{
     Adjust, Identity, Instant, Local, Measure, Method, Mission, MissionConfig, Profile, Relay,
     Settings,

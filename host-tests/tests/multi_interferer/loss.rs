@@ -1,8 +1,8 @@
 //! SIR lost by placing a chain with the hypothetical interferer. `COUNT` scenes of each kind (30 if unset).
 
+use chacha20::ChaCha8Rng;
 use host_tests::placing::profile_of;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::Schedule;
 use uav_relay::optimiser::plan::{place, solve};
 use uav_relay_oracle::random::{count, seed};

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{self, Chain, Style, seed};
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::Corridor;

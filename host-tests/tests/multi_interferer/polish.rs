@@ -1,7 +1,7 @@
 //! Improvement of chains one relay at a time.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::joint::{CROWDED, scenario};
 use uav_relay_oracle::random::seed;
 use uav_relay_oracle::recorded;

@@ -1,7 +1,7 @@
 //! Hypothetical interferer compared with random positions at their best power.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_scenario::hypothetical::{Raster, fit};
 

@@ -19,8 +19,8 @@
 
 use std::ops::RangeInclusive;
 
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::Link;

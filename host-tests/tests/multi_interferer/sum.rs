@@ -1,7 +1,7 @@
 //! True sum of interferers: conversion of a scenario to a scene, and SIRs compared with the reference.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_oracle::reference::{Link, Station};
 use uav_relay_scenario::scene::{Relay, Scene};

@@ -1,7 +1,7 @@
 //! Noise in a field: quality of the bound on E[1 / (I + N)], and its use by a chain.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::mission::MissionError;
 use uav_relay::optimiser::plan;
 use uav_relay::{Field, FieldPoint, Interference, Mission, MissionConfig, Schedule, sir};

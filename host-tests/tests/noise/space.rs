@@ -2,9 +2,9 @@
 
 use std::task::Poll;
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::{unharmed, with_room};
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use uav_relay::Method;
 use uav_relay::optimiser::joint::{Seat, Solver};

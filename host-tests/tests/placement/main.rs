@@ -1,11 +1,11 @@
 //! Placement compared with the f64 reference, on random and degenerate links.
 
+use chacha20::ChaCha8Rng;
 use host_tests::placing::{
     Mixed, SINGLE, generator, hop_sirs_agree, optimum_is_found, places, profile_of, reaches_agree,
     solve, xs,
 };
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::optimiser::spacing::receiver_reach;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};

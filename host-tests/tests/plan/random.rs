@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use chacha20::ChaCha8Rng;
 use host_tests::placing::reference;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::recorded;
 use uav_relay_oracle::reference::joint::{self, Corridor, Place};

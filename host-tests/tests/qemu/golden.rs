@@ -2,9 +2,9 @@
 
 use std::io::{Read as _, Write as _};
 
+use chacha20::ChaCha8Rng;
 use host_tests::firmware::emulator::{Emulator, Life};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_decode::vectors::Vectors;
 use uav_relay_tools::provision::config::LEN;
 

@@ -1,7 +1,7 @@
 //! Measured powers at drones' positions. For any inputs the chain agrees, also after the sensors recover.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use uav_relay::{
     Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement, Sample, Settings,

@@ -1,7 +1,7 @@
 //! Missions and settings: one to four relays at random limits of all ranges.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Placement};
 
 use crate::draw::{mission, own, settings};

@@ -1,7 +1,7 @@
 //! Positions, control and clocks of guarded relays. Numbers stay finite, and with true inputs the chain agrees.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::GuardConfig;
 use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
 

@@ -1,7 +1,7 @@
 //! Reference on random links, compared with scans, brute force, and between methods.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 

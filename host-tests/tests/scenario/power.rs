@@ -1,7 +1,7 @@
 //! Powers, gains and noise in decibel units: the chain reproduces the link budget.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_scenario::mission::mission;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_sim::report::hop_sirs;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use uav_relay::planning::single::aside::{self, AsideCase};
 use uav_relay::planning::single::{Found, theorems};

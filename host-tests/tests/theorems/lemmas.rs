@@ -1,7 +1,7 @@
 //! Equal hops, extrema of SIR_1, and power ratios at which the cases change.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::single::theorems;
 use uav_relay::sir::{Extremum, first_hop_turn};
 use uav_relay_oracle::random;

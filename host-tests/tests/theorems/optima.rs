@@ -1,7 +1,7 @@
 //! Theorems 1 to 3, and the noise-limited case, compared with brute force.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::single::{Found, theorems, without_interferer};
 use uav_relay_oracle::random::{self, count, log_uniform};
 

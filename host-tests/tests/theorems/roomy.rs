@@ -1,7 +1,7 @@
 //! Scene with room above and to the sides, and its optimum by brute force.
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::planning::single::Found;
 use uav_relay::{Band, Mission, MissionConfig};
 use uav_relay_oracle::random::{self};

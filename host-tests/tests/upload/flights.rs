@@ -1,8 +1,8 @@
 //! Guarded flights with an upload.
 
+use chacha20::ChaCha8Rng;
 use host_tests::flights::{APART_M, SEPARATION_M, guard};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::*;
 

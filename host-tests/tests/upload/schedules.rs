@@ -1,8 +1,8 @@
 //! Random schedules of uploads, faults, losses and reboots for eight relays.
 
+use chacha20::ChaCha8Rng;
 use host_tests::ledger::{lose_relays, number, run_all};
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay_oracle::random::seed;
 
 use super::*;

@@ -1,8 +1,8 @@
 //! Reports to the ground station: number of relays with a mission, refusals, competing stations.
 
+use chacha20::ChaCha8Rng;
 use host_tests::ledger::number;
 use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use uav_relay::GuardConfig;
 use uav_relay::ground::Progress;

@@ -3,9 +3,9 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use chacha20::ChaCha8Rng;
 use host_tests::bench::Bench;
 use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::ground::Progress;
 use uav_relay::{
     Auth, Duration, Event, FlownMission, Ground, Identity, Key, Placement, Relay, Settings,

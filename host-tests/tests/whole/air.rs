@@ -4,8 +4,8 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{
     Auth, Event, Identity, Instant, Key, MAX_FRAME, Mission, Phase, Port, Relay, Settings, Upload,
     ViewRecord, Wiring,

@@ -9,8 +9,8 @@ mod schedule;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
 /// Time limit from the last fault to the whole chain, s.

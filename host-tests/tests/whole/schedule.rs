@@ -1,7 +1,7 @@
 //! Random schedules that mix all faults.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Interference, Interferer, Upload, Wiring};
 
 use super::air::{Air, Deed, Kind};

@@ -8,8 +8,8 @@
 //!
 //! Each is scored in f64 by [`Scene`]: the SIR of the worst hop.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay_scenario::scene::{Relay, Scene};
 
 /// Number of draws used in the paper.

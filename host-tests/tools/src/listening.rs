@@ -1,7 +1,7 @@
 //! Chains that must locate their interferer, compared with chains that know it, in random scenes.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use uav_relay::{Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement};
 use uav_relay_scenario::mission::mission;

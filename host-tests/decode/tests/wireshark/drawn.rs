@@ -1,7 +1,7 @@
 //! Random frames: well-formed with arbitrary numbers, and damaged ones.
 
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::wire::frame::Header;
 use uav_relay_decode::draw::Draw;
 use uav_relay_decode::envelope::{before, sealed, stuffed};

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::wire::auth::TAG;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::{MissionId, digest};

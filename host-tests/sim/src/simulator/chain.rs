@@ -10,8 +10,8 @@ use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{
     Identity, Instant, MAX_FRAME, Placement, Port, Relay, Sample, Settings, SetupError, Upload,
     ViewRecord, Wiring,

@@ -1,7 +1,7 @@
 //! Simple drones with speed and acceleration limits and position errors.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{Duration, Instant, Placement};
 
 use uav_relay_scenario::number::narrow;

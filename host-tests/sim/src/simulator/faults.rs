@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use uav_relay::wire::frame::MAX_SWEEP;
 use uav_relay::{Duration, Instant};
 

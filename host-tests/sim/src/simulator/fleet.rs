@@ -1,7 +1,7 @@
 //! Drones with simulated autopilots, connected to their relays by MAVLink.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::{Autopilot, Kind};
 use uav_relay::flight::axis::Axis;

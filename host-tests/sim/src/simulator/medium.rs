@@ -5,8 +5,8 @@
 
 use std::collections::VecDeque;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use uav_relay::{Duration, Instant};
 

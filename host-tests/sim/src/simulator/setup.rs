@@ -1,7 +1,7 @@
 //! Setup of a simulated chain.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::{
     Auth, ChannelLoad, Duration, Instant, Key, Mission, Profile, Settings, Side, Upload, Wiring,
 };

@@ -1,7 +1,7 @@
 //! Interference that the relays of a run measure, from interferers that their mission does not contain.
 
+use chacha20::ChaCha8Rng;
 use rand::Rng;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Beta, Distribution as _, Gamma, StandardNormal};
 use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, Placement, Sample};

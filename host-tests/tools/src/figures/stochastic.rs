@@ -1,7 +1,7 @@
 //! Algorithm 4 with the paper's step, in an even and in an uneven field.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use uav_relay::Mission;
 

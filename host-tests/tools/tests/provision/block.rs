@@ -1,7 +1,7 @@
 //! Content of a block against the table of `config/mod.rs`, byte by byte, and as a drone reads it.
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use uav_relay::channel::ChannelError;
 use uav_relay::field::FieldError;
 use uav_relay::flight::course::Course;

@@ -2,8 +2,8 @@
 
 use std::io;
 
+use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::{Scenario, in_space};
 
