@@ -272,6 +272,11 @@ mod tests {
                 x_m,
                 y_m,
             };
+            let noise_w = if cfg!(feature = "noise") {
+                noise_w
+            } else {
+                0.0
+            };
             let mission = Mission::try_new(MissionConfig {
                 interference: Interference::Source(interferer),
                 noise_w,

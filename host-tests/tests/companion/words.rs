@@ -39,9 +39,9 @@ fn a_port_that_cannot_be_opened_says_why() {
     let mut first = Relay::start(&format!("--index 1 --of 2 --downstream {used}"));
     first.line("started: ");
     let mut faults = vec![
-        (files.text(""), "is a directory, and no tty"),
+        (files.text(""), "is a directory, not a tty"),
         (files.text("none"), "No such file: is it plugged in?"),
-        ("/dev/null".to_owned(), "is no tty"),
+        ("/dev/null".to_owned(), "is not a tty"),
         (used, "is already in use"),
     ];
     // Root may open any file.
@@ -139,11 +139,11 @@ fn on_a_channel_the_ground_says_what_most_likely_is_wrong() {
     fails(
         "key",
         "--network 8",
-        "of another network number than --network 8",
+        "have another network number than --network 8",
     );
     fails(
         "other",
         "",
-        "none is for the transmitter: are --key-file, --end",
+        "but none for the transmitter: compare --key-file, --end",
     );
 }
