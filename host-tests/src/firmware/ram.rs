@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use super::journal::{BLANK, Flash};
 
 /// Sectors, their faults and the number of erases.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Ram {
     /// Words of each sector.
     pub sectors: [Vec<u32>; 2],
@@ -34,6 +34,17 @@ impl Ram {
             power: None,
             worn: 0,
             erased: Vec::new(),
+            rng: ChaCha8Rng::seed_from_u64(seed),
+        }
+    }
+
+    /// Creates a copy of the sectors and their faults, whose random numbers come from `seed`.
+    pub fn copy(&self, seed: u64) -> Self {
+        Self {
+            sectors: self.sectors.clone(),
+            power: self.power,
+            worn: self.worn,
+            erased: self.erased.clone(),
             rng: ChaCha8Rng::seed_from_u64(seed),
         }
     }

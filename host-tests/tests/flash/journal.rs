@@ -64,12 +64,12 @@ fn a_record_with_any_bit_changed_is_none() {
     assert!(log(&mut flash).keep(&entry(1), WhenFull::Refuse));
     assert!(log(&mut flash).keep(&entry(2), WhenFull::Refuse));
     for bit in 0..32 * RECORD {
-        let mut bad = flash.clone();
+        let mut bad = flash.copy(0);
         bad.sectors[0][RECORD + bit / 32] ^= 1 << (bit % 32);
         assert_eq!(newest(&mut bad), Some(entry(1)), "bit {bit}");
     }
     for word in [0, BLANK] {
-        let mut bad = flash.clone();
+        let mut bad = flash.copy(0);
         bad.sectors[0].fill(word);
         assert_eq!(newest(&mut bad), None);
     }
