@@ -5,8 +5,8 @@
 //! every further loss, up to six times `dead_after`. Hellos omit links that are held down, so that no other relay makes room for
 //! a node that could not be linked.
 //!
-//! A gap is a silence of more than `dead_after`. While the side has no neighbour and hears nobody, it is one of more than four
-//! times `dead_after`: such a side asks every `dead_after` only, so one lost frame makes a silence of that length.
+//! A gap is a silence of more than `dead_after`. While the side has no neighbour and hears nobody, it is one of more than eight
+//! times `dead_after`: such a side asks every `dead_after` only, so a few lost frames make a silence of several times that.
 //!
 //! | state of the side | event | losses |
 //! | --- | --- | --- |
@@ -363,14 +363,14 @@ mod tests {
     #[test]
     fn a_silence_between_two_rare_questions_is_no_loss() {
         let (mut side, mut now, settings) = begun();
-        let (search, gap) = (now, settings.dead_after.times(4));
+        let (search, gap) = (now, settings.dead_after.times(8));
         for _ in 0..10 {
-            now = now + seconds(40);
+            now = now + seconds(100);
             side.record_hello(1, Some(search), gap, now, &settings);
         }
         assert_eq!(side.held_down_nodes(now, &settings), 0);
         for _ in 0..3 {
-            now = now + seconds(61);
+            now = now + seconds(121);
             side.record_hello(1, Some(search), gap, now, &settings);
         }
         assert_eq!(side.held_down_nodes(now, &settings), 0b0001);

@@ -321,13 +321,14 @@ impl Neighbour {
 
     /// Returns the silence of a node after which its link counts as down.
     ///
-    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only, so a silence of that length
-    /// is one lost frame.
+    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only. A few lost frames then make a
+    /// silence that is several times as long, so the link counts as down after the longest silence of any neighbour.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
-        let asks_rarely = self.has_no_peer() && !self.is_near(now, settings);
-        settings
-            .dead_after
-            .times(if asks_rarely { RARE_GAPS } else { 1 })
+        if self.has_no_peer() && !self.is_near(now, settings) {
+            longest_lease(settings)
+        } else {
+            settings.dead_after
+        }
     }
 
     fn is_near(&self, now: Instant, settings: &Settings) -> bool {
@@ -575,9 +576,6 @@ impl Signs {
         answer: 0,
     };
 }
-
-/// Silence without a neighbour after which a link counts as down, in units of `dead_after`.
-const RARE_GAPS: u32 = 4;
 
 /// Consecutive reports of a node that it does not hear this relay: an answer or two may be lost.
 const UNHEARD: u8 = 8;
