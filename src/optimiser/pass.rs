@@ -44,7 +44,7 @@ impl Behind {
     }
 }
 
-/// Relay on a pass.
+/// Relay in a pass, as far as its reaches depend on it.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission of the relay.

@@ -94,12 +94,14 @@ impl RandomScene {
         Ok(scene.chain_sir(&self.told()?))
     }
 
-    /// Returns the positions of a chain that knows the interferer. For several sources, the paper's hypothetical one.
+    /// Returns the positions of a chain that knows the interferer.
+    ///
+    /// For several sources it knows the paper's hypothetical interferer instead.
     pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
         let places: Option<_> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
-        places.ok_or(FigureError::Unsettled("a chain that was told"))
+        places.ok_or(FigureError::Unsettled("a chain that knows the interferer"))
     }
 
     /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.

@@ -179,18 +179,18 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
         .filter(move |(_, index)| *index <= relays)
 }
 
-/// Known profile of one relay: its room and its power.
+/// Known profile of one relay: its power, and its lateral offsets and altitudes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
-    /// Allowed region across the line.
+    /// Lateral offsets and altitudes that the relay may choose from.
     pub room: Room,
     /// Transmit power, W.
     pub power_w: f32,
 }
 
 impl Seat {
-    /// Returns the seat of a relay without a profile of its own.
+    /// Returns the profile of a relay that has the mission's common one.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),
@@ -198,7 +198,8 @@ impl Seat {
         }
     }
 
-    /// Returns the seat of a relay with the profile `own`, at its altitude if it `holds` that.
+    /// Returns the profile of a relay with the altitude and power `own`. If it `holds` the altitude, that is the only one
+    /// allowed.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {
