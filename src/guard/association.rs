@@ -15,10 +15,12 @@ use crate::time::Jitter;
 /// Number of messages of another association in a row that show a new one. Fewer may be late messages of an old one.
 const STRAYS: u8 = 3;
 
-/// Reminders, one per second, after which a halt request that is not repeated expires.
+/// Number of reminders, one per second, after which a halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Reminders after which a position that is not repeated expires.
+/// Number of reminders after which a neighbour's position expires unless it is repeated.
+///
+/// There is one reminder per second.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Association that this relay has left, until the neighbour starts a new one.
@@ -85,7 +87,7 @@ impl Association {
         }
     }
 
-    /// Returns true without a flown neighbour: the chain ends here, or the neighbour is absent.
+    /// Returns true if there is no flown neighbour: the chain ends here, or the neighbour is absent.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
@@ -440,7 +442,9 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends that state if this relay is beyond `near_m` by `is_beyond`. It then stays at least that far away.
+    /// Ends the state of [`mark_near`](Self::mark_near) once `is_beyond` is true for `near_m`.
+    ///
+    /// `near_m` then becomes the limit, so this relay stays at least that far away.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

@@ -198,7 +198,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns how close the neighbour upstream may come at most, m, for the limits downstream.
+    /// Returns the minimum distance along x that the neighbour upstream keeps, m; limits downstream use it.
     pub(super) const fn taken_m(&self) -> f32 {
         if self.keep_out.is_near() || self.is_agreed() && !self.clear {
             0.0

@@ -89,7 +89,7 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association along another line; of lost relays it only keeps that there are some.
+    /// Starts a new association along another line. Lost relays are kept without their positions.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),

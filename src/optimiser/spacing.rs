@@ -97,7 +97,7 @@ const MOST_RATIO: f32 = 1e18;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
-    /// X, m.
+    /// Interferer's x: X, m.
     interferer_x_m: f32,
     /// (Y - y)^2 + h^2, m^2.
     aside_squared: f32,

@@ -212,7 +212,7 @@ pub(super) struct Tangent {
     pub(super) c: f32,
     /// c - 1.
     pub(super) e: f32,
-    /// m^2.
+    /// Constant term of the quadratic, m^2.
     pub(super) spare: f32,
 }
 

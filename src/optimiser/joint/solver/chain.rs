@@ -98,7 +98,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. The largest gain of any hop.
+    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. It is the largest gain of any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
