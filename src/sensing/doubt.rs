@@ -2,7 +2,7 @@
 //!
 //! # Relay
 //!
-//! A relay's measurements do not fit those of the others because its receiver is faulty or it lies.
+//! A relay's measurements do not fit those of the others because its receiver is faulty or it reports false values.
 //!
 //! If the measurements do not fit a single source, the leader excludes one relay after the other from a pass. Without the faulty
 //! relay the others are consistent; without any other relay they are not.
