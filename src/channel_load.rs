@@ -31,7 +31,7 @@ const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Relays in range of one place in a chain whose radios reach four relays far. A frame then waits for its own time only.
+/// Maximum number of relays in range without waits: radios reach four relays far on either side.
 const NEAR: u16 = 9;
 
 /// Maximum wait for the channel, in frame times.
@@ -56,8 +56,9 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the bits of keep-alive traffic in one `probe_after`, in bit µs/s. They are divided by the allowed fraction of the
-    /// channel.
+    /// Returns the required capacity times 1e6, bits: keep-alive bits over their allowed fraction.
+    ///
+    /// The bits are those of one `probe_after`.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -186,7 +187,7 @@ impl core::fmt::Display for ChannelFull {
         let ms = self.least_probe_after.as_micros() / 1_000;
         write!(
             f,
-            "{} relays share the channel at one place: it needs {} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {} relays in range",
+            "{} relays in range of each other overload the channel: it needs {} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {} relays in range",
             self.in_range, self.least_baud, self.most_in_range
         )
     }

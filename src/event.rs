@@ -132,7 +132,7 @@ const LAST: &[Event] = &[
     Event::InterfererUnclear,
 ];
 
-/// Kinds of event that concern a node at one side.
+/// Kind of event about one node on one side of this relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum About {
     Lost,

@@ -2,9 +2,10 @@
 
 use crate::place::Placement;
 
-/// Behaviour of a relay while its part of the chain has no quorum and must not block the other part.
+/// Behaviour of a relay while its part of the chain has no quorum.
 ///
-/// Set it to the same value on all relays: relays that leave then keep their order and distances.
+/// [`Leave`](Self::Leave) clears the line for the part that has a quorum. Set the same value on all relays: relays that leave the
+/// line then keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {

@@ -30,7 +30,7 @@ mod upload;
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    println!("This one runs on the target: cargo cost");
+    println!("This program runs on the target only. Use `cargo cost`.");
 }
 
 #[cfg(target_os = "none")]

@@ -7,7 +7,7 @@ use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 use super::counter::relay;
 use super::missions::mission;
 
-/// Measures the maximum stack use of a relay's calls, bytes, by the paint that is left below.
+/// Measures the maximum stack use of a relay's calls, bytes, by a pattern that they overwrite.
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);
     let mut head = relay(1, Settings::default(), TWO);
@@ -36,7 +36,7 @@ pub(crate) fn exchange(from: &mut Relay, to: &mut Relay, at: Port, now: Instant)
     }
 }
 
-/// Number of painted words: more than any call uses.
+/// Number of stack words filled with the pattern: more than any call uses.
 pub(crate) const PAINTED: usize = 1024;
 
 pub(crate) const PAINT: u32 = 0xC0FF_EE11;
@@ -49,7 +49,7 @@ pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
     look()
 }
 
-/// Paints the stack that the next call will use, by using it.
+/// Fills the stack that the next call will use with the pattern.
 #[inline(never)]
 pub(crate) fn paint() {
     let mut words = [0_u32; PAINTED];
@@ -59,7 +59,9 @@ pub(crate) fn paint() {
     black_box(&words);
 }
 
-/// Returns the bytes without paint. Its array lies where that of `paint` was, and is not written.
+/// Returns the number of bytes that no longer have the pattern.
+///
+/// Its array lies where that of `paint` was, and is not written.
 #[inline(never)]
 pub(crate) fn look() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();

@@ -35,7 +35,7 @@ pub(crate) fn resume_views(
     if let Some(bytes) = &bytes {
         stored = record(bytes, ViewRecord::LENGTH);
         let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
-            refused("is damaged or not a record of views: remove the file before the next flight, and start again")
+            refused("is damaged or no record of votes: before a new flight remove the file, and start again")
         })?;
         relay.resume_view(now, &votes).map_err(|error| match error {
             RecordError::Base => refused(&format!(

@@ -49,14 +49,14 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
         Progress::Stored { by } => log.tell(
             now,
             "stored",
-            format_args!("relay {by} has stored version {version}; the other relays are being asked"),
+            format_args!("relay {by} has stored version {version}; polling until the chain flies it"),
         ),
         Progress::Adopted { by } => log.say(
             now,
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
             format_args!(
-                "relay {by} flies version {version}, as the first of {all} relays; it is being asked for the others"
+                "relay {by} flies version {version}, as the first of {all} relays; polling it until the others do, too"
             ),
         ),
         Progress::Flown { by, view, relays } => log.say(

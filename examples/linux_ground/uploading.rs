@@ -40,9 +40,9 @@ pub(crate) type Over = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Question to the chain for the mission that it flies.
+    /// Asks the chain for the mission that it flies.
     ///
-    /// With the time when a relay first reported an upload without its values.
+    /// The time is that at which a relay first reported an upload without its values.
     Asking(Option<Instant>),
     Confirming,
     Uploading,

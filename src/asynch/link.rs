@@ -272,7 +272,7 @@ pub(super) async fn watched<F: Future>(future: F) -> (F::Output, bool) {
     (output, waited)
 }
 
-/// Capacity: two frames of full length, beside the one that the port is sending.
+/// Capacity of a frame queue: two frames of full length, besides the frame that the port is sending.
 const ROOM: usize = 2 * MAX_FRAME;
 
 /// Queued frames in sending order, each with its delimiter.

@@ -15,10 +15,12 @@ use crate::time::Jitter;
 /// Number of messages of another association in a row that show a new one. Fewer may be late messages of an old one.
 const STRAYS: u8 = 3;
 
-/// Reminders, one per second, after which a halt request that is not repeated expires.
+/// Number of reminders, one per second, after which a halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Reminders after which a position that is not repeated expires.
+/// Number of reminders after which a neighbour's position expires unless it is repeated.
+///
+/// There is one reminder per second.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Association that this relay has left, until the neighbour starts a new one.
@@ -42,7 +44,7 @@ pub(super) struct Association {
     pub(super) own: u16,
     /// Number of the neighbour's association, paired with `own`; 0 for none.
     pub(super) heard: u16,
-    /// Messages of other associations in a row.
+    /// Number of consecutive messages that belong to another association.
     strays: u8,
     /// True if a message is pending.
     pub(super) due: bool,
@@ -54,7 +56,8 @@ pub(super) struct Association {
     halt_reminders_left: u8,
     /// True while a halt request is sent to the neighbour.
     halt_sent: bool,
-    /// Number of the association that the neighbour has left, 0 for none. The neighbour is absent, that is not flown.
+    /// Number of the association that the neighbour has left, 0 for none. A neighbour that has left one is absent: its drone does
+    /// not follow setpoints.
     absent: u16,
     /// Pending notice of the association that this relay has left.
     leave_notice: Option<LeaveNotice>,
@@ -84,7 +87,7 @@ impl Association {
         }
     }
 
-    /// Returns true without a flown neighbour: the chain ends here, or the neighbour is absent.
+    /// Returns true if there is no flown neighbour: the chain ends here, or the neighbour is absent.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
@@ -94,7 +97,7 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance of this relay's reported x beyond the neighbour's last x, on its own side, m. NaN if unknown.
+    /// Returns how far this relay is on its own side of the neighbour's last x, m; NaN if unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -113,12 +116,12 @@ impl Association {
         }
     }
 
-    /// Returns true if this relay was reported on the wrong side of the neighbour's last x.
+    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x.
     pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay was reported on its own side of the neighbour's last x.
+    /// Returns true if this relay's reported x is on its own side of the neighbour's last x.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -414,8 +417,9 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits relays lost before the first setpoint `x_m`. Never heard, they may hover anywhere beyond, at the separation from
-    /// `near_m` on.
+    /// Moves the limit for relays that were lost before the first setpoint to that setpoint's `x_m`.
+    ///
+    /// They were never heard and may hover anywhere beyond it; from `near_m` on they are the separation away.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -438,7 +442,9 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends that state if this relay is beyond `near_m` by `is_beyond`. It then stays at least that far away.
+    /// Ends the state of [`mark_near`](Self::mark_near) once `is_beyond` is true for `near_m`.
+    ///
+    /// `near_m` then becomes the limit, so this relay stays at least that far away.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -495,8 +501,8 @@ pub struct Fence {
     pub target_m: f32,
     /// Position of the sender across the line, or its target position across the line, m. Both coordinates are -1e7 to 1e7.
     pub across: CrossSection,
-    /// Owner: requested step, its distance from the fence along x, m, 0 to 1e5. If it is less than the separation, the follower
-    /// must not move across the line.
+    /// Owner: requested step, which is the distance to keep from the fence along x, m, 0 to 1e5. If it is less than the
+    /// separation, the follower must not move across the line.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,

@@ -198,7 +198,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns how close the neighbour upstream may come at most, m, for the limits downstream.
+    /// Returns the minimum distance along x that the neighbour upstream keeps, m; limits downstream use it.
     pub(super) const fn taken_m(&self) -> f32 {
         if self.keep_out.is_near() || self.is_agreed() && !self.clear {
             0.0
@@ -207,13 +207,17 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true without a neighbour, or if the neighbour has found this relay beyond it. Before, it announces no fence.
+    /// Returns true if no flown neighbour is upstream, or if it has announced a fence.
+    ///
+    /// A neighbour announces a fence once it has found this relay beyond it. False while a lost relay may be out of order.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.is_agreed())
     }
 
-    /// Returns true if the neighbour upstream has reported that it is beyond this relay.
+    /// Returns true if the neighbour upstream was reported at a larger x than this relay.
+    ///
+    /// Also true while a lost relay may be out of order.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         self.keep_out.is_disordered()
             || !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
@@ -232,8 +236,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest x of the neighbour upstream and relays beyond it that are too near to it, m. They are not yet the
-    /// separation below it. It applies until this relay has cleared the first fence: then all of them are below this relay.
+    /// Returns the highest possible x of the relays upstream before the first fence is cleared, m.
+    ///
+    /// Until then the neighbour upstream, and relays beyond it, may be closer than the separation. Afterwards all are below this
+    /// relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)

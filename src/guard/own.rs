@@ -1,6 +1,7 @@
 //! State of the relay itself: agreed position, setpoint and reachable positions.
 //!
-//! The reachable interval is the x at which the relay may be between its last report and its setpoints. A relay that is told to turn flies on for a while, but never beyond its earlier setpoints, where it could have stopped. So it
+//! The reachable interval is the x at which the relay may be between its last report and its setpoints. A relay whose
+//! setpoint turns back flies on for a while, but never beyond its earlier setpoints, where it could have stopped. So it
 //! may be anywhere between its reported x and all setpoints within the [`lag`](GuardConfig::lag) before that report.
 
 use super::config::GuardConfig;

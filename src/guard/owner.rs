@@ -89,7 +89,7 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association along another line; of lost relays it only keeps that there are some.
+    /// Starts a new association along another line. Lost relays are kept without their positions.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -135,10 +135,11 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the neighbour is known to be beyond this relay along x. Each report has an error of up to `hover_m`.
-    /// Before the first fence is cleared, two relays whose reports are closer than that along x are in order only if they may
-    /// pass each other, that is the separation apart across the line. A pair that was in order may since have moved by that error
-    /// once more at each relay, each time that one halts or is rebooted.
+    /// Returns true if the neighbour is known to be beyond this relay along x.
+    ///
+    /// Each report has an error of up to `hover_m`. Before the first fence is cleared, two relays whose reports are closer than
+    /// the errors along x are in order only if they may pass each other: they are then the separation apart across the line. A
+    /// pair that was in order may have moved by the errors once more since then, each time that one of them halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;

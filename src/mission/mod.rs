@@ -282,8 +282,9 @@ pub struct Mission {
     /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W. eta / (`mu_los` `p_MSI`), in a field m^2/W:
     /// `Upsilon_max` / `mu_los`.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of a relay on the last hop per watt, m^2/W. (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, in a field Upsilon(D) / eta.
-    /// With noise, of the interference plus noise at Rx.
+    /// Gain of a relay on the last hop per watt, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`.
+    ///
+    /// In a field it is Upsilon(D) / eta. With noise it refers to the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
     /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m. 0 without noise and in a field.
     pub(super) noise_at_a_metre: f32,
@@ -696,7 +697,7 @@ impl Mission {
     }
 }
 
-/// Gain factor that makes a hop half as long as the others.
+/// Ratio of gains that gives a hop half the length of the others: SIR is gain over squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {

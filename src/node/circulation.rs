@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant, Jitter};
 /// portions.
 const SLOW: u32 = 4;
 
-/// Base-2 logarithm of the most hop times between two retransmissions, less one: eight hop times.
+/// Maximum of the exponent n in the wait of 2 << n hop times between retransmissions: eight hop times.
 const LOG_MOST: u32 = 2;
 
 /// Hop times until the first retransmission on a lossy channel. In this time the neighbour has also replied to a duplicate.
@@ -90,7 +90,7 @@ pub(crate) struct Circulation {
     is_received: bool,
     /// True if this or the previous relay has noticed a loss of the current message.
     is_lossy: bool,
-    /// Further messages for which the channel counts as lossy.
+    /// Number of further messages during which the channel still counts as lossy.
     lossy_messages: u8,
     /// Remaining repetitions of the reply without a request for it.
     replies_left: u8,

@@ -193,15 +193,15 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if a message was retransmitted.
     pub(crate) resent: bool,
-    /// A pass or a proposal starts at this relay.
+    /// True if a pass or a proposal has started at this relay.
     pub(crate) began: bool,
-    /// A new view is needed.
+    /// True if a new view is needed.
     pub(crate) view_needed: bool,
     /// Neighbour that was alive at this time or later, by its reply.
     pub(crate) alive: Option<(Peer, Instant)>,
     /// Origin of the proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,
-    /// Outstanding proposal: no pass continues before its decision.
+    /// True if a proposal is outstanding: no pass continues before its decision.
     pub(crate) view_proposed: bool,
     pub(crate) news: Option<LayerEvent>,
     /// Changes of the interference estimate and of the faulty receivers.

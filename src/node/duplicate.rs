@@ -56,7 +56,7 @@ pub(crate) enum Sender {
     Itself,
     /// Another node, which has not stated its claim number; with a key, perhaps a forger.
     Unknown,
-    /// Another node with this claim.
+    /// Another node, with its claim to this relay's number.
     Rival(Rival),
 }
 

@@ -67,8 +67,9 @@ pub(crate) struct Lease {
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
     is_agreed: bool,
-    /// Start of the next renewal at the leader, and slowly decaying maximum of recent round trips.
+    /// Start of the next renewal at the leader.
     next_at: Option<Instant>,
+    /// Slowly decaying maximum of recent round trips of renewals.
     slowest: Duration,
     circulation: Circulation,
 }

@@ -37,9 +37,9 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Number of this relay's hellos, for the offers that answer them, with its first and last use.
+/// Number that this relay's hellos bear, with the times of its first and last use.
 ///
-/// The number 0 means none.
+/// An offer that answers a hello repeats its number. The number 0 means none.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -50,13 +50,15 @@ struct Asked {
 /// State of the offers to the neighbour, and to the ground station, on one side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Number of the neighbour's last hello, which an offer answers, and its time; 0 before any.
+    /// Number in the neighbour's last hello, which an answering offer repeats; 0 before any.
     nonce: u16,
+    /// Reception time of that hello.
     heard: Option<Instant>,
     /// True if an offer is pending.
     is_due: bool,
-    /// Time of the next repetition, and number of offers sent.
+    /// Time of the next repetition.
     at: Option<Instant>,
+    /// Number of offers sent.
     tries: u8,
     /// True if a hello to the ground station is pending.
     reports: bool,
@@ -87,9 +89,11 @@ pub(crate) enum Offered {
     Passed,
 }
 
-/// Hop times until the first repetition, offers until the time doubles, and number of repetitions.
+/// Hop times until the first repetition of an offer.
 const OFFER_HOPS: u32 = 4;
+/// Number of offers after which the interval doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
+/// Maximum number of repetitions.
 const OFFERS: u8 = 16;
 
 /// Missions known to one relay, and its offers to the neighbours.

@@ -100,7 +100,7 @@ impl Hops {
         }
     }
 
-    /// Returns the SIRs of the hops to and from the relay at `at`. Their operations are those of [`crate::sir`].
+    /// Returns the SIRs of the hops to and from the relay at `at`, computed as in [`crate::sir`].
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -214,7 +214,7 @@ impl LocalSearch {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the next row; returns the number of evaluations, `None` after the last row.
+    /// Searches the next altitude of the coarse-to-fine search. Returns the number of evaluations, `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;

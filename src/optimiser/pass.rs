@@ -1,8 +1,8 @@
 //! Pass of targets along the chain. Each relay's reaches, the last relay's verdict, and the positions on the way back.
 //!
-//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it still receives the relay before it, for any position
-//! of that relay up to its own reach. Toward Tx (Algorithm 4) it is the x closest to Tx from which the relay before it on the
-//! pass still receives it, for any position of that relay. So no chain that meets the target is excluded, and a missed target is
+//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it receives the relay before it, if that relay is at the
+//! best of its positions up to its own reach. Toward Tx (Algorithm 4) it is the x closest to Tx from which the relay before it on
+//! the pass receives it at the best of its positions. So no chain that meets the target is excluded, and a missed target is
 //! out of reach of every chain. See [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may
 //! have to hold back.
 //!
@@ -44,7 +44,7 @@ impl Behind {
     }
 }
 
-/// Relay on a pass.
+/// Relay in a pass, as far as its reaches depend on it.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission of the relay.

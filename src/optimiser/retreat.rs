@@ -33,7 +33,7 @@ use crate::sir::square;
 /// Hop to a known receiver, prepared for evaluation with many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat {
-    /// A of the module's text without Upsilon; for the hop to Rx with it.
+    /// Gain A of the module's documentation: without Upsilon, except for the hop to Rx.
     gain: f32,
     /// (h - h0)^2, m^2.
     climb_squared: f32,

@@ -97,7 +97,7 @@ const MOST_RATIO: f32 = 1e18;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
-    /// X, m.
+    /// Interferer's x: X, m.
     interferer_x_m: f32,
     /// (Y - y)^2 + h^2, m^2.
     aside_squared: f32,
@@ -117,9 +117,9 @@ pub struct Hop {
 }
 
 impl Hop {
-    /// Returns the hop from `sender` to relay `index` at `at`.
+    /// Returns the hop from `sender` to relay `index` at the cross-section `at`.
     ///
-    /// Neighbours among the relays after it may be `spread_squared` m^2 apart across the line.
+    /// `spread_squared` is the maximum squared distance across the line between neighbours among the relays after it, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -458,15 +458,15 @@ impl Hop {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
-    /// rho = gamma / A.
+    /// Ratio rho = gamma / A of target and gain; the symbols are those of the module's documentation.
     pub(super) ratio: f32,
     /// rho - 1.
     pub(super) excess: f32,
-    /// u, m.
+    /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
-    /// Value of a^2, m^2.
+    /// Squared distance a^2 of the receiver from the interferer at d = u, m^2.
     pub(super) aside_squared: f32,
-    /// b^2, m^2.
+    /// Squared distance b^2 of the receiver from the sender at d = 0, m^2.
     pub(super) across_squared: f32,
     /// a^2 - b^2, without its cancellation, m^2.
     pub(super) base: f32,

@@ -2,7 +2,7 @@
 //!
 //! # Relay
 //!
-//! A relay's measurements do not fit those of the others because its receiver is faulty or it lies.
+//! A relay's measurements do not fit those of the others because its receiver is faulty or it reports false values.
 //!
 //! If the measurements do not fit a single source, the leader excludes one relay after the other from a pass. Without the faulty
 //! relay the others are consistent; without any other relay they are not.
@@ -60,7 +60,7 @@ const DECISIVE: f64 = 6.0;
 /// Maximum variance of the relative errors of consistent measurements (some 1.5 dB).
 const OF_ONE_MIND: f64 = 0.1;
 
-/// Number of sensing passes between a failed trial and the next trial.
+/// Number of sensing passes from a failed trial to the next trial.
 const REST: u8 = 4;
 
 /// Maximum squared difference at which an excluded relay fits again. In squared standard deviations, and absolutely.
@@ -133,7 +133,7 @@ impl Trial {
         }
     }
 
-    /// Evaluates a pass of `relays` relays, whose nodes are among 1 to `nodes`.
+    /// Evaluates the `sums` of a pass. The view has `relays` relays, whose node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -246,9 +246,10 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay still does not fit. It is compared at `place` with the sums of all
-/// `others`. `expected` is the estimate there. The difference of v and the others' fit e is (v / e - e / v) / 2, which is symmetric
-/// in both.
+/// Returns true if the measurement of an excluded relay still does not fit the others.
+///
+/// The measured v at `place` is compared with e, the fit to the sums of all `others` there. Their difference is (v / e - e / v) /
+/// 2, which is symmetric in both. `expected` is v by the current estimate; it sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -270,8 +271,9 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing should measure several times the noise. Repeated measurements of all others show
-/// that.
+/// Returns true if a relay without a measurable signal should receive several times the noise.
+///
+/// The other relays' repeated measurements show that.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -286,8 +288,9 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than these limits. They are squared standard deviations and a
-/// difference.
+/// Returns true if a ratio of powers differs from 1 by more than both limits.
+///
+/// The limits are a multiple of the variance `unsure`, and a squared difference.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -321,7 +324,9 @@ pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Compares the levels of the ends with `fit`, the fit of the relays' measurements.
+/// Compares the levels of the ground ends with `fit`; returns the ends that do not fit.
+///
+/// `fit` is that of the relays' measurements.
 pub(super) fn judge_ends(
     mission: &Mission,
     fit: &Fit,

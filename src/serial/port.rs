@@ -113,9 +113,10 @@ where
 
 /// Port with [`embedded_io`] traits.
 ///
-/// Its reads and writes may block, so each is only called after the port has reported that it will not; its `flush` may block and
-/// is never called. So it cannot report when the last byte has left, and a driver-enable pin uses the byte time instead. For that
-/// the port must send at once and without gaps: a UART with a FIFO or a ring buffer does, a USB adapter does not.
+/// Its reads and writes may block, so each is only called after the port has reported that the call will not block. Its `flush`
+/// may block and is never called. So the port cannot report when the last byte has left, and a driver-enable pin uses the byte
+/// time instead. For that the port must send at once and without gaps: a UART with a FIFO or a ring buffer does, a USB adapter
+/// does not.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Io<S>(pub S);
 

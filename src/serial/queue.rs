@@ -152,7 +152,7 @@ pub struct InterruptEnd<'q> {
     received: Filler<'q, AtomicU16>,
     outgoing: Emptier<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// True if bytes were lost and the main loop has not read that.
+    /// True while bytes were lost and no [`Fault::Overrun`] has been queued for them.
     gap: bool,
 }
 

@@ -161,20 +161,28 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
 pub(crate) fn refused(error: ConfigError) {
     match error {
         ConfigError::Blank => warn!("no configuration: the block is blank"),
-        ConfigError::Magic => error!("configuration refused: no block"),
-        ConfigError::Version => error!("configuration refused: version or length"),
+        ConfigError::Magic => error!("configuration refused: the block does not begin with UAVR"),
+        ConfigError::Version => {
+            error!("configuration refused: another version or length of the block");
+        }
         ConfigError::Crc => error!("configuration refused: damaged, the CRC does not match"),
-        ConfigError::Index => error!("configuration refused: index"),
-        ConfigError::Profile => error!("configuration refused: own altitude or power"),
+        ConfigError::Index => {
+            error!("configuration refused: the index exceeds the number of relays, or is 0");
+        }
+        ConfigError::Profile => {
+            error!("configuration refused: altitude or power of this relay out of range");
+        }
         ConfigError::Hold => error!("configuration refused: byte 15 is neither 0 nor 1"),
         ConfigError::Method => {
             error!("configuration refused: method unknown, or not for a field");
         }
         ConfigError::Adjust => {
-            error!("configuration refused: rounds or altitudes of adjust");
+            error!(
+                "configuration refused: rounds or explore of adjust out of range, or not 0 for another method"
+            );
         }
         ConfigError::Measure => {
-            error!("configuration refused: samples or i_max_w");
+            error!("configuration refused: samples or i_max_w of the measurement out of range");
         }
         ConfigError::Listen => {
             error!(
@@ -182,7 +190,7 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Interferer => {
-            error!("configuration refused: interferer and field at once");
+            error!("configuration refused: it has both an interferer and a field");
         }
         ConfigError::Points => error!("configuration refused: too many points of the field"),
         ConfigError::Unused => {
@@ -232,7 +240,10 @@ pub(crate) fn no_epoch() {
 /// Logs that a mission uploaded before this start was restored.
 #[cfg(feature = "upload")]
 pub(crate) fn resumes(version: u16) {
-    info!("mission version {=u16} was uploaded before", version);
+    info!(
+        "mission version {=u16} restored: uploaded before this start",
+        version
+    );
 }
 
 /// Logs an uploaded mission; `kept` is true if it was stored.
@@ -251,18 +262,18 @@ pub(crate) fn uploaded(version: u16, kept: bool) {
 /// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
 pub(crate) fn stands_by(taken: bool) {
     if taken {
-        info!("votes restored from flash");
+        info!("votes on views restored from flash");
     } else {
-        error!("votes in flash are of another firmware, and ignored");
+        error!("votes on views in flash are of another firmware, and ignored");
     }
 }
 
 /// Logs that storing the votes works again (`kept`) or fails.
 pub(crate) fn votes(kept: bool) {
     if kept {
-        info!("votes can be stored again");
+        info!("votes on views can be stored again");
     } else {
-        error!("votes cannot be stored: a reboot in flight loses them");
+        error!("votes on views cannot be stored: a reboot in flight loses them");
     }
 }
 
@@ -273,7 +284,10 @@ pub(crate) fn cannot_sign() {
 
 /// Logs that this image was built without the feature for the method, or for measuring.
 pub(crate) fn cannot_fly(error: SetupError) {
-    error!("configuration refused: this image cannot do it, {}", error);
+    error!(
+        "configuration refused: not supported by this image, {}",
+        error
+    );
 }
 
 pub(crate) fn event(event: Event, relay: &Relay) {

@@ -42,7 +42,7 @@ pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     ];
     let mut pip = Command::new(&python);
     succeed(pip.args(install).arg(REQUIREMENTS_FILE)).map_err(|why| match why {
-        Trouble::Missing => format!("{} is not there", python.display()),
+        Trouble::Missing => format!("{} is missing", python.display()),
         Trouble::Failed(said) => {
             let names: Vec<&str> = REQUIREMENTS.lines().collect();
             format!(

@@ -94,7 +94,7 @@ fn put(file: &Path, excerpt: &str) -> Result<(), Failure> {
         .and_then(|(before, rest)| Some((before, rest.split_once(end)?.1)));
     let Some((before, after)) = parts else {
         return Err(wrong(format!(
-            "no lines {} and {}",
+            "the lines {} and {} are missing",
             begin.trim(),
             end.trim()
         )));

@@ -69,7 +69,7 @@ impl Rivals {
             .spawn()
             .map_err(|error| format!("{}: {error}", python.display()))?;
         let pipes = child.stdin.take().zip(child.stdout.take());
-        let (tasks, lines) = pipes.ok_or("Python has no pipes")?;
+        let (tasks, lines) = pipes.ok_or("the Python process has no pipes")?;
         let (sender, answers) = channel();
         std::thread::spawn(move || {
             for line in BufReader::new(lines).lines().map_while(Result::ok) {
@@ -130,7 +130,7 @@ impl Rivals {
         _ = writeln!(self.tasks, "{task}");
         match self.answers.recv_timeout(patience(self.limit_s)) {
             Ok(line) => serde_json::from_str(&line).map_err(|error| error.to_string()),
-            Err(_) => Err(format!("Python gives no answer: {}", self.last_words())),
+            Err(_) => Err(format!("Python sent no answer: {}", self.last_words())),
         }
     }
 

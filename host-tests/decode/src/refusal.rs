@@ -49,11 +49,11 @@ impl fmt::Display for Refusal {
             Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 137"),
             Self::Truncated => f.write_str("cut short: the delimiter comes inside a COBS run"),
             Self::Short(len) => write!(f, "too short: {len} bytes without COBS"),
-            Self::Crc(has, is) => write!(f, "CRC {has:08x}, its bytes have {is:08x}"),
+            Self::Crc(has, is) => write!(f, "CRC {has:08x}, but its bytes give {is:08x}"),
             Self::Version(version, flags) => {
                 write!(
                     f,
-                    "version {version} with flags {flags}: known is 1 with 0, 1 or 3"
+                    "version {version} with flags {flags}: must be 1 with 0, 1 or 3"
                 )
             }
             Self::UnknownTag(tag) => write!(f, "unknown tag {tag:02x}"),

@@ -109,7 +109,7 @@ fn one<'f>(kind: &'f Kind, rest: &mut Rest<'_>) -> Result<Value<'f>, String> {
         Kind::List(most, of) => {
             let count = rest.varint()?;
             if count > *most {
-                return Err(format!("there are {count} of it: must be 0 to {most}"));
+                return Err(format!("its count is {count}: must be 0 to {most}"));
             }
             several(count, of, rest)?
         }

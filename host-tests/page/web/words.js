@@ -47,6 +47,18 @@ function list(sirs, ends) {
   });
 }
 
+/** Phrases for the kinds of events that need more words beside a relay's number. */
+const PHRASES = {
+  "silent": "went silent",
+  "lost": "lost relay",
+  "found": "linked with relay",
+  "no quorum": "no quorum, too few relays are reachable",
+  "converged": "agreed on a position",
+  "infeasible": "no target SIR can be met",
+  "new estimate": "new interference estimate",
+  "interferer unclear": "the measurements fit no single interferer",
+};
+
 /** Fills the list of events. */
 function happened(timeline) {
   byId("happened").hidden = timeline.length === 0;
@@ -55,7 +67,7 @@ function happened(timeline) {
     const who = event.relay === 0 ? "Tx" : `relay ${event.relay}`;
     const other = event.other === undefined ? "" : ` ${event.other}`;
     const relays = event.relays === undefined ? "" : `, ${event.relays} relays`;
-    item.textContent = `${event.at_s.toFixed(3)} s: ${who}: ${event.what}${other}${relays}`;
+    item.textContent = `${event.at_s.toFixed(3)} s: ${who}: ${PHRASES[event.what] || event.what}${other}${relays}`;
     return item;
   }));
 }

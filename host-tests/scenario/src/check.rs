@@ -200,9 +200,9 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table that [`table`] accepts and serde rejects.
+/// Creates the error for a table whose keys [`table`] accepts, but whose values serde rejects.
 ///
-/// This is a fault of the program: the key table and the types differ.
+/// It is a fault of the program: the key table and the types differ.
 pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

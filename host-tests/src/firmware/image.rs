@@ -16,7 +16,7 @@ pub const PROFILE: &str = "firmware";
 pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
-        .ok_or("the workspace is not where it was when this was built")?;
+        .ok_or("the workspace has moved since this program was built")?;
     let folder = std::env::var_os("CARGO_TARGET_DIR")
         .map_or_else(|| root.join("target"), PathBuf::from)
         .join("emulated");

@@ -7,7 +7,7 @@ use uav_relay::{Instant, Phase, Side, Wiring};
 use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
 use super::net::{Deed, Net};
 
-/// Schedule: a reboot; an upload and reboots of relays and leader. Another upload and reboots at both ends.
+/// Schedule of the run, ms: reboots of relays, new searches by the leader, uploads from both ends.
 const DEEDS: [(u64, Deed); 11] = [
     (6_000, Deed::Reboot(4)),
     (6_500, Deed::Restart),

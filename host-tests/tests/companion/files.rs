@@ -67,7 +67,9 @@ pub(crate) fn write(path: impl AsRef<Path>, text: &str) {
     file.write_all(text.as_bytes()).unwrap();
 }
 
-/// Sends `request` to a process's socket and returns the answer. With `is_whole` no more is sent, so the answer comes at once.
+/// Sends `request` to a process's socket and returns the answer.
+///
+/// With `is_whole` the client then closes its sending side, so that the process answers at once.
 pub(crate) fn answer(socket: impl AsRef<Path>, request: &str, is_whole: bool) -> String {
     let mut stream = None;
     wait_until(|| {

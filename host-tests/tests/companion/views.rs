@@ -106,7 +106,8 @@ fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
     damaged[7] ^= 1;
-    let is_damaged = "is damaged or not a record of views: remove the file before the next flight, and start again";
+    let is_damaged =
+        "is damaged or no record of votes: before a new flight remove the file, and start again";
     for (bytes, words) in [
         (damaged, is_damaged),
         (good[..good.len() - 1].to_vec(), is_damaged),

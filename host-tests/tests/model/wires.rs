@@ -28,7 +28,7 @@ pub(crate) struct Flying {
 #[derive(Debug, Default)]
 struct Line {
     flying: VecDeque<Flying>,
-    /// Delayed frames, which the others overtake.
+    /// Delayed frames; frames sent later arrive before them.
     late: Vec<Flying>,
     /// Bytes received since the last delimiter.
     begun: Vec<u8>,
@@ -144,7 +144,7 @@ impl Wires {
         busy.get(usize::from(pick) % busy.len().max(1)).copied()
     }
 
-    /// Removes the next frame from a line, or one of those `behind` it.
+    /// Removes the frame that is `behind` places after the next one of a line, or else its last frame.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;
@@ -201,7 +201,7 @@ impl Wires {
         late.extend(flying.pop_front().map(|frame| Flying { due, ..frame }));
     }
 
-    /// Releases the frames whose delay has ended by `now`, ahead of later ones.
+    /// Releases the delayed frames that are due by `now`. They arrive before the frames in transit.
     pub(crate) fn hurry(&mut self, now: Instant) {
         for Line { flying, late, .. } in &mut self.lines {
             let due = late.extract_if(.., |frame| frame.due <= now);

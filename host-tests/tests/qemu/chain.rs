@@ -40,8 +40,10 @@ pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
         .collect()
 }
 
-/// Maximum number of flights until one has no damaged frame. The emulator is not real time, so that a byte is lost now and then on a
-/// busy host; a fault of the port driver shows in every flight.
+/// Maximum number of flights until one has no damaged frame.
+///
+/// The emulator is not real time, so on a busy host it loses a byte now and then. A fault of the port driver shows in every
+/// flight.
 const FLIGHTS: usize = 3;
 
 #[test]
@@ -141,7 +143,9 @@ fn the_smallest_image_refuses_what_it_cannot_do() {
     fleet.wait("refusals", |lines| {
         [1, 2].iter().all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == *drone);
-            lines.any(|line| line.text == "configuration refused: this image cannot do it, Method")
+            lines.any(|line| {
+                line.text == "configuration refused: not supported by this image, Method"
+            })
         })
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));

@@ -59,7 +59,7 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// True if the pilot wants OFFBOARD or GUIDED, and chooses it again on request; else the sticks fly.
+    /// True if the pilot chooses OFFBOARD or GUIDED, and again on request; false in manual flight.
     pub(crate) granted: bool,
     /// Time until which the pilot chooses another mode, ms.
     elsewhere_until: u64,

@@ -35,7 +35,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     vec![(SECTORS[0], flash.bytes())]
 }
 
-const HOLDS: &str = "votes restored from flash";
+const HOLDS: &str = "votes on views restored from flash";
 
 /// Checks drones that agreed on view 40: they fly in a later view.
 #[test]

@@ -17,7 +17,9 @@ const RELAYS: u16 = 5;
 /// Additional loss of the ground path, which the mission does not know: the receiver is behind a hill.
 const HILL: f64 = 8.0;
 
-/// Returns the error of the first relay's estimate at the receiver. Returns also the fraction of the optimum.
+/// Returns the error of relay 1's estimate at the receiver, and the fraction of the optimum SIR.
+///
+/// One pair for each chain.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
         let wild = RandomScene::new(seed, RELAYS, 1);

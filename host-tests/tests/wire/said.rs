@@ -25,7 +25,7 @@ impl fmt::Debug for Said {
     }
 }
 
-/// Decodes and checks a body by the tables; the error is the reason for refusal.
+/// Decodes and checks a body by the tables of FORMAT.md; the error is the reason for refusal.
 fn walked(body: &[u8]) -> Result<Fields<'static>, MessageError> {
     match walk::message(&FORMAT, body) {
         Ok((_, fields)) => Ok(fields),

@@ -16,7 +16,9 @@ fn sixth() -> (Bench, Said) {
     (bench, sweep)
 }
 
-/// Returns the hello of a node that hears the nearest, has chosen `neighbour` and asks for nothing.
+/// Returns the hello of a node that receives its nearest node and has selected `neighbour`.
+///
+/// It requests nothing.
 fn chose(bench: &Bench, neighbour: u16) -> Said {
     near(1, 1, &a_hello(0, bench.mission, neighbour, 0))
 }

@@ -22,8 +22,9 @@ pub(crate) const NOW: Instant = Instant::ZERO;
 
 const KEY: [u8; 32] = *b"whoever reads this is not secret";
 
-/// Flags of a frame: a tag follows, and the body is a handshake.
+/// Flag of a frame: a tag follows the body.
 const SIGNED: u16 = 1;
+/// Flag of a frame: the body is a handshake.
 const HANDSHAKE: u16 = 2;
 
 /// Returns settings with the key.

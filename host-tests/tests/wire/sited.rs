@@ -178,7 +178,7 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_eq!(stale(&met, line), (1, 0));
 }
 
-/// Checks a single relay, which has a position and a guard's setpoint until the line changes.
+/// Checks a relay that adopts another line: it has no setpoint until its drone can have stopped.
 #[test]
 fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let config = paper(1);

@@ -39,7 +39,7 @@ fn agreed_in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Checks that another digest means another view or mission, which a hello tells apart.
+/// Checks passes and renewals with the digest of this view or of another one, which a hello answers.
 #[test]
 fn passes_have_the_digest_of_their_view() {
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {

@@ -69,8 +69,9 @@ pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> S
     hello.with(json!({ "latest_view": newest }))
 }
 
-/// Sets the nodes that a hello's sender receives, and the number of connected relays behind it. Bit 0 is the nearest; it counts
-/// itself.
+/// Sets which nodes a hello's sender receives (bit 0: the nearest), and its connected relays.
+///
+/// The number of connected relays includes the sender.
 pub(crate) fn near(hears: u8, behind: u16, hello: &Said) -> Said {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

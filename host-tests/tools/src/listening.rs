@@ -94,12 +94,14 @@ impl RandomScene {
         Ok(scene.chain_sir(&self.told()?))
     }
 
-    /// Returns the positions of a chain that knows the interferer. For several sources, the paper's hypothetical one.
+    /// Returns the positions of a chain that knows the interferer.
+    ///
+    /// For several sources it knows the paper's hypothetical interferer instead.
     pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
         let places: Option<_> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
-        places.ok_or(FigureError::Unsettled("a chain that was told"))
+        places.ok_or(FigureError::Unsettled("a chain that knows the interferer"))
     }
 
     /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.
@@ -161,9 +163,9 @@ pub fn shares(
         let outcome = run(setup(&wild)?)?;
         let best = wild.optimum()?;
         let sirs = by_agreement(&wild.scene()?, &outcome.stands);
-        let last = *sirs
-            .last()
-            .ok_or(FigureError::Unsettled("a chain that listens"))?;
+        let last = *sirs.last().ok_or(FigureError::Unsettled(
+            "a chain that measures the interferer",
+        ))?;
         let share = |at: usize| sirs.get(at).unwrap_or(&last) / best;
         Ok((0..=LAST).map(share).collect())
     };
@@ -243,7 +245,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     wild.place(500.0 - speed_mps * half_s, 300.0);
     let mut setup = wild.flown(Interference::Unknown)?;
     setup.settings.listen = Some(Listen::following(relays));
-    let none = FigureError::Unsettled("an interferer that moves");
+    let none = FigureError::Unsettled("a chain that tracks a moving interferer");
     let Some(sky) = &mut setup.sky else {
         return Err(none);
     };

@@ -110,11 +110,12 @@ impl Pace {
         }
     }
 
-    /// Returns the stopping time, from a new setpoint, of a drone at maximum speed elsewhere. It is meant for
-    /// [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag). 9.8 s for the default.
+    /// Returns the time in which a drone at maximum speed stops at a new setpoint; 9.8 s for the default.
     ///
-    /// The target decelerates by a down to a / k, and from there in proportion to the remaining distance, which is at most 0.25 m
-    /// after this time. At most 8 steps.
+    /// Intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
+    ///
+    /// The target decelerates by a down to the speed a / k, and from there in proportion to the remaining distance, which is at
+    /// most 0.25 m after this time. At most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
     #[expect(
@@ -297,8 +298,8 @@ const AGAIN: Duration = Duration::from_millis(1_000);
 const REFUSED_AFTER: u8 = 6;
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
-/// Tolerance between the reported target of an ArduCopter and the carrot. Standing: 1e-7 degrees; moving: m, and s at the carrot's
-/// speed.
+/// Tolerance between the target that an ArduCopter reports and the carrot. A standing carrot: units of 1e-7 degrees. A moving
+/// carrot: [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
 const TAKEN_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;

@@ -41,7 +41,7 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Pending answer: its receiver, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// Side that the relay has to clear.
+    /// Side whose lost relays this relay has to clear.
     cleared: Option<Side>,
 }
 
@@ -108,7 +108,7 @@ impl Clearance {
         self.answer.take()
     }
 
-    /// Removes the side that the relay has to clear.
+    /// Removes and returns the side whose lost relays this relay has to clear.
     pub(super) const fn take_cleared(&mut self) -> Option<Side> {
         self.cleared.take()
     }

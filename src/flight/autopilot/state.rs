@@ -16,7 +16,7 @@
 //! | ArduCopter | other than GUIDED, not CRITICAL | start, restart, disarming; no heartbeat for 3 s |
 //!
 //! A link that finds OFFBOARD or GUIDED granted therefore engages nothing and sends no targets. The pilot has to choose another
-//! mode first, and is told so. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
+//! mode first, and receives that as the reason. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
 //! and no message of a neighbour.
 
 /// Control state of the drone.

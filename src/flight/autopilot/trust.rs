@@ -1,8 +1,8 @@
 //! Signature policy of the link. Without a key it accepts every frame, with a key only frames signed with it.
 //!
 //! A link with a key signs its frames and accepts frames that are signed with the key and are new, and unsigned RADIO_STATUS: a SiK
-//! radio cannot sign. An autopilot with a key ignores unsigned frames silently, so the firmware is told of each kind of mismatch,
-//! once. A mismatch is reported after three consecutive heartbeats of an autopilot.
+//! radio cannot sign. An autopilot with a key ignores unsigned frames silently, so an event reports each kind of mismatch to the
+//! firmware, once. A mismatch is reported after three consecutive heartbeats of an autopilot.
 
 use super::state::Kind;
 use super::vehicle::AUTOPILOT;

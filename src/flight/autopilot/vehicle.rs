@@ -706,7 +706,7 @@ mod clock_tests {
         }
     }
 
-    /// Checks a simulator on a loaded machine.
+    /// Checks an autopilot's clock that runs 1 % slow, as in a simulator on a loaded machine.
     #[test]
     fn a_clock_that_runs_one_percent_slow_is_never_blind() {
         let ages = ages(|ms| ms - ms / 100, |_| 5);

@@ -10,7 +10,7 @@
 //! timestamp of a sender may be up to a minute behind the own one. An accepted timestamp advances the own one, so both ends share
 //! one time.
 //!
-//! *A board without a clock* starts in 2015. Until it has accepted a frame it cannot tell an old one from a new one, so a
+//! *A board without a clock* starts in 2015. Until it has accepted a frame it cannot distinguish an old one from a new one, so a
 //! replayed recording may be accepted first; after the first current frame none is. Its own frames before that are too old for an
 //! autopilot with a clock, which ignores them.
 

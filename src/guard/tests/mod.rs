@@ -139,7 +139,9 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Rule 1, even if the neighbour on the other side started too close.
+/// Rule 1: a relay keeps the limit that it has granted.
+///
+/// It does so even if the neighbour on the other side started too close.
 #[test]
 fn a_squeezed_relay_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -163,7 +165,7 @@ fn a_squeezed_relay_keeps_its_promise() {
     );
 }
 
-/// Rule 9.
+/// Rule 9: a relay keeps clear of a lost neighbour.
 #[test]
 fn a_lost_relay_is_kept_clear_of() {
     let mut one = One::new([None, Some(2)], 100.0, 400.0);
@@ -310,7 +312,7 @@ impl Pair {
     }
 }
 
-/// Rule 8.
+/// Rule 8: neither relay moves before it has heard the other one.
 #[test]
 fn nobody_moves_before_the_other_one_was_heard() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
@@ -419,7 +421,7 @@ fn an_old_report_frees_nothing() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Rule 7.
+/// Rule 7: two relays that start too close first move apart along x.
 #[test]
 fn a_start_too_close_is_opened_before_anything_else() {
     let mut pair = Pair::new([100.0, 500.0], [104.0, 600.0]);

@@ -70,7 +70,7 @@ impl Row {
     }
 }
 
-/// Rule 15.
+/// Rule 15: the neighbours of a drone in manual control come no nearer to it.
 #[test]
 fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
     let mut row = Row::new();
@@ -151,7 +151,9 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// Movement across the line within the separation along x is only away from the drone.
+/// A relay beside a drone in manual control moves across the line only away from it.
+///
+/// Beside means within the separation along x.
 #[test]
 fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
     for (y_m, moves) in [(-30.0, true), (30.0, false)] {

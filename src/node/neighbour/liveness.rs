@@ -30,7 +30,9 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(QUESTIONS))
 }
 
-/// Returns the interval between questions while many relays of a shared channel have no agreement yet. Three or more fit.
+/// Returns the interval between questions while many relays of a shared channel have no agreement yet.
+///
+/// Three or more questions fit before `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }

@@ -561,7 +561,7 @@ impl AgreedNodes {
     }
 }
 
-/// Pending heartbeat of the neighbour.
+/// Pending heartbeat to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
     /// True if a question is pending.
@@ -657,7 +657,9 @@ impl Neighbour {
         self.unheard.count(distance, !heard, UNHEARD)
     }
 
-    /// Returns true if the node `distance` places away, which has another mission, is to be reported.
+    /// Returns true if the node `distance` places away has to be reported for its other mission.
+    ///
+    /// At most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.mismatches.should_report(distance, now)
     }

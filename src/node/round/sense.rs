@@ -351,13 +351,15 @@ pub(super) struct SensorState {
     pub(super) silent_at: Placement,
     /// Leader only: true if the relays of the view have received the estimate.
     pub(super) is_distributed: bool,
-    /// Information at the time at which the estimate was adopted.
+    /// Amount of measurements, and expected error, with which the estimate was adopted.
     pub(super) known: Knowledge,
     /// Reason why the last sums gave no estimate.
     pub(super) unfit: Option<Unfit>,
-    /// Sensing period in multiples of `Listen::every`, passes without a change, and end of the period.
+    /// Sensing period in multiples of `Listen::every`.
     pub(super) wait: u32,
+    /// Number of consecutive passes that did not change the estimate.
     pub(super) kept: u8,
+    /// End of the current sensing period.
     pub(super) at: Option<Instant>,
 }
 

@@ -214,7 +214,7 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep: `behind` and `from` are the previous relay and its reaches.
+    /// Starts a sweep from the relay `behind`, `None` for Tx or Rx, whose reaches are `from`, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;

@@ -203,7 +203,7 @@ impl TurnPass {
 
     /// Continues the search for at most `budget` evaluations, and then to the end of the grid row.
     ///
-    /// Ready with the better position, if any.
+    /// Ready at the end of the search, with a position if a better one was found.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);

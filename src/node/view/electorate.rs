@@ -136,7 +136,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if `proposal` of `node` would be refused with this relay's vote alone. Does not vote.
+    /// Returns true if this relay, polled alone for `proposal` of `node`, would find no quorum. Casts no vote.
     pub(super) fn is_refused_alone(
         &self,
         node: u16,

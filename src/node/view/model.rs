@@ -38,7 +38,9 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks chains of `relays` relays with the given numbers of cuts, proposals and reboots. `heals`: every state is healed.
+/// Checks chains of `relays` relays with at most this many cuts, proposals and reboots.
+///
+/// `heals` also checks in every state that a healed chain settles.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,

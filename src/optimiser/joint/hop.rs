@@ -42,7 +42,7 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of a reach by p and w. p is the hop's start (three coordinates), w the two free coordinates of its end.
+/// Derivatives of a hop's reach by its start p and by w, the two free coordinates of its end.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -52,9 +52,9 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Mixed, by each of w and by p.
+    /// Mixed second derivatives: row i by the free coordinate w_i and by p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives by w: first twice, mixed, second twice.
+    /// Second derivatives by w: w_1 twice, w_1 and w_2, w_2 twice.
     pub(super) by_ww: [f32; 3],
     /// Derivative by ln gamma, m.
     pub(super) by_target: f32,
@@ -212,7 +212,7 @@ pub(super) struct Tangent {
     pub(super) c: f32,
     /// c - 1.
     pub(super) e: f32,
-    /// m^2.
+    /// Constant term of the quadratic, m^2.
     pub(super) spare: f32,
 }
 

@@ -127,7 +127,7 @@ impl Outlook {
     }
 }
 
-/// a + b f
+/// Returns a + b f.
 fn add(a: Triple, b: Triple, f: f32) -> Triple {
     let mut sum = a;
     for (cell, b) in sum.iter_mut().zip(b) {
@@ -145,15 +145,17 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     sum
 }
 
-/// Step of a relay in the two free coordinates of its hop.
+/// Policy of a relay: its step in the two free coordinates of its hop.
+///
+/// The step has a feedback on the previous relay's move.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
     /// True for the larger of the two values that the hop allows for the dependent coordinate.
     pub(super) rising: bool,
-    /// Step without a change before, m.
+    /// Step if the previous relay has not moved, m.
     pub(super) step: [f32; 2],
-    /// Feedback on a change in (x, y, h) of the relay before.
+    /// Additional step per move of the previous relay in x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
@@ -232,7 +234,9 @@ impl Policy {
         }
     }
 
-    /// Returns the change of the free coordinates for `share` of the step. The relay before has moved by `change`.
+    /// Returns the change of the free coordinates for `share` of the step.
+    ///
+    /// `change` is the move of the previous relay.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;

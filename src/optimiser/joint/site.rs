@@ -245,7 +245,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the dependent coordinate at which the hop `from` the sender meets `target`.
+    /// Returns the dependent coordinate at which the hop from the sender at `from` just meets `target`.
     ///
     /// `at` are the two free coordinates.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
@@ -368,7 +368,7 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
     band.nearest(band.least_m + code * (band.span_m() / LAST))
 }
 
-/// Allowed region of a relay across the line.
+/// Lateral offsets and altitudes that a relay may choose from.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {

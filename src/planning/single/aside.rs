@@ -94,7 +94,7 @@ pub enum AsideCase {
     Edge(EdgeCoordinate),
     /// Position above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level,
-    /// Touching position on a vertical face of the corridor, with noise.
+    /// Point on a vertical face of the corridor at which both SIRs' level lines touch; only with noise.
     Wall,
     /// Position inside the corridor at its lowest or highest altitude, with noise. By a search without a proof of optimality.
     Inside,

@@ -252,7 +252,7 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     slope.turns().map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// phi for P > 0.
+/// Function phi of the module's documentation, for P > 0.
 struct Slope {
     p: f64,
     a: f64,
@@ -330,7 +330,7 @@ const LINES: u8 = 24;
 /// Number of the best lines that are refined.
 const FOLLOWED: usize = 3;
 
-/// Golden-section steps about each.
+/// Golden-section steps about each refined line.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;

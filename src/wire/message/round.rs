@@ -25,7 +25,7 @@ pub struct Sweep {
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
     pub view_digest: u16,
-    /// Targets.
+    /// Target SIRs.
     pub ladder: Ladder,
     /// Cross-section and power of the sender.
     pub relay: Station,

@@ -66,18 +66,18 @@ pub(crate) fn signs_to_autopilot() {
 /// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
 pub(crate) fn stands_by(taken: bool) {
     if taken {
-        info!("votes restored from flash");
+        info!("votes on views restored from flash");
     } else {
-        error!("votes in flash are of another firmware, and ignored");
+        error!("votes on views in flash are of another firmware, and ignored");
     }
 }
 
 /// Logs that storing the votes works again (`kept`) or fails.
 pub(crate) fn votes(kept: bool) {
     if kept {
-        info!("votes can be stored again");
+        info!("votes on views can be stored again");
     } else {
-        error!("votes cannot be stored: a reboot in flight loses them");
+        error!("votes on views cannot be stored: a reboot in flight loses them");
     }
 }
 
@@ -97,7 +97,7 @@ pub(crate) fn refused(why: Refused) {
         }
         Refused::Course(why) => error!("configuration refused: sites, {}", why),
         Refused::Setup(why) => {
-            error!("configuration refused: this image cannot do it, {}", why);
+            error!("configuration refused: not supported by this image, {}", why);
         }
     }
 }

@@ -117,5 +117,5 @@ fn without_venv_pip_or_packages_it_says_so() {
     std::fs::remove_file(bin.join("python")).unwrap();
     symlink("/bin/true", bin.join("python")).unwrap();
     let line = refusal(&with_path(folder.path()), 1);
-    assert!(line.contains("Python gives no answer"), "{line}");
+    assert!(line.contains("Python sent no answer"), "{line}");
 }

@@ -279,7 +279,7 @@ local function open(tvb, tree, pinfo)
     local crc = tree:add_le(head.crc, tvb(ends, CHECK))
     local is = crc32c(tvb, ends)
     if tvb(ends, CHECK):le_uint() ~= is then
-        crc:append_text(string.format(", its bytes have 0x%08x", is))
+        crc:append_text(string.format(", but its bytes give 0x%08x", is))
         refuse("crc")
     end
     local flags = header(tvb, tree, pinfo)

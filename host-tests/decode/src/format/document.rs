@@ -66,7 +66,8 @@ fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, St
             let range = from.parse::<usize>().ok()?..=to.parse().ok()?;
             Some((range, rows))
         };
-        let (range, rows) = parts().ok_or_else(|| format!("cannot be followed: {text}"))?;
+        let (range, rows) =
+            parts().ok_or_else(|| format!("a reference to rows that are unknown: {text}"))?;
         let within = |row: &&Row| row.offset.parse().is_ok_and(|at| range.contains(&at));
         all.extend(rows.iter().filter(within).cloned());
     }
@@ -79,7 +80,9 @@ fn fields(rows: &[Row], tables: &[Table<'_>]) -> Result<Vec<Field>, String> {
     while let Some(row) = rest.next() {
         let (row, kind) = match row.kind.as_str() {
             "count" => {
-                let list = rest.next().ok_or("a count of nothing")?;
+                let list = rest
+                    .next()
+                    .ok_or("a count without a row for its elements")?;
                 let most = last_number(&row.range).ok_or("a count without a range")?;
                 (list, Kind::List(most as u64, Box::new(item(list, tables)?)))
             }
@@ -87,7 +90,9 @@ fn fields(rows: &[Row], tables: &[Table<'_>]) -> Result<Vec<Field>, String> {
                 let bytes = last_number(&row.size).ok_or("an Option without a size")?;
                 let (mut inner, mut taken) = (Vec::new(), 1);
                 while taken < bytes {
-                    let row = rest.next().ok_or("an Option of too few rows")?;
+                    let row = rest
+                        .next()
+                        .ok_or("an Option that is longer than its rows")?;
                     taken += last_number(&row.size).ok_or("a row without a size")?;
                     inner.push(row.clone());
                 }

@@ -339,7 +339,9 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame without its signature. The frame's checksum was computed with `covered_flags`.
+    /// Checks a frame from which the signature was removed.
+    ///
+    /// `covered_flags` are the flags that its checksum covers.
     fn look_at(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()

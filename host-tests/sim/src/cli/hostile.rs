@@ -562,7 +562,7 @@ fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
             .and_then(|index| starts.get_mut(usize::from(index)))
             .ok_or_else(|| at(format!("drone {index}: must be within 1 to {relays}")))?;
         if start.replace(place).is_some() {
-            return Err(at(format!("drone {index} is there twice")));
+            return Err(at(format!("drone {index} is given twice")));
         }
     }
     let complete: Option<Vec<Point>> = starts.iter().copied().collect();

@@ -102,7 +102,7 @@ impl AttackReport {
                     .collect();
                 _ = writeln!(
                     text,
-                    "attack on a chain {tags} tags: {} {kind} frames, {} taken; counted as {}",
+                    "attack on a chain {tags} tags: {} {kind} frames, {} accepted; counted as {}",
                     one.sent,
                     one.taken,
                     counted.join(", ")
@@ -120,7 +120,7 @@ impl AttackReport {
         if self.misled > 0 {
             _ = writeln!(
                 text,
-                "in between, relays flew to {} positions for false targets",
+                "in between, relays took {} positions by target SIRs that no relay has without the attack",
                 self.misled
             );
         }

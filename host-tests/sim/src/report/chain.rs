@@ -230,7 +230,7 @@ impl ChainReport {
             Some(0) if self.timeline.iter().any(|moment| moment.what == "adopted") => {
                 _ = writeln!(
                     text,
-                    "no relay is left in a chain that flies what was uploaded and adopted"
+                    "no remaining relay flies the mission that was uploaded and adopted"
                 );
             }
             Some(0) => {
@@ -246,18 +246,21 @@ impl ChainReport {
         if self.channel.is_some() {
             _ = writeln!(
                 text,
-                "by one radio channel that relays up to {} away hear",
+                "one radio channel, received by relays up to {} places away",
                 Setup::RADIO_REACH
             );
         }
         match self.promised {
             Some(true) => {
-                _ = writeln!(text, "no chain of equals can have more in this field");
+                _ = writeln!(
+                    text,
+                    "no chain of identical relays has a higher SIR in this field"
+                );
             }
             Some(false) => {
                 _ = writeln!(
                     text,
-                    "this field is uneven: that no chain can have more is not certain"
+                    "this field is uneven: a chain with a higher SIR may exist"
                 );
             }
             None => {}
@@ -411,7 +414,7 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Settled | Ending::Soaked => None,
         Ending::Infeasible if method.ends_with("-step") => Some(
-            "none of the targets that the fixed step takes can be met; a smaller one may find one"
+            "no target SIR of the fixed-step schedule can be met; a smaller step may find one"
                 .to_owned(),
         ),
         Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
@@ -468,7 +471,7 @@ impl AirReport {
         let mut text = String::new();
         _ = writeln!(
             text,
-            "air ({}, {} baud): load {load:.3}, {} frames sent, {} not for want of room; receptions lost: {} to collisions, {} to sending",
+            "air ({}, {} baud): load {load:.3}, {} frames sent, {} dropped by full queues; receptions lost: {} to collisions, {} to own transmissions",
             self.access, self.baud, counts.sent, counts.dropped, counts.collided, counts.unheard
         );
         text

@@ -247,7 +247,9 @@ impl Group {
             "not received by" => format!("relay {other} does not receive {who}"),
             "mission mismatch" => format!("{who}: relay {other} has another mission"),
             "key mismatch" => format!("{who}: relay {other} signs with another key"),
-            "epoch went back" => format!("{who}: the epoch of relay {other} went back"),
+            "epoch went back" => {
+                format!("{who}: relay {other} has an old epoch, its frames are rejected")
+            }
             "duplicate index" => format!("{who}: duplicate relay number {other}"),
             "engaged" => format!("{who}: setpoint control engaged"),
             "released" => format!("{who} released: the pilot took control"),

@@ -47,7 +47,7 @@ pub enum TimelineEvent {
     KeyMismatch,
     /// Another node's epoch went back.
     EpochWentBack,
-    /// The number of the relay or of the other node is used twice.
+    /// Two relays use the number of this relay, or that of the other node.
     DuplicateIndex,
     /// The relay accepted its position in an agreement.
     Converged,

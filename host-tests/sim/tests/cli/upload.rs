@@ -175,7 +175,7 @@ fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     }
 }
 
-/// A relay is lost before, during and after an upload.
+/// Checks that the other relays fly an uploaded mission, if one is lost before, during or after it.
 #[test]
 fn the_relays_that_are_left_fly_it() {
     let folder = tempfile::tempdir().unwrap();

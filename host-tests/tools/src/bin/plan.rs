@@ -418,7 +418,7 @@ fn write_out(
         && flown.plan.sir() < target * (1.0 - options.tolerance)
     {
         return Err(Failure::unmet(format!(
-            "--out {}: not written: {relays} relays by themselves reach {sir:.2} dB, and the target is {:.2} dB; ask for more by --uavs",
+            "--out {}: not written: {relays} relays agree on {sir:.2} dB, below the target of {:.2} dB; give a larger --uavs",
             file.display(),
             db(target)
         )));

@@ -310,8 +310,11 @@ fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), St
         return Ok(());
     }
     let in_range = options.in_range.unwrap_or(uavs).min(uavs);
-    command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after)
-        .map_err(|error| format!("{error}; fewer with --in-range, none with --wires"))
+    command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after).map_err(|error| {
+        format!(
+            "{error}; if fewer receive each other, give --in-range, or --wires for separate links"
+        )
+    })
 }
 
 fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, String> {

@@ -101,7 +101,7 @@ impl Axis {
         }
     }
 
-    /// Sets the end values.
+    /// Sets the ends of the axis.
     pub fn between(self, from: f64, to: f64) -> Self {
         Self {
             ends: Some((from, to)),

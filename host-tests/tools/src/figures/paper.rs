@@ -22,7 +22,9 @@ pub fn multi_hop() -> Scenario {
     }
 }
 
-/// Returns the scenario of the section on altitudes. Interferer at (500, `y_m`) m, altitudes 20 m to 300 m, 4 m apart.
+/// Returns the scenario of the paper's section on altitudes.
+///
+/// The interferer is at (500, `y_m`) m, altitudes are 20 m to 300 m, and relays are at least 4 m apart.
 pub fn altitudes(y_m: f64, altitude_m: f64) -> Scenario {
     Scenario {
         altitude_m,

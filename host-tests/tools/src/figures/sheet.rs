@@ -19,9 +19,9 @@ pub struct Sheet {
     pub name: &'static str,
     /// Title.
     pub title: &'static str,
-    /// Findings, one paragraph each.
+    /// Findings that the figure shows, one paragraph each.
     pub says: Vec<String>,
-    /// Parameters; those that the paper omits are marked.
+    /// Parameters of the figure; those that the paper omits are marked.
     pub taken: Vec<String>,
     /// Chart.
     pub chart: Chart,

@@ -360,13 +360,13 @@ pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Quiet r = (I + N)^(-1/2) at the nodes, W^(-1/2).
+    /// Inverse amplitude r = (I + N)^(-1/2) of interference plus noise at the nodes, W^(-1/2).
     quiet: Vec<f64>,
     slope: Vec<f64>,
     tops: Vec<f64>,
 }
 
-/// Hop range at some target SIR, per unit of quiet at the receiver: range = `stride` times quiet, m.
+/// Hop range at some target SIR, per unit of r at the receiver: range = `stride` times r, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stride(f64);
 

@@ -110,8 +110,9 @@ fn alone(
     })
 }
 
-/// Tolerated difference between planned and recomputed positions and SIR, m and dB. Rounding of another machine.
+/// Tolerated difference between planned and recomputed positions, m. Another machine rounds differently.
 const SAME_M: f64 = 0.1;
+/// Tolerated difference between planned and recomputed SIR, dB.
 const SAME_DB: f64 = 0.01;
 
 /// Returns the `[plan]` section for `flown`.
@@ -204,7 +205,7 @@ pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
     }
     Err(format!(
         "[plan] is of another scenario: relays in this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB in place of \
-         plan.sir_db = {:.3}; allowed: [plan] as `cargo plan --out` writes it for what is above it",
+         plan.sir_db = {:.3}; allowed: [plan] as `cargo plan --out` writes it for this scenario",
         planned.sir_db
     ))
 }

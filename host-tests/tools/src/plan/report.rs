@@ -534,7 +534,10 @@ impl fmt::Display for NoiseReport {
             "noise: {power_dbm:.3} dBm, {power_w:.6e} W, at every receiver: k T0 B F with T0 = {temperature_k} K, B = {bandwidth_hz} Hz, F = {figure_db} dB"
         )?;
         if effective_w.total_cmp(&power_w).is_ne() {
-            write!(f, "; by their antennas it counts as {effective_w:.6e} W")?;
+            write!(
+                f,
+                "; divided by the lower antenna gain of the receivers it is {effective_w:.6e} W"
+            )?;
         }
         Ok(())
     }

@@ -98,7 +98,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. The largest gain of any hop.
+    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. It is the largest gain of any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -179,18 +179,18 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
         .filter(move |(_, index)| *index <= relays)
 }
 
-/// Known profile of one relay: its room and its power.
+/// Known profile of one relay: its power, and its lateral offsets and altitudes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
-    /// Allowed region across the line.
+    /// Lateral offsets and altitudes that the relay may choose from.
     pub room: Room,
     /// Transmit power, W.
     pub power_w: f32,
 }
 
 impl Seat {
-    /// Returns the seat of a relay without a profile of its own.
+    /// Returns the profile of a relay that has the mission's common one.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),
@@ -198,7 +198,8 @@ impl Seat {
         }
     }
 
-    /// Returns the seat of a relay with the profile `own`, at its altitude if it `holds` that.
+    /// Returns the profile of a relay with the altitude and power `own`. If it `holds` the altitude, that is the only one
+    /// allowed.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

@@ -234,12 +234,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 /// Maximum number of relays of a polished chain. Chains with fixed altitudes are always polished, since their path has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of halvings of the polish's moves, and the first move as a fraction of the room.
+/// Number of times that the polish halves its moves.
 const HALVINGS: u16 = 12;
+/// First move of the polish, as a fraction of the room.
 const FIRST_MOVE: f32 = 0.25;
 
-/// Minimum gain of a move, in ln gamma, and maximum number of accepted moves.
+/// Minimum gain of an accepted move, in ln gamma.
 pub(super) const GAIN: f32 = 2e-5;
+/// Maximum number of accepted moves.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -372,7 +374,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the cross-section of relay `index` in an unchanged chain or in a start chain.
+    /// Returns the cross-section of relay `index`: the stored one, or for a new start that of its shape.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

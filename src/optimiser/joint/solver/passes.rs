@@ -324,7 +324,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (end_m + step).min(mission.config().distance_m)
     }
 
-    /// Returns the required x of the relay before `segment`; `place_m` is that of the segment's last relay.
+    /// Returns the required x of the relay before `segment`, m, for its last relay at `place_m`.
+    ///
+    /// `None` if a relay of the segment cannot take its required position.
     pub(super) fn held_back_x_m(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -35,7 +35,10 @@ pub fn optima() -> io::Result<Vec<f64>> {
     {
         let (number, sir): (usize, f64) = row?;
         if number != optima.len() {
-            return Err(io::Error::other(format!("row of number {number}")));
+            let expected = optima.len();
+            return Err(io::Error::other(format!(
+                "row {number} in place of row {expected}"
+            )));
         }
         optima.push(sir);
     }

@@ -252,7 +252,9 @@ pub(crate) fn no_panic() -> Result<(), String> {
     ) {
         Ok(_) => Err("a panic put there on purpose was linked: the proof proves nothing".into()),
         Err(error) if error.contains("a_panic_is_reachable") => Ok(()),
-        Err(error) => Err(format!("the control failed for another reason: {error}")),
+        Err(error) => Err(format!(
+            "the image with a deliberate panic failed to link for another reason: {error}"
+        )),
     }
 }
 

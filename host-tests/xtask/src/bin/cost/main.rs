@@ -66,7 +66,7 @@ fn report(rows: &[Row], write: bool) -> Result<(), String> {
             document.write()?;
         } else if !document.is_right() {
             return Err(format!(
-                "{} says something else: `cargo cost --write`",
+                "{} differs from the measured costs: run `cargo cost --write`",
                 document.name()
             ));
         }

@@ -11,7 +11,7 @@ use uav_relay_xtask::template::{TEMPLATES, checkout, generate};
 #[derive(Parser)]
 #[command(name = "cargo template", bin_name = "cargo template")]
 struct Arguments {
-    /// Main loop
+    /// Kind of main loop
     #[arg(value_parser = TEMPLATES, required_unless_present = "check")]
     name: Option<String>,
     /// Folder to write to; it must be empty or missing
