@@ -2,7 +2,6 @@
 //!
 //! The relay's loop feeds it once a turn, after serving ports and timers; no interrupt does. So a hanging loop, a panic, a hard
 //! fault or a stopped clock restarts the chip. A sleep takes [`TURN_MS`] at most.
-//! fault, and a clock that stops have the chip restart. A sleep is ended after [`TURN_MS`] at the latest.
 
 use crate::registers::{Register, Registers};
 

@@ -27,7 +27,7 @@ fn the_results_have_the_run_that_is_kept() {
     std::fs::write(&copy, "no table").unwrap();
     let line = refusal(&compare(&arguments), 2);
     assert!(
-        line.contains("--into") && line.contains("no lines"),
+        line.contains("--into") && line.contains("are missing"),
         "{line}"
     );
 }
