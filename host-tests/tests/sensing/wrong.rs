@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use uav_relay::{Instant, Interference, Wiring};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
+use uav_relay_sim::simulator::outcome::{Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
 
@@ -89,6 +89,15 @@ fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync)
             came.len()
         );
         assert!(median < 0.03, "{relays} {who} {what}");
+        assert_eq!(other, 0, "{relays} {who} {what}");
+        // An end that receives nothing sends no measurement.
+        let least = match (who, says) {
+            ("a relay", _) => 0.9,
+            (_, SensorReading::Always(0.0)) => 0.0,
+            _ => 2.0 / 3.0,
+        };
+        let share = found as f64 / came.len() as f64;
+        assert!(share >= least, "{relays} {who} {what}: {share}");
     }
 }
 
@@ -106,6 +115,35 @@ fn a_wrong_end_costs_next_to_nothing() {
         let sound = sound(relays);
         hold(relays, &sound, "the receiver", |_| relays + 1);
         hold(relays, &sound, "the transmitter", |_| 0);
+    }
+}
+
+/// Checks that a chain that is too short to know the wrong sensor names no other one, and says that its measurements do not fit.
+#[test]
+fn no_other_sensor_of_a_short_chain_is_named() {
+    for relays in [1, 2, 3, 4] {
+        for (what, says) in KINDS {
+            let one = |seed: usize| {
+                let wild = RandomScene::new(seed as u64, relays, 1);
+                let node = 1 + (seed % usize::from(relays)) as u16;
+                let mut wrong = setup(&wild);
+                wrong.sky.as_mut().unwrap().broken = vec![Broken {
+                    node,
+                    says,
+                    since: Instant::ZERO,
+                }];
+                let outcome = run(wrong).unwrap();
+                let named = named(&outcome);
+                assert!(named.iter().all(|it| *it == node), "{relays} {what} {seed}");
+                let is_unclear = |it: &Moment| it.what == TimelineEvent::InterfererUnclear;
+                outcome.moments.iter().any(is_unclear)
+            };
+            let scenes = count(24) as usize;
+            let came: Vec<bool> = (0..scenes).into_par_iter().map(one).collect();
+            let unclear = came.iter().filter(|unclear| **unclear).count();
+            println!("N = {relays}, a relay says {what}: unclear in {unclear} of {scenes}");
+            assert!(relays > 2 || unclear == scenes, "{relays} {what}");
+        }
     }
 }
 

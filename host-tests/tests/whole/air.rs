@@ -150,6 +150,11 @@ impl Drone {
 }
 
 impl Air {
+    /// Stores `record` at relay `at`, as of an earlier flight.
+    pub(crate) fn store(&mut self, at: usize, record: ViewRecord) {
+        self.drones[at].stored.0 = Some(record);
+    }
+
     /// Creates a chain with all relays switched off and all links intact.
     pub(crate) fn new(kind: Kind) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(kind.seed);

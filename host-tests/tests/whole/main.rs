@@ -9,7 +9,9 @@ mod schedule;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use self::air::Air;
 use chacha20::ChaCha8Rng;
+use host_tests::fixtures::voted;
 use rand::{RngExt, SeedableRng};
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
@@ -35,7 +37,11 @@ struct Found {
 }
 
 fn flown(seed: u64, schedule: &Schedule) -> Found {
-    let mut air = schedule.begun();
+    ended(seed, schedule, schedule.begun())
+}
+
+/// Flies a schedule in `air` to its end.
+fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
     let end = schedule.faults_end_us;
     air.run(end);
     // The chain has to stay whole for a minute.
@@ -219,6 +225,29 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
         }
     }
     assert!(late.is_empty(), "{late:?}");
+}
+
+/// Checks a relay whose record of an earlier flight has a much later view number than those of the others.
+#[test]
+fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
+    for (relays, later) in [(2_u16, 1), (4, 0), (5, 2), (8, 7)] {
+        for number in [257, 3_000, 20_000, 100_000] {
+            let schedule = Schedule::of(relays, 1);
+            let mut air = schedule.begun();
+            let loaded = schedule.kind.mission.digest();
+            air.store(later, voted(loaded, relays, number, true));
+            let found = ended(1, &schedule, air);
+            println!(
+                "relay {} of {relays} at view {number}: whole after {:?} s",
+                later + 1,
+                found.whole_s
+            );
+            assert!(
+                found.whole_s.is_some_and(|s| s <= WHOLE_S as f64),
+                "{found:?}"
+            );
+        }
+    }
 }
 
 /// Flies chains with clock steps of up to ten hours. In half of them a relay is isolated for three minutes.

@@ -79,9 +79,9 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
         (true, 0, 0),
         (true, id(6, 2), id(6, 2)),
         (true, id(255, 2), id(255, 2)),
-        (true, id(256, 2), id(256, 2)),
-        (true, id(257, 2), id(256, 2)),
-        (true, id(4_194_303, 2), id(256, 2)),
+        (true, id(4_096, 2), id(4_096, 2)),
+        (true, id(4_097, 2), id(4_096, 2)),
+        (true, id(4_194_303, 2), id(4_096, 2)),
     ] {
         let mut bench = Bench::new(4, 8, Wiring::Pair);
         let mission = bench.mission;

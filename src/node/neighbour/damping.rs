@@ -280,6 +280,10 @@ impl Damping {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::Damping;
     use crate::settings::Settings;
     use crate::time::{Duration, Instant};
@@ -320,6 +324,22 @@ mod tests {
             side.record_hello(1, None, settings.dead_after, now, &settings);
         }
         assert!(!side.is_held_down(1, now, &settings));
+    }
+
+    #[test]
+    fn each_further_loss_doubles_the_hold_down_up_to_90_s() {
+        let (mut side, mut now, settings) = begun();
+        let mut spans = Vec::new();
+        for _ in 0..8 {
+            outage(&mut side, &mut now, &[], &settings);
+            let back = now;
+            while side.is_held_down(1, now, &settings) {
+                now = now + seconds(1);
+                side.record_hello(1, None, settings.dead_after, now, &settings);
+            }
+            spans.push(now.since(back).as_micros() / 1_000_000);
+        }
+        assert_eq!(spans, [0, 0, 15, 30, 60, 90, 90, 90]);
     }
 
     #[test]

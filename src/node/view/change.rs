@@ -29,7 +29,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
 /// Maximum advance of the latest known view by one message, in view numbers.
-const LEAP: u32 = 256;
+const LEAP: u32 = 4096;
 
 /// State of the view change at one relay.
 #[derive(Clone, Debug)]

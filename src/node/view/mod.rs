@@ -19,7 +19,7 @@
 //! | active again after another node used this relay's index | leave the view, request a view |
 //! | lease expired | request a view, less and less often |
 //! | view refused | request one after `probe_after` once anything has changed, else after up to eight times that; a relay that is alone proposes only if its own vote would suffice |
-//! | view number received that is far ahead of all known ones | advance the latest known view by at most 256 numbers per message |
+//! | view number received that is far ahead of all known ones | advance the latest known view by at most 4096 numbers per message |
 //! | no quorum for three times `dead_after` | on a shared channel: give up the links and search again |
 //!
 //! | file | content |
