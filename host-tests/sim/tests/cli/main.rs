@@ -445,6 +445,7 @@ fn the_simulator_builds_without_the_crates_of_other_tools() {
         "mavlink v",
         "pcap-file v",
         "plotters v",
+        "sha2 v",
         "syn v1.",
         "syn v2.",
         "thiserror v1.",
@@ -452,6 +453,7 @@ fn the_simulator_builds_without_the_crates_of_other_tools() {
         "uav-relay-decode v",
         "uav-relay-page v",
         "wasm-bindgen v",
+        "zerocopy v",
     ] {
         assert!(!is_built(other), "{other}: {text}");
     }
