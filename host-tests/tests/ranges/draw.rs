@@ -1,8 +1,9 @@
 //! Random numbers, missions and settings from their whole ranges, with frequent limits.
 
 use rand::{Rng, RngExt};
-use uav_relay::GuardConfig;
+
 use uav_relay::channel::AirGround;
+use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{
     Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local,
     Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,
@@ -184,6 +185,40 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
+/// Draws the common settings of a chain of `mission`, with values that may take any time to an agreement.
+pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
+    let usual = settings(rng, mission);
+    let micros = |most: f64, rng: &mut _| f64::from(scaled(rng, 3e4, 1e3, 1e13)).min(most) as u64;
+    let method = match usual.method {
+        Method::Adjust(adjust) => Method::Adjust(Adjust {
+            rounds: [20, u16::MAX][rng.random_range(0..2)],
+            ..adjust
+        }),
+        method => method,
+    };
+    let schedule = if rng.random() {
+        let step = f64::from(scaled(rng, 0.1, f32::from_bits(1), f32::MAX));
+        Schedule::FixedStep { step }
+    } else {
+        Schedule::Bracketed
+    };
+    Settings {
+        method,
+        measure: usual.measure.map(|measure| Measure {
+            samples: [100, 1_000, 1_000_000][rng.random_range(0..3)],
+            ..measure
+        }),
+        schedule,
+        hop_time: Duration::from_micros(micros(1e13, rng)),
+        dead_after: match rng.random_range(0..3) {
+            0 => Duration::from_micros(usual.probe_after.as_micros() + 1),
+            1 => usual.probe_after.times(100),
+            _ => Duration::from_micros(usual.probe_after.as_micros() + micros(1e13, rng)),
+        },
+        ..usual
+    }
+}
+
 /// Draws the settings of one relay.
 pub(crate) fn own(
     rng: &mut impl Rng,
@@ -204,8 +239,39 @@ pub(crate) fn own(
                 0 => 0.0,
                 _ => scaled(rng, 1.0, 1e-3, 1e3),
             },
-            ..GuardConfig::of(mission, held).with_room_for(common.without_quorum)
+            separation_m: match rng.random_range(0..4) {
+                0 => 0.0,
+                1 => scaled(rng, 4.0, 1e-3, 1e5),
+                _ => mission.config().min_separation_m,
+            },
+            fence: if rng.random_ratio(1, 4) {
+                fence(rng)
+            } else {
+                let guard = GuardConfig::of(mission, held);
+                guard.with_room_for(common.without_quorum).fence
+            },
+            ..GuardConfig::of(mission, held)
         }),
         ..common
+    }
+}
+
+/// Draws a geofence anywhere, perhaps a single point.
+fn fence(rng: &mut impl Rng) -> Geofence {
+    let mut range = |usual| {
+        let (one, other) = (signed(rng, usual, 1e7), signed(rng, usual, 1e7));
+        let other = if rng.random_ratio(1, 4) { one } else { other };
+        [one.min(other), one.max(other)]
+    };
+    let [least_x_m, most_x_m] = range(1_000.0);
+    let [least_y_m, most_y_m] = range(100.0);
+    let [least_altitude_m, most_altitude_m] = range(20.0);
+    Geofence {
+        least_x_m,
+        most_x_m,
+        least_y_m,
+        most_y_m,
+        least_altitude_m,
+        most_altitude_m,
     }
 }

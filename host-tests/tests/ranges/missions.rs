@@ -1,10 +1,11 @@
 //! Missions and settings: one to four relays at random limits of all ranges.
 
 use chacha20::ChaCha8Rng;
+use host_tests::bench::Bench;
 use rand::{RngExt, SeedableRng};
-use uav_relay::{Duration, Instant, Placement};
+use uav_relay::{Duration, Instant, Mission, Placement, Settings};
 
-use crate::draw::{mission, own, settings};
+use crate::draw::{mission, own, settings, slow_settings};
 use crate::each;
 use crate::line::{check, has_agreed, is_infeasible, line};
 
@@ -19,21 +20,20 @@ enum Came {
     Infeasible,
 }
 
-fn fly(seed: u64) -> Came {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let Some(mission) = mission(&mut rng, 4) else {
-        return Came::Refused;
-    };
-    let common = settings(&mut rng, &mission);
+/// Returns a chain of random relays; `None` if the mission or a relay's settings are refused.
+fn chain(
+    rng: &mut ChaCha8Rng,
+    settings: fn(&mut ChaCha8Rng, &Mission) -> Settings,
+) -> Option<(Bench, Mission, Settings)> {
+    let mission = mission(rng, 4)?;
+    let common = settings(rng, &mission);
     let guarded = rng.random_ratio(1, 4);
     let each: Vec<_> = (0..mission.relays())
-        .map(|_| own(&mut rng, &mission, common, guarded))
+        .map(|_| own(rng, &mission, common, guarded))
         .collect();
     // A clock may start at any time.
     let begin = Instant::from_micros([0, 1, 1 << 32, 1 << 62][rng.random_range(0..4)]);
-    let Some(mut line) = line(mission, begin, |index| each[usize::from(index) - 1]) else {
-        return Came::Refused;
-    };
+    let mut line = line(mission, begin, |index| each[usize::from(index) - 1])?;
     if guarded {
         let config = *mission.config();
         let step_m = config.distance_m / f32::from(config.relays + 1);
@@ -46,6 +46,14 @@ fn fly(seed: u64) -> Came {
             line.relays[usize::from(index) - 1].handle_position(begin, begin, at);
         }
     }
+    Some((line, mission, common))
+}
+
+fn fly(seed: u64) -> Came {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let Some((mut line, mission, common)) = chain(&mut rng, settings) else {
+        return Came::Refused;
+    };
     for _ in 0..60 {
         line.run_for(Duration::from_micros(PATIENCE.as_micros() / 60));
         check(&line);
@@ -76,4 +84,23 @@ fn every_mission_and_setting_ends_in_places_or_infeasible() {
         of(Came::Refused)
     );
     assert!(of(Came::Agreed) > came.len() / 4);
+}
+
+/// Checks settings with which an agreement may take any time: fixed steps, many rounds, long hops, any `dead_after`.
+#[test]
+fn every_slow_setting_gives_finite_numbers() {
+    let came = each(200, |seed| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let Some((mut line, ..)) = chain(&mut rng, slow_settings) else {
+            return false;
+        };
+        for _ in 0..30 {
+            line.run_for(Duration::from_millis(1_000));
+            check(&line);
+        }
+        true
+    });
+    let flown = came.iter().filter(|flown| **flown).count();
+    println!("{flown} of {} accepted", came.len());
+    assert!(flown > came.len() / 4);
 }
