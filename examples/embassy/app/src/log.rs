@@ -97,7 +97,10 @@ pub(crate) fn refused(why: Refused) {
         }
         Refused::Course(why) => error!("configuration refused: sites, {}", why),
         Refused::Setup(why) => {
-            error!("configuration refused: not supported by this image, {}", why);
+            error!(
+                "configuration refused: not supported by this image, {}",
+                why
+            );
         }
     }
 }
