@@ -40,9 +40,7 @@ pub(crate) type Over = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Asks the chain for the mission that it flies.
-    ///
-    /// The time is that at which a relay first reported an upload without its values.
+    /// Waits for the mission that the chain flies; `Some` since a relay reported it without its values.
     Asking(Option<Instant>),
     Confirming,
     Uploading,
@@ -56,7 +54,7 @@ pub(crate) struct Uploading {
     /// Upload, once its values are known.
     upload: Option<Upload>,
     progress: Progress,
-    /// End of the stage; `None` while a confirmation is awaited, and at the end.
+    /// Deadline of the stage; `None` while a confirmation is awaited, and at the end.
     late_at: Option<Instant>,
 }
 

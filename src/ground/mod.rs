@@ -29,7 +29,7 @@ use crate::wire::upload::{Upload, UploadError};
 /// Silence of a relay after which another node with its index is accepted.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Wait for an answer.
+/// Time after which an unanswered question is repeated.
 const PATIENCE: Duration = Duration::from_millis(1_000);
 
 /// Unanswered questions to one relay before the next relay is polled.
@@ -86,7 +86,7 @@ pub struct Ground {
     unanswered: u8,
     /// Mission that the polled relay holds, once it has reported it.
     holds: Option<MissionId>,
-    /// True if its next hello answers a question.
+    /// True if the polled relay's next hello answers a question.
     asked: bool,
     /// Number of the hello that the next offer answers.
     offer_number: Option<u16>,
@@ -208,7 +208,7 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames to this node that were rejected. Not from a relay in reach, invalid, or replayed.
+    /// Returns the number of rejected intact frames to this node: sender not in reach, invalid, replayed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -283,7 +283,7 @@ impl Ground {
         bump(counter);
     }
 
-    /// Returns true while a question waits for its answer.
+    /// Returns true while the question about the flown mission is unanswered.
     const fn is_asking(&self) -> bool {
         self.upload.is_none()
             && self.question != 0
@@ -415,7 +415,7 @@ impl Ground {
         self.at(self.distance)
     }
 
-    /// Returns the relay at `distance`.
+    /// Returns the node number of the relay at `distance`.
     fn at(&self, distance: u16) -> u16 {
         match self.end {
             Side::Upstream => distance,
@@ -535,12 +535,12 @@ pub enum Progress {
     Offering,
     /// A relay holds the mission; the ground station polls until the chain flies it.
     Stored {
-        /// Node number of the relay.
+        /// Node number of the relay that holds it.
         by: u16,
     },
     /// A relay flies the mission, but not all relays of its view are known to.
     Adopted {
-        /// Node number of the relay.
+        /// Node number of the relay that flies it.
         by: u16,
     },
     /// The mission is active in all relays of a view. Relays outside the view take no part until they fly it, too.
@@ -567,12 +567,12 @@ pub enum Progress {
 /// Number of reports between handshakes. A relay that has restarted can read reports after the next handshake.
 const LEVELS_A_GREETING: u8 = 16;
 
-/// Last measurement, and the relays that have not received it.
+/// Last measured interference, and the relays to which its report is pending.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
     /// Last measured interference, W; 0 before the first.
     power_w: f32,
-    /// Distances of relays without the last report: bit d - 1 for d.
+    /// Relays to which the report is pending: bit d - 1 for the relay at distance d.
     untold: u8,
     measured: u8,
 }

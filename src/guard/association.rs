@@ -12,15 +12,13 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of messages of another association in a row that show a new one. Fewer may be late messages of an old one.
+/// Number of consecutive messages of another association that prove a new one. Fewer may be late ones.
 const STRAYS: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of reminders after which a neighbour's position expires unless it is repeated.
-///
-/// There is one reminder per second.
+/// Number of reminders, one per second, after which a neighbour's unrepeated position expires.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Association that this relay has left, until the neighbour starts a new one.
@@ -97,7 +95,7 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns how far this relay is on its own side of the neighbour's last x, m; NaN if unknown.
+    /// Returns the distance of this relay on its own side of the neighbour's last x, m; NaN if unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -217,7 +215,7 @@ impl Association {
         known
     }
 
-    /// Returns a message of this association without the fields of the fence.
+    /// Returns a message of this association; the fence's number, x and step are 0.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own,
@@ -299,7 +297,7 @@ impl Association {
     }
 }
 
-/// Limit of this relay's x. Its cause is a lost relay that may still hover, or an obstacle that is not flown.
+/// Limit on this relay's x, because of a lost relay that may still hover, or of an unflown drone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Nearest lost node, and the limit of this relay's x because of that node, m.
@@ -442,9 +440,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends the state of [`mark_near`](Self::mark_near) once `is_beyond` is true for `near_m`.
-    ///
-    /// `near_m` then becomes the limit, so this relay stays at least that far away.
+    /// Ends [`is_near`](Self::is_near) once this relay `is_beyond` the x `near_m`. `near_m` then becomes its limit, so it stays the
+    /// separation away from the lost relay.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

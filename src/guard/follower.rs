@@ -6,7 +6,7 @@ use super::own::Own;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Maximum forward distance of fence numbers plus one; a fence is newer than another one below it.
+/// Forward distance of wrapping fence numbers below which a fence is newer than the last one.
 const AHEAD: u16 = 0x8000;
 
 /// Follower's state of a fence: the one toward Tx.
@@ -89,7 +89,7 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association along another line. Lost relays are kept without their positions.
+    /// Starts a new association because the line has changed. Lost relays are kept, unflown drones are not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -173,7 +173,7 @@ impl FenceFollower {
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if this relay must not move across the line. Its position there may separate the two.
+    /// Returns true if a requested step below the separation forbids this relay to move across the line.
     pub(super) fn is_held(&self, own: &Own) -> bool {
         self.asked_m < own.config.separation_m
     }
@@ -248,8 +248,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message, with `low_m` as the valid x. A relay that is not `placed`, that is in order with its
-    /// neighbour downstream, only sends a halt request.
+    /// Returns the pending message, with `low_m` as the valid x. A relay that is not `placed` (in order with its neighbour
+    /// downstream) only sends a halt request.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

@@ -89,7 +89,7 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association along another line. Lost relays are kept without their positions.
+    /// Starts a new association because the line has changed. Lost relays are kept, unflown drones are not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),

@@ -233,12 +233,12 @@ impl Band {
         !(self.least_m < self.most_m)
     }
 
-    /// Returns true if the limits are in order and within 0.1 to 1e5.
+    /// Returns true if the limits are in order and within 0.1 to 1e5 m.
     pub(super) const fn is_of_altitudes(self) -> bool {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
     }
 
-    /// Returns true if the limits are in order, within -1e5 to 1e5, and include 0.
+    /// Returns true if the limits are in order, within -1e5 to 1e5 m, and include 0.
     pub(super) const fn is_room_beside(self) -> bool {
         within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
@@ -668,7 +668,7 @@ impl Mission {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index` if those relays need no separation, m.
+    /// Returns the largest x of relay `index`, m, if the relays between it and Rx need no separation.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }

@@ -84,10 +84,10 @@ const AFTER_START: Duration = Duration::from_millis(2_000);
 /// Maximum interval between unprompted claims, before they continue every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims after a claim of an active node, [`least_interval`] apart.
+/// Number of claims, [`least_interval`] apart, after a claim of an active node to the same index.
 const DEFENCES: u8 = 32;
 
-/// Number of claims after another frame with this relay's index, [`least_interval`] apart.
+/// Number of claims after a frame with this index that is no claim, or after raising one with a key.
 const QUESTIONS: u8 = 8;
 
 /// Returns the minimum interval between claims. The claims of two relays and their echoes leave room on the channel.
@@ -302,8 +302,8 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the unprompted claims on links without a key, and those of a defence. On a shared channel, which every unprompted
-    /// frame loads, the other node is received directly, by whatever it sends.
+    /// Starts the unprompted claims on links without a key, and those of a defence. A shared channel needs none, because any frame
+    /// of the other node is received directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -357,7 +357,7 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Removes the other node after its silence; returns true if this relay becomes active.
+    /// Removes the other node, which is gone; returns true if this relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {

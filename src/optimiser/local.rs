@@ -133,14 +133,14 @@ impl Hops {
     }
 }
 
-/// Search in progress.
+/// Search in progress for a relay's best position between its two neighbours.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,
     hops: Hops,
     bottom_m: f32,
     top_m: f32,
-    /// Altitudes of the current round.
+    /// Lowest and highest altitude of the current round, m.
     low_m: f32,
     high_m: f32,
     round: u8,

@@ -63,8 +63,7 @@ impl Retreat {
         }
     }
 
-    /// Returns this hop with a receiver that may go to the end of its range. The relays before `index` then hold back to leave
-    /// themselves room.
+    /// Returns this hop with a range that reserves no separation for the relays between `index` and Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),

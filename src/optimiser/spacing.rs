@@ -170,7 +170,7 @@ impl Hop {
         }
     }
 
-    /// Returns this hop for a chain in which the relays after `index` hold back, instead of relay `index`.
+    /// Returns this hop with a range that reserves no separation for the relays after `index`.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),

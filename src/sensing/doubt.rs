@@ -70,7 +70,7 @@ const AGAIN: (f64, f64) = (25.0, 0.1);
 /// measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum faded number of measured positions. With fewer, the faulty relay cannot be identified.
+/// Minimum [`Sums::count`] of positions, after fading. With fewer, no faulty relay can be identified.
 const ENOUGH: f32 = 3.5;
 
 /// Maximum ratio of the mean weight to the weight of one position. Smaller weights are lost in the rounding of the sums.
@@ -318,7 +318,7 @@ impl EndLevel {
     }
 }
 
-/// Returns v of an end with `level`, by the mission's path loss over the ground.
+/// Returns v (see [`UNIT_W`]) of a ground end with `level`, by the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)

@@ -30,7 +30,7 @@ pub enum Unfit {
 /// Weight of the operator's expected error in the fit's variance, as a number of measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of t that separates the sides of the line.
+/// Minimum variance of the positions' t (2 y / D) that tells the two sides of the line apart.
 const SIDES: f64 = 2.5e-5;
 
 /// Estimated source.
@@ -41,7 +41,7 @@ pub struct FoundSource {
     pub source: Interferer,
     /// Variance of the position along the line and to its right, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source. Otherwise it is the closest one, and the variance is unknown.
+    /// True if the measurements fit a single source; otherwise `source` fits best, and `variance_m2` is 0.
     pub is_one: bool,
 }
 
@@ -268,7 +268,7 @@ impl Fit {
     /// `side_m` selects its side of the line if the positions do not determine it.
     ///
     /// # Errors
-    /// [`Unfit::NoSource`] if no source on the ground comes close.
+    /// [`Unfit::NoSource`] if no source on the ground fits.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "the mission checks the range of what comes of it"
@@ -384,8 +384,8 @@ const FINE: i8 = 2;
 /// Number of finer grids; the steps of each are 0.4 times the steps of the previous grid.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the closest source on one side of the line of positions. `None` if no source fits at all. `sign` is 1 or
-/// -1 for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// Returns X', Y' and k of the best-fitting source on one side of the line of positions. `None` if none fits. `sign` is 1 or -1
+/// for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

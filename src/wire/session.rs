@@ -52,7 +52,7 @@ struct Peer {
     proven: bool,
     /// Time of the last use, on the session's own clock.
     used: u32,
-    /// Time of its last proof, or of its first frame with a larger nonce.
+    /// Time of the node's last proof of presence, or of its first frame with a larger nonce.
     heard: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own: u32,
@@ -111,7 +111,7 @@ pub(crate) struct Session {
     claim: u32,
     /// Lower half of the last created nonce.
     made: u32,
-    /// Claim to this relay's number in the last frame.
+    /// Claim of another node to this relay's number, from the last handshake with one.
     rival: Option<Rival>,
     /// Counter of uses of entries, wrapping.
     clock: u32,
@@ -176,7 +176,7 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes. Later nonces are above `claim`, if that is a new claim number.
+    /// Forgets all nodes. New nonces count from `claim`, if it is above all nonces of this epoch so far.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.made {
             self.claim = claim;
@@ -212,7 +212,7 @@ impl Session {
         }
     }
 
-    /// Returns the claim to this relay's number in the last frame, once.
+    /// Returns another node's claim to this relay's number from a handshake, once.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
@@ -439,8 +439,8 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch belong to two nodes. Their numbers differ by more than one node's do. The increment by
-/// which a node raises its claim number is ignored.
+/// Returns true if two nonces of one epoch belong to two nodes. Their numbers then differ by more than [`NEAR`], apart from the
+/// bit [`RAISED`].
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR

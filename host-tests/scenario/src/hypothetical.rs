@@ -97,7 +97,7 @@ impl Hypothetical {
     }
 }
 
-/// Best position found on a given raster.
+/// Best position of the hypothetical interferer found on a given raster.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// x_H, m.
@@ -126,7 +126,7 @@ pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     })
 }
 
-/// Returns the position with the least error found on `raster`; `None` without interferers or points.
+/// Returns the best hypothetical interferer found on `raster`; `None` without interferers or points.
 pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     if scene.sources.is_empty() || raster.is_empty() {
         return None;
@@ -154,7 +154,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     })
 }
 
-/// Returns the starting points. The grid's deepest local minima and the best true sources, in the coordinates of `space`.
+/// Returns the starting points in `space`: the grid's deepest local minima and the best true sources.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -261,7 +261,7 @@ impl Space {
         graded(0.0, self.most_u, &[], 0.0, RISE)
     }
 
-    /// Minimises by a simplex from `start`, with a size of `share` of the local length scale.
+    /// Minimises the error by a simplex from `start`, with a size of `share` of the local length scale.
     fn descend(
         &self,
         raster: &Raster,
@@ -472,7 +472,7 @@ fn gauss(ends: &[f64]) -> Vec<Share> {
         .collect()
 }
 
-/// True sum over the shape at one point.
+/// Ratio S / g of the true sum to the shape at one point, and its weight in the median.
 struct Ratio {
     value: f64,
     weight: f64,

@@ -1,4 +1,4 @@
-//! Availability over an hour on a bad channel: the table in `RESULTS.md`, and the hours with the longest searches.
+//! Availability over an hour on a bad channel: table in `RESULTS.md`, hours with the longest searches.
 
 use host_tests::fixtures::mission;
 use uav_relay_sim::report::{self, ChainReport};
@@ -95,9 +95,9 @@ fn an_hour_on_a_bad_channel() {
     }
 }
 
-/// Hours with half of the frames lost in runs of 20, by their seeds; the environment variable `SEEDS` (as `201-800`) overrides them.
+/// Seeds of the hours with half of the frames lost in runs of 20.
 ///
-/// In these, one relay loses its links to both sides repeatedly. When each silence between its own rare questions counted as one
+/// The environment variable `SEEDS` (as `201-800`) overrides them. In these hours, one relay loses its links to both sides repeatedly. When each silence between its own rare questions counted as one
 /// more loss, its links were held down for good, and the chain was complete for 4, 2, 11 and 28 % of the hour.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
 

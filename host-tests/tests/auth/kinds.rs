@@ -148,7 +148,7 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
 /// Random generator of attacks.
 pub(crate) struct Attacker {
     pub(crate) rng: ChaCha8Rng,
-    /// Frames with every kind of message.
+    /// Bodies of valid messages of every kind.
     pub(crate) messages: Vec<Plain>,
 }
 
@@ -340,7 +340,7 @@ impl Attacker {
         frame
     }
 
-    /// Draws random bytes, with or without a CRC; the counter follows from the rules for streams.
+    /// Draws a COBS frame of random bytes; its length determines the counter that it increments.
     fn noise(&mut self, to: u16, port: Port) -> Attack {
         let len = self.rng.random_range(1..300);
         let bytes: Vec<u8> = (0..len).map(|_| self.rng.random()).collect();

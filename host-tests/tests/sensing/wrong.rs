@@ -118,7 +118,7 @@ fn a_wrong_end_costs_next_to_nothing() {
     }
 }
 
-/// Checks that a chain that is too short to know the wrong sensor names no other one, and says that its measurements do not fit.
+/// Checks that a short chain names no sensor but the wrong one; one or two relays report a misfit.
 #[test]
 fn no_other_sensor_of_a_short_chain_is_named() {
     for relays in [1, 2, 3, 4] {

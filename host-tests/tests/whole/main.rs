@@ -227,7 +227,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Checks a relay whose record of an earlier flight has a much later view number than those of the others.
+/// Checks a relay whose record of an earlier flight has a far later view number than the others'.
 #[test]
 fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
     for (relays, later) in [(2_u16, 1), (4, 0), (5, 2), (8, 7)] {

@@ -21,7 +21,7 @@ use super::strategies::{bodies, headers, kinds, messages};
 proptest! {
     #![proptest_config(config(4000))]
 
-    /// Checks both codecs, and the overhead of a frame. Header, CRC, a byte of stuffing and the only delimiter.
+    /// Checks that both codecs agree, and a frame's overhead: header, CRC, a stuffing byte, a delimiter.
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
         let message = message(&said);
@@ -137,7 +137,7 @@ proptest! {
 
 #[test]
 fn the_draws_reach_messages_and_both_refusals() {
-    /// First tag without a message, for it and all later ones.
+    /// First unused message tag, which counts for all later tags as well.
     const NONE: usize = 21;
 
     let mut runner = TestRunner::new(config(1));
@@ -178,7 +178,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
     }
 }
 
-/// Checks that a sweep with a solved position on the line is an Aside, without measured values.
+/// Checks that a sweep with a solved position is encoded as an Aside, without measured values.
 #[test]
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {

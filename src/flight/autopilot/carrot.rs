@@ -17,7 +17,7 @@ use crate::time::{Duration, Instant};
 /// Distance from the setpoint below which the carrot has arrived, m.
 const THERE_M: f32 = 0.01;
 
-/// Speed per remaining distance near the setpoint, 1/s.
+/// Ratio k of speed to remaining distance near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
 
 /// Minimum speed near the setpoint, m/s.
@@ -52,7 +52,7 @@ const HALVES_MS: u64 = 1_387;
 /// Maximum number of half-lives until the drone has stopped. The drone starts 20 m away at the maximum acceleration.
 const MOST_HALVES: u32 = 8;
 
-/// Maximum age of a position that is used.
+/// Maximum time back for which an earlier carrot position is extrapolated.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
 /// Maximum time step. After a longer gap the carrot continues from its position.
@@ -79,7 +79,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default acceleration with that maximum speed, m/s. 0.1 to 20, or 0 for the default speed.
+    /// Returns the default pace with the maximum speed `speed_m_s`, m/s: 0.1 to 20, or 0 for the default.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {
@@ -88,7 +88,7 @@ impl Pace {
         pace
     }
 
-    /// Returns the maximum speed at that distance from the place where the carrot stops.
+    /// Returns the maximum speed, m/s, at the distance `left_m` from the position where the carrot stops.
     fn speed_before_m_s(self, left_m: f32) -> f32 {
         let a = self.acceleration_m_s2;
         // Here the two parts meet, both at the speed a / k.
@@ -100,7 +100,7 @@ impl Pace {
         }
     }
 
-    /// Returns the stopping distance from that speed, m.
+    /// Returns the stopping distance, m, from the speed `speed_m_s`.
     fn stopping_m(self, speed_m_s: f32) -> f32 {
         let a = self.acceleration_m_s2;
         if speed_m_s > a / END_PER_S {
@@ -144,7 +144,6 @@ impl Pace {
     }
 }
 
-/// Moving target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Carrot {
     pub(super) place: Placement,
@@ -170,7 +169,7 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the position `ago` before the last step, extrapolated by the velocity.
+    /// Returns the carrot's position `ago` before its last step, extrapolated back by its velocity.
     fn before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -286,7 +285,7 @@ fn length(a: [f32; 3]) -> f32 {
     libm::sqrtf(dot(a, a))
 }
 
-/// Intervals between two targets, while it moves and while it stands. A PX4 leaves its mode after a second without a target.
+/// Intervals between targets, while the carrot moves and while it stands. A PX4 leaves its mode after a second without a target.
 const MOVING: Duration = Duration::from_millis(100);
 const STANDING: Duration = Duration::from_millis(200);
 

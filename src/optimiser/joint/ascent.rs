@@ -24,9 +24,9 @@ const LEAST_SLOPE: f32 = 0.3;
 /// Initial distance of the target above the ceiling for a repeated probe, in ln gamma.
 const EXCESS: f32 = 0.03;
 
-/// First limit of the slack that counts, in units of D. Without a limit, slack would outweigh a penalty.
+/// First cap on the slack that counts, in units of D. Without a cap, slack would outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Limit below which it is not reduced further, in units of D.
+/// Cap below which it is not lowered further, in units of D.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of negative slack relative to positive slack.
@@ -71,7 +71,7 @@ pub(crate) struct Ascent {
     /// Maximum target until the chain is probed, in ln gamma, and its next increase.
     limit: f32,
     excess: f32,
-    /// Limit of the slack that counts, in units of D; it is reduced where slack would outweigh a penalty.
+    /// Cap on the slack that counts, in units of D; lowered where slack would outweigh a penalty.
     spare: f32,
     /// Penalty of the nominal chain for relays too near the interferer, in metres of slack.
     pub(crate) penalty: f32,
@@ -121,17 +121,17 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the maximum slack that is counted, m: more slack has no additional value.
+    /// Returns the cap on the slack, m: more slack than that has no additional value.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would reduce the limit.
+    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the slack.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Reduces the limit on the counted slack if a penalty applies; returns true if the limit changed.
+    /// Lowers the cap on the slack if a penalty applies; returns true if it was lowered.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -140,7 +140,7 @@ impl Ascent {
         true
     }
 
-    /// Continues with the slack of the nominal chain under the reduced limit.
+    /// Continues with `slack`, m, the nominal chain's slack under the lowered cap.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;

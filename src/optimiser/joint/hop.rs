@@ -61,7 +61,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Reach of a hop whose end does not depend on anything.
+    /// Reach of a hop whose end is fixed: all derivatives are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -121,7 +121,7 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of the inverse interference at s m^2 from the interferer, with noise.
+/// Derivatives q'(s) and 2 q''(s) of the inverse interference plus noise, s in m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -164,7 +164,7 @@ impl Coordinate {
         }
     }
 
-    /// Inverts [`Coordinate::first`].
+    /// Restores the order (x, y, h); the inverse of [`Coordinate::first`].
     #[inline(never)] // called from many places
     pub(crate) const fn back(self, [first, second, third]: Triple) -> Triple {
         match self {
@@ -174,12 +174,12 @@ impl Coordinate {
         }
     }
 
-    /// Returns a symmetric matrix with this coordinate first.
+    /// Returns a symmetric matrix with rows and columns reordered as by [`Coordinate::first`].
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.first_row(bend).map(|row| self.first(row))
     }
 
-    /// Inverts [`Coordinate::first_of`].
+    /// Restores rows and columns to the order (x, y, h); the inverse of [`Coordinate::first_of`].
     pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         let [a, b, c] = bend.map(|row| self.back(row));
         match self {
@@ -206,7 +206,7 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Hop as a quadratic: s + spare >= c l.
+/// Condition of a hop, s + spare >= c l; s and l are the squared distances of the module's text.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
@@ -221,7 +221,7 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the tangent for nu = `noise`, 1/m^2, at `s` m^2 from the interferer.
+    /// Returns the tangent at the squared distance `s`, m^2, from the interferer; `noise` is nu, 1/m^2.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

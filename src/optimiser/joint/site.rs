@@ -19,10 +19,10 @@ const RIM: f32 = 0.999_99;
 /// Factor on the minimum separation. With a small violation the required separation is still kept.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Iterations of the tangent for a hop with noise.
+/// Newton iterations of the point at which a hop with noise is linearised (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Bisection steps on a path whose end is out of reach.
+/// Bisection steps of [`Site::halved`], on a path whose end is out of reach.
 const HALVINGS: u8 = 12;
 
 /// Relay whose position is computed, with the hop to it.
@@ -87,7 +87,7 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the end of the hop at `at` across the line.
+    /// Returns the farthest position along x with the cross-section `at` that the hop reaches.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -99,9 +99,9 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns `wanted` or the closest reachable cross-section. It is on the line from the best cross-section in the room.
-    /// Reachable means without a step back along x; `None` if nothing is. For c > 1 the reach of a hop is a ball: its centre is (p
-    /// - m) / (c - 1) from the sender's position p, its radius sqrt(c) |p - m| / (c - 1).
+    /// Returns `wanted`, or the closest reachable cross-section on the line from the best one in the room. Reachable means without
+    /// a step back along x; `None` if nothing is. For c > 1 a hop from p reaches a ball, with the interferer at m: its centre is
+    /// p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -114,7 +114,7 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns centre and squared radius of the reach at `x_m` or beyond for c > 1. With noise, linearised near `wanted`.
+    /// Returns centre and squared radius, m^2, of the cross-sections in reach at x >= `x_m`, for c > 1.
     fn disk(
         &self,
         target: f32,
@@ -379,7 +379,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// Returns the room of the mission.
+    /// Returns the lateral offsets and altitudes that the mission allows.
     pub const fn of(mission: &Mission) -> Self {
         let config = mission.config();
         Self {
@@ -406,7 +406,7 @@ impl Room {
     }
 }
 
-/// Fraction of a ceiling that is aimed at.
+/// Fraction of the maximum SIR of the first or the last hop that counts as the chain's ceiling.
 const LITTLE: f32 = 0.999_97;
 
 /// Bisection steps between Tx and the noise-free optimum of a first hop.
@@ -458,7 +458,7 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the slack at `target` of a last relay of `power_w` in `room` at `at`, and its derivatives.
+/// Returns the slack, m, of the hop to Rx at `target` from a last relay at `at`, and its derivatives.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,
@@ -508,7 +508,7 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty of the relay at `to`, m of slack.
+    /// Returns the penalty of a relay at `to` too near the interferer, in metres of slack.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
@@ -569,7 +569,7 @@ impl Site<'_> {
         }
     }
 
-    /// Returns the dependent coordinate and the slope of F by it.
+    /// Returns the dependent coordinate of the hop's end, and the derivative of F by it (see `hop`).
     ///
     /// It is the coordinate with the steepest slope of those that are not at an end of their room, `low` to `high`.
     fn axis(

@@ -27,7 +27,7 @@ use crate::sir;
 #[cfg(feature = "internals")]
 use crate::sir::square;
 
-/// Minimum number of relays.
+/// Minimum number of relays for a target SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fewest {
@@ -37,20 +37,20 @@ pub struct Fewest {
     pub proven: bool,
 }
 
-/// Maximum SIR of any number of relays.
+/// Highest target SIR that any number of relays meets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Most {
     /// Highest target that is met, linear SIR, to 1e-6 relative.
     pub target: f32,
-    /// Minimum number of relays that meets it.
+    /// Minimum number of relays that meets `target`.
     pub relays: u16,
 }
 
 /// Lower limit of the search in [`Most::of`], relative to the ceiling of the first hop.
 const DEPTH: f32 = 1e-20;
 
-/// Bisection steps of that range in its logarithm, which is 46 wide: to 1e-8.
+/// Bisection steps of the search in [`Most::of`], which is 46 wide in ln target: to 1e-8.
 const HALVINGS: u8 = 32;
 
 impl Fewest {
@@ -127,7 +127,7 @@ impl Mission {
     }
 }
 
-/// Returns the minimum number of relays; `proven` ignores the separation.
+/// Returns the minimum number of relays; its `proven` does not consider the minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -218,7 +218,7 @@ fn required_places(
     settled(&chain, places).is_some() || settled(&plain, places).is_some()
 }
 
-/// Computes the reaches, and then the required positions from the last relay back.
+/// Writes the relays' positions: their reaches, then the required positions from the last relay back.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let (slack, mut place) = chain.ends(|index, reach| {
@@ -268,7 +268,7 @@ fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
     chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns the minimum number of equal relays for `target` in a field; see [`fewest`]. Without a separation it is found by
+/// Returns the minimum number of equal relays for `target` in a field; see [`Fewest::of`]. Without a separation it is found by
 /// bisection.
 fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {

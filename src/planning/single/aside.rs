@@ -80,7 +80,7 @@ pub use super::edge::EdgeCoordinate;
 /// Bisection steps of the distance from Rx, in f64: to far below an f32's step.
 const HALVINGS: u8 = 48;
 
-/// Case of the optimum.
+/// Geometric case of the optimal position.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
@@ -90,7 +90,7 @@ pub enum AsideCase {
     Hilltop,
     /// Position above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,
-    /// Edge of the box with this free coordinate: the unlimited optimum is outside of the corridor.
+    /// Edge of the corridor's box along this coordinate: the optimum without limits is outside the box.
     Edge(EdgeCoordinate),
     /// Position above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level,
@@ -283,7 +283,7 @@ impl Plane {
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns the distance of SIR_1's maximum from Tx. It is relative to that of the interferer on the other side.
+    /// Returns t: the maximum of SIR_1 is at -t (X, Y), opposite the interferer as seen from Tx.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {

@@ -47,7 +47,7 @@ pub enum TimelineEvent {
     KeyMismatch,
     /// Another node's epoch went back.
     EpochWentBack,
-    /// Two relays use the number of this relay, or that of the other node.
+    /// Two nodes use the index [`Moment::other`], which is this relay's or a neighbour's.
     DuplicateIndex,
     /// The relay accepted its position in an agreement.
     Converged,

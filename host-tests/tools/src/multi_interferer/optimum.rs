@@ -206,7 +206,7 @@ pub(super) fn golden(
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.
 
-/// A feasible hop: for a relay anywhere in `from`, some position of the next relay in `to` works.
+/// Feasible hop: from a relay anywhere in `from`, some position of the next relay in `to` is reached.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     from: Span,
@@ -225,7 +225,7 @@ pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
     target: f64,
-    /// Relays N - 1 down to 1.
+    /// Stages of relays N - 1 down to 1.
     before: Vec<Stage>,
     /// Positions of relay 1 that are feasible for the hops after it.
     first: Vec<Span>,
@@ -239,9 +239,10 @@ struct Reach {
 }
 
 impl<'a> Stages<'a> {
-    /// Computes the sets for `target` (linear, > 0) and a separation of `apart` metres. `None` if one is empty.
+    /// Computes the feasible positions of each relay for `target` (linear, > 0), `apart` metres apart.
     ///
-    /// Work: a scan of the line's nodes for every change of power along the chain, and a few intervals per relay.
+    /// `None` if a relay has none. Work: a scan of the line's nodes per change of power along the chain, and a few intervals per
+    /// relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {
@@ -485,7 +486,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the falling crossings. Maxima of the integral, or points where the function drops below the level.
+/// Returns the falling crossings: points where the function drops below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

@@ -25,7 +25,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.mission.config().distance_m
     }
 
-    /// Returns the sender of relay `index`, at `from`.
+    /// Returns the sender of the hop to relay `index`: Tx, or the previous relay at `from`.
     pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
         if index <= 1 {
             return Sender::transmitter(self.mission);
@@ -42,7 +42,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// Returns gamma / A of the hop from `from` to relay `index`, with the noise at `from` included.
+    /// Returns target / gain of the hop to relay `index`, times 1 + noise / interference at `from`.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -83,7 +83,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the last relay at `at`, and its derivatives.
+    /// Returns the slack, m, of the hop to Rx from the last relay at `at`, and its derivatives.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         site::tail(self.mission, power_w, room, target, at)
@@ -137,7 +137,7 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// Value function at the last relay of the segment, without the parts for the backward pass only.
+    /// Derivatives of the value function at the segment's last relay: m per m; second ones, 1/m.
     pub(super) slope: Triple,
     pub(super) bend: [f32; 6],
 }
@@ -190,7 +190,7 @@ pub struct Seat {
 }
 
 impl Seat {
-    /// Returns the profile of a relay that has the mission's common one.
+    /// Returns the mission's common profile.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),

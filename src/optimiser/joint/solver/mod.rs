@@ -67,7 +67,7 @@ enum Purpose {
     Start,
     /// Higher target during an ascent.
     Raise,
-    /// Slack is computed again after its limit was reduced.
+    /// New computation of the slack after its cap was lowered.
     Tighten,
     /// Result of an ascent.
     Judge,
@@ -97,9 +97,9 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target found, in ln gamma, and the number of its start.
     best: Option<(f32, u8)>,
-    /// Result of that start's ascent before it was judged, in ln gamma.
+    /// Result of the best start's ascent before it was judged, in ln gamma.
     highest: f32,
-    /// Cells of that start, and the target at which it was judged, in ln gamma. `None` if a repetition of the start would give
+    /// Cells of the best start, and the target at which it was judged, in ln gamma. `None` if a repetition of it would give
     /// another chain: it was judged before its ascent ended, or without an ascent.
     best_cells: [Cell; RELAYS],
     best_judged: Option<f32>,
@@ -211,7 +211,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::default();
     }
 
-    /// Stores the `cell` of relay `index`, which comes after one at `x_m`.
+    /// Stores the cross-section `cell` of relay `index`; at a segment's start, also the x before it, `x_m`.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
