@@ -185,7 +185,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the common settings of a chain of `mission`, with values that may take any time to an agreement.
+/// Draws the common settings of a chain of `mission`, in which an agreement may take any time.
 pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let usual = settings(rng, mission);
     let micros = |most: f64, rng: &mut _| f64::from(scaled(rng, 3e4, 1e3, 1e13)).min(most) as u64;

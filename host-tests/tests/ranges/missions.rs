@@ -86,7 +86,7 @@ fn every_mission_and_setting_ends_in_places_or_infeasible() {
     assert!(of(Came::Agreed) > came.len() / 4);
 }
 
-/// Checks settings with which an agreement may take any time: fixed steps, many rounds, long hops, any `dead_after`.
+/// Checks settings with which an agreement may take any time: fixed steps, long hops, any `dead_after`.
 #[test]
 fn every_slow_setting_gives_finite_numbers() {
     let came = each(200, |seed| {
