@@ -183,10 +183,10 @@ mod autopilot {
     });
 
     texts!(Mistrust {
-        Mistrust::NoKey => "signs its frames and ignores unsigned ones; this relay has no key",
-        Mistrust::SignsOnly => "signs its frames but answers unsigned ones; this relay has no key",
-        Mistrust::Unsigned => "does not sign its frames, which are ignored; this relay has a key",
-        Mistrust::OtherKey => "signs with another key than this relay's; its frames are ignored",
+        Mistrust::NoKey => "signs its frames and ignores unsigned ones; this relay has no autopilot key",
+        Mistrust::SignsOnly => "signs its frames but answers unsigned ones; this relay has no autopilot key",
+        Mistrust::Unsigned => "does not sign its frames, which are ignored; this relay has an autopilot key",
+        Mistrust::OtherKey => "signs with another key than this relay's autopilot key; its frames are ignored",
         Mistrust::Old => "signs with an old timestamp; its frames are ignored",
     });
 

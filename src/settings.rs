@@ -299,7 +299,7 @@ impl core::fmt::Display for SetupError {
             Self::WithoutQuorum => {
                 "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
             }
-            Self::Guard => "guard must have positions within 1e7 m, a separation of 0 to 1e5 m, 1 to 1000 relays, a hover_m of 0 to 1e3, and the feature guard",
+            Self::Guard => "guard needs its feature, a fence within 1e7 m with least <= most, separation_m 0 to 1e5, relays 1 to 1000, and hover_m 0 to 1e3",
         })
     }
 }

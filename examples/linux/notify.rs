@@ -10,7 +10,7 @@ use uav_relay::{Duration, Instant};
 pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
-    /// Watchdog period, if systemd requests one.
+    /// Interval of watchdog messages, half the period that systemd requests; `None` without one.
     every: Option<Duration>,
     due: Instant,
 }

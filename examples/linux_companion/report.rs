@@ -127,11 +127,11 @@ impl Report {
             Event::NewEstimate => self.log_estimate(now, relay.interference_estimate()),
             Event::LeaseLapsed => tell(
                 "lease expired",
-                "not all relays are reachable; this relay holds its position and requests a new view",
+                "not all relays are reachable; this relay keeps its setpoint and requests a new view",
             ),
             Event::NoQuorum => tell(
                 "no quorum",
-                "too few relays are reachable; this relay holds its position; bring the missing relays into range, or land the reachable ones",
+                "too few relays are reachable; this relay keeps its setpoint; bring the missing relays into range, or land the reachable ones",
             ),
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
@@ -328,7 +328,7 @@ impl Report {
                     "power_w": source.power_w, "x_m": source.x_m, "y_m": source.y_m, "receiver_w": receiver_w,
                 }),
                 format_args!(
-                    "interferer {} W, x {} m, y {} m; at the receiver {receiver_w:.3e} W",
+                    "interferer {} W, x {} m, y {} m; interference at the receiver {receiver_w:.3e} W",
                     Exact(source.power_w),
                     Exact(source.x_m),
                     Exact(source.y_m)

@@ -40,7 +40,7 @@ pub(crate) type Over = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Waits for the mission that the chain flies; `Some` since a relay reported it without its values.
+    /// Waits for the flown mission; `Some` is when a relay first reported it without its values.
     Asking(Option<Instant>),
     Confirming,
     Uploading,

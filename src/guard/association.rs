@@ -18,7 +18,7 @@ const STRAYS: u8 = 3;
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of reminders, one per second, after which a neighbour's unrepeated position expires.
+/// Number of one-second reminders after which a neighbour's last x expires, unless it sends again.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Association that this relay has left, until the neighbour starts a new one.

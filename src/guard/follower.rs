@@ -45,7 +45,7 @@ impl FenceFollower {
         }
     }
 
-    /// Replaces the neighbour; 0 for none.
+    /// Replaces the neighbour by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.disorder();

@@ -116,9 +116,9 @@ impl core::fmt::Display for MissionError {
                 "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6"
             }
             Self::Band => {
-                "band must be within 0.1 to 1e5, from least to most, with common.altitude_m in it"
+                "band.least_m to band.most_m must be within 0.1 to 1e5, with common.altitude_m between them"
             }
-            Self::Lateral => "lateral must be within -1e5 to 1e5, from least to most, with 0 in it",
+            Self::Lateral => "lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
             Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
             Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
             Self::Noise => {

@@ -52,7 +52,7 @@ pub(crate) enum Stage {
     Outstanding,
     /// The result is known.
     Completed,
-    /// Cancelled after sending: its times are no signs of life. The other rules of `Completed` apply.
+    /// Cancelled after sending; its times are no sign of life. Otherwise like `Completed`.
     Cancelled,
 }
 

@@ -75,10 +75,10 @@ pub(crate) struct Rival {
 /// Bit that a relay with a lease sets in its claim number to keep its position.
 pub(crate) const RAISED: u32 = 1 << 31;
 
-/// Time from the start to the first claim; each further interval is twice the previous one.
+/// Wait before the first unprompted claim; each further interval is twice the previous one.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start to the first unprompted claims. By then, a hundred relays have agreed by `align`.
+/// Time from the start before unprompted claims begin: a hundred relays have agreed by `align`.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
 /// Maximum interval between unprompted claims, before they continue every `dead_after`.

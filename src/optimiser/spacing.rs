@@ -112,7 +112,7 @@ pub struct Hop {
     from_tx: bool,
     /// Maximum x of the receiver, m.
     end_m: f32,
-    /// Maximum x of the receiver and of its sender if all relays gather at the end, m.
+    /// Maximum x of the receiver and of its sender that leaves the relays after each their separation, m.
     gathered_m: [f32; 2],
 }
 

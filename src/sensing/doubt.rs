@@ -51,7 +51,7 @@ const OUT_OF_LINE: f64 = 4.0;
 /// Minimum reduction of the misfit by an exclusion, in squared standard deviations.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum absolute reduction of the misfit by an exclusion: some 15 % of one position.
+/// Minimum misfit, and reduction by an exclusion: that of an error of some 15 % at one position.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the variances without the second suspect and without the faulty relay.

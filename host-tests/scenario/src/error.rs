@@ -108,7 +108,7 @@ impl fmt::Display for Problem {
             Self::EmptyList => "has no entry",
             Self::TwoInterferences => "contradicts [[interferer]]",
             Self::MeasuredField => "contradicts [field]",
-            Self::NoInterference => "is missing, and so is field",
+            Self::NoInterference => "and field are both missing",
             Self::DuplicateRelay => "is already used",
             Self::NothingDiffers => "has no effect",
             Self::OtherDistance => "contradicts [site]",

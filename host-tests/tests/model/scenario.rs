@@ -32,7 +32,7 @@ const SCENES: u64 = 400;
 pub(crate) enum Kind {
     /// Algorithm 1, predicted by the leader.
     Predicted,
-    /// Algorithm 1 by trials of targets. Relays may have their own altitudes and powers.
+    /// Algorithm 1 without prediction: the leader tries targets by sweeps. Relays may have their own altitudes and powers.
     Tried,
     /// Algorithm 1 with free altitudes.
     Altitude,

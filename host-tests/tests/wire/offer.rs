@@ -44,7 +44,7 @@ pub(crate) fn with_sites(offer: &Said, sites: [i32; 6]) -> Said {
     offer.with(sites.map(|(name, number)| (name, json!(number))).collect())
 }
 
-/// Returns the stored part.
+/// Returns the part of an offer that a relay stores across a reboot.
 pub(crate) fn kept(offer: &Said) -> Vec<u8> {
     offer.body()[..KEPT].to_vec()
 }

@@ -25,7 +25,7 @@ pub struct Function {
 pub enum StackError {
     /// A function can call itself, directly or not.
     Recursion(String),
-    /// The size of a frame is not constant.
+    /// The stack frame of the function has no constant size.
     Dynamic(String),
     /// The function does not exist.
     Unknown(String),

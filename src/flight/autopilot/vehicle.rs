@@ -14,7 +14,7 @@ use crate::time::{Duration, Instant};
 /// Silence after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Maximum age of the last position off the line.
+/// Maximum age of a position that is used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
 /// Silence of the link that may have caused a failsafe of a PX4. A PX4 enters its failsafe after a second without a target, and a
@@ -558,10 +558,10 @@ pub(super) const fn millis(micros: u64) -> u32 {
     ((high / 1_000) << 16).wrapping_add(low / 1_000)
 }
 
-/// Minimum time between two events.
+/// Minimum time between two reports of a position off the line.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of a position that is used.
+/// Maximum age of the last position off the line.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
 /// Position of a drone that has no place along its line.

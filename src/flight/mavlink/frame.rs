@@ -85,7 +85,7 @@ pub mod id {
     pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
     /// Message RADIO_STATUS: signal and noise level of a radio.
     pub const RADIO_STATUS: u32 = 109;
-    /// Clock value that is sent back.
+    /// Message TIMESYNC: clock value, which the receiver sends back.
     pub const TIMESYNC: u32 = 111;
     /// State of the vehicle's geofence.
     pub const FENCE_STATUS: u32 = 162;

@@ -355,7 +355,7 @@ fn the_keeper_follows_the_kept_relay() {
     );
 }
 
-/// Rules 1 and 5: a fence to the left is lowered as the owner clears it.
+/// Rules 1 and 5: toward Tx the follower follows the fence, which follows the owner's position.
 #[test]
 fn the_kept_relay_follows_the_keeper() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);

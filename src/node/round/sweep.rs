@@ -271,7 +271,7 @@ impl SweepPass {
         true
     }
 
-    /// Sets this relay's position by the verdict; revokes the commit if the previous relay then has none.
+    /// Takes the position of the verdict; revokes the commit if it leaves the previous relay none.
     fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
         let Some(commit) = self.verdict.commit else {
             return;

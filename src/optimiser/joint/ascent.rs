@@ -108,7 +108,7 @@ impl Ascent {
         }
     }
 
-    /// Returns the ascent with a first probe at `limit`.
+    /// Returns the ascent with `limit`, in ln gamma, as the maximum target until its first probe.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,

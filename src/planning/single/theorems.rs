@@ -98,7 +98,7 @@ pub enum PlaceCase {
     Hilltop = 6,
     /// x of the crossing beyond the maximum of SIR_1, for X < 0.
     BeyondHill = 7,
-    /// x = D, for X < 0: the first hop is the better one even above Rx. SIR_1 may also rise over the whole range.
+    /// x = D, for X < 0: SIR_1 rises all the way to Rx, or the first hop is the better one even there.
     HillAboveRx = 8,
     /// x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level = 9,

@@ -55,7 +55,7 @@ pub struct Look {
     pub hue: usize,
     /// Stroke between the points.
     pub stroke: Stroke,
-    /// Points that have a sign.
+    /// Points that are drawn with a marker.
     pub signs: Signs,
 }
 

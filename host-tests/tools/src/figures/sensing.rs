@@ -27,7 +27,7 @@ struct Found {
     agreements: usize,
     /// Median over the scenes of the share of the optimum, linear.
     median_linear: f64,
-    /// Share that nine of ten scenes reach, linear.
+    /// Share of the optimum that nine of ten scenes reach, linear.
     tenth_linear: f64,
 }
 

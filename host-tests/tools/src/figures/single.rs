@@ -157,7 +157,7 @@ impl Reading {
     }
 }
 
-/// Gains under one reading for one pair of powers.
+/// Gains over other positions, by one kind of average ([`Reading`]), for one pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct GainRow {
     tx_w: f64,

@@ -220,7 +220,7 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Stages of the dynamic program for one target, which every hop except the first can meet.
+/// Feasible positions of every relay for one target, computed from Rx; the first hop is unchecked.
 pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
