@@ -114,7 +114,10 @@ fn a_step_that_is_too_large_says_so() {
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
-        report["error"].as_str().unwrap().contains("fixed-step schedule"),
+        report["error"]
+            .as_str()
+            .unwrap()
+            .contains("fixed-step schedule"),
         "{report}"
     );
     assert!(report.get("best_sir").is_none());
