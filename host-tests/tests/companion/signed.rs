@@ -116,7 +116,7 @@ fn a_bad_key_or_epoch_is_named() {
     }
 }
 
-/// Checks a restart with an older epoch file, as from a backup: the neighbour says what to do, and doing that helps.
+/// Checks a restart with an older epoch file: the neighbour logs the remedy, which helps.
 #[test]
 fn an_epoch_that_goes_back_is_told_of_with_the_remedy() {
     let mut chain = Chain::on_wires(2, QUIET);

@@ -129,7 +129,7 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     })
 }
 
-/// Cuts the chain after the relay that decides on the view with the new mission, the first that flies it.
+/// Cuts the chain after the relay that decides on the view with the upload, the first that flies it.
 #[test]
 fn the_ground_tells_of_one_relay_that_flies_it_until_all_do() {
     let state = Arc::new(Mutex::new(Wire::Open));

@@ -219,7 +219,7 @@ fn what_the_channel_cannot_carry_is_refused_before_flight() {
     assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
 }
 
-/// Checks fifty relays in one range at 57600 bit/s: the refusal states what would fit, and the slower probing of its text fits.
+/// Checks fifty relays in one range: the refusal states what would fit. Its slower probing does fit.
 #[test]
 fn fifty_relays_on_a_slow_channel_are_refused_with_the_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
