@@ -19,6 +19,14 @@ pub const TURN_MS: u64 = 500;
 /// Longest delay of a relay's timer in a loop that may feed, ms.
 pub const LATE_MS: u64 = 1_000;
 
+/// Returns true if a loop may feed at `now_us`. The timer of its relay, due at `due_us`, is then not late by [`LATE_MS`].
+pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
+    match due_us {
+        Some(due_us) => now_us < due_us.saturating_add(1_000 * LATE_MS),
+        None => true,
+    }
+}
+
 /// Values of the key register.
 const START: u32 = 0xCCCC;
 const UNLOCK: u32 = 0x5555;
@@ -46,7 +54,7 @@ pub fn feed(chip: &mut impl Registers) {
 
 #[cfg(test)]
 mod tests {
-    use super::{PRESCALER, RELOAD, TIMEOUT_MS, feed, start};
+    use super::{PRESCALER, RELOAD, TIMEOUT_MS, feed, may_feed, start};
     use crate::mock::Block;
     use crate::registers::Register::{DebugFreeze, WatchdogKey, WatchdogPrescaler, WatchdogReload};
 
@@ -65,6 +73,22 @@ mod tests {
         assert_eq!(&block.written[..], expected);
         feed(&mut block);
         assert_eq!(block.written[6..], [(WatchdogKey, 0xAAAA)]);
+    }
+
+    #[test]
+    fn a_loop_with_a_timer_that_is_late_by_a_second_may_not_feed() {
+        for (now_us, due_us, may) in [
+            (0, None, true),
+            (u64::MAX, None, true),
+            (5_000_000, Some(9_000_000), true),
+            (5_000_000, Some(5_000_000), true),
+            (5_999_999, Some(5_000_000), true),
+            (6_000_000, Some(5_000_000), false),
+            (u64::MAX, Some(5_000_000), false),
+            (u64::MAX - 1, Some(u64::MAX), true),
+        ] {
+            assert_eq!(may_feed(now_us, due_us), may, "{now_us} {due_us:?}");
+        }
     }
 
     #[test]

@@ -10,8 +10,6 @@ use uav_relay_chip::watchdog;
 
 const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-const LATE: Duration = Duration::from_millis(watchdog::LATE_MS);
-
 static WAS_HUNG: AtomicBool = AtomicBool::new(false);
 
 pub(crate) struct Begun {
@@ -41,7 +39,8 @@ pub(crate) fn feed() {
 
 /// Ends a turn of the main loop at `now`: feeds the watchdog unless a timer of `relay` is overdue.
 pub(crate) fn end_turn(relay: &Relay, now: Instant) {
-    if relay.poll_timeout().is_none_or(|due| now < due + LATE) {
+    let due = relay.poll_timeout().map(Instant::as_micros);
+    if watchdog::may_feed(now.as_micros(), due) {
         feed();
     }
 }

@@ -89,10 +89,15 @@ fn is_off_a_swapped_line(kind: &str) {
     let texts = apart.drone.so_far().into_iter().filter(operator).count();
     assert!((1..=3).contains(&texts), "{texts} texts");
     // The drone cannot be engaged: the relay has no position, and no targets are streamed.
+    // The log gives the reason, and never reports the drone as ready.
+    let reason = "autopilot: cannot be engaged: there is no position near the line";
+    apart.relay.says(reason);
     apart.drone.order("mode companion");
     let heard = apart.drone.hears_for(Duration::from_secs(3));
     assert!(!heard.iter().any(Heard::is_target), "{heard:?}");
-    assert!(!apart.relay.has_said("setpoint control engaged"));
+    for never in ["setpoint control engaged", "autopilot: ready"] {
+        assert!(!apart.relay.has_said(never), "{never}");
+    }
 }
 
 const fn with_height([lat, lon, _]: Site, amsl: f64) -> Site {

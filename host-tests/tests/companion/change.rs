@@ -135,6 +135,61 @@ fn what_leaves_the_geofence_is_refused_before_it_is_sent() {
     assert!(!bench.0.relays[0].has_said("uploaded: "));
 }
 
+/// Checks a dry run: its exit status is that of the upload.
+#[test]
+fn a_dry_run_that_leaves_the_geofence_fails() {
+    let mut bench = Bench::new();
+    bench.agreed();
+    for (altitude, is_outside) in [("50", true), ("30", false)] {
+        let more = format!("--new-altitude {altitude} --dry-run");
+        let station = bench.uploads("1", &format!("{more} --new-band {altitude},{altitude}"));
+        if !is_outside {
+            let lines = station.succeeds();
+            assert_eq!(said(&lines, "dry run"), ["version 1 was not uploaded"]);
+            continue;
+        }
+        let (lines, error) = station.fails(1);
+        let why = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays";
+        assert!(error.starts_with(why), "{error}");
+        assert_eq!(said(&lines, "change")[0], "altitude: 20 m -> 50 m");
+        assert!(said(&lines, "dry run").is_empty(), "{lines:?}");
+    }
+    assert!(!bench.0.relays[0].has_said("uploaded: "));
+}
+
+/// Checks an upload that starts from the loaded values: all that an earlier upload changed goes back.
+#[test]
+fn an_upload_from_the_loaded_values_shows_what_goes_back() {
+    let mut bench = Bench::new();
+    bench.agreed();
+    let moved = "--new-interferer 80,700,-300 --yes";
+    bench.uploads("1", moved).succeeds();
+    bench.0.lines("adopted: the chain flies version 1");
+    let altitude = "altitude: 20 m -> 30 m";
+    for (from, expected) in [
+        ("", &[altitude][..]),
+        (
+            "--from-loaded",
+            &[
+                altitude,
+                "interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m",
+            ],
+        ),
+    ] {
+        let more = format!("--new-altitude 30 --dry-run {from}");
+        let lines = bench.uploads("2", &more).succeeds();
+        assert_eq!(said(&lines, "current"), ["relay 1 flies version 1"]);
+        assert_eq!(said(&lines, "change"), expected);
+    }
+    // Without any other value the relays fly again as loaded.
+    let lines = bench.uploads("2", "--from-loaded --yes").succeeds();
+    assert_eq!(
+        said(&lines, "change"),
+        ["interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m"]
+    );
+    bench.0.lines("adopted: the chain flies version 2");
+}
+
 /// Runs the ground station at a terminal and answers its question. Returns exit status and terminal text.
 fn at_a_terminal(options: &str, answer: &str) -> (Option<i32>, String) {
     let terminal = Pty::new();

@@ -47,6 +47,9 @@ struct Counts {
     corrupted: AtomicU64,
 }
 
+/// Decides for bytes that tty `from` has sent: true if the other ttys receive them.
+type Gate = Box<dyn FnMut(usize, &[u8]) -> bool + Send>;
+
 /// Ttys of a medium; `None` for one that is unplugged.
 type Ttys = Mutex<Vec<Option<Arc<Pty>>>>;
 
@@ -67,7 +70,15 @@ impl Medium {
         let ptys: Vec<Pty> = (0..ttys).map(|_| Pty::new()).collect();
         let paths = ptys.iter().map(|pty| pty.path().to_owned()).collect();
         let ptys = ptys.into_iter().map(|pty| Some(Arc::new(pty))).collect();
-        Self::of(paths, ptys, noise, None)
+        Self::of(paths, ptys, noise, Box::new(|_, _| true), None)
+    }
+
+    /// Creates a quiet wire that carries what `gate` lets pass.
+    pub(crate) fn gated(gate: impl FnMut(usize, &[u8]) -> bool + Send + 'static) -> Self {
+        let ptys = [Pty::new(), Pty::new()];
+        let paths = ptys.iter().map(|pty| pty.path().to_owned()).collect();
+        let ptys = ptys.map(|pty| Some(Arc::new(pty)));
+        Self::of(paths, ptys.into(), QUIET, Box::new(gate), None)
     }
 
     /// Creates a quiet medium whose ttys can be unplugged.
@@ -75,7 +86,8 @@ impl Medium {
         let folder = tempfile::tempdir().unwrap();
         let name = |index| folder.path().join(format!("radio{index}"));
         let paths = (0..ttys).map(name).collect();
-        let medium = Self::of(paths, vec![None; ttys], QUIET, Some(folder));
+        let open = Box::new(|_, _: &[u8]| true);
+        let medium = Self::of(paths, vec![None; ttys], QUIET, open, Some(folder));
         (0..ttys).for_each(|index| medium.plug(index));
         medium
     }
@@ -84,12 +96,13 @@ impl Medium {
         paths: Vec<PathBuf>,
         ptys: Vec<Option<Arc<Pty>>>,
         noise: Noise,
+        gate: Gate,
         folder: Option<TempDir>,
     ) -> Self {
         let (ptys, counts) = (Arc::new(Mutex::new(ptys)), Arc::new(Counts::default()));
         let stop = Arc::new(AtomicBool::new(false));
         let shared = (Arc::clone(&ptys), Arc::clone(&counts), Arc::clone(&stop));
-        let pump = std::thread::spawn(move || carry(&shared.0, noise, &shared.1, &shared.2));
+        let pump = std::thread::spawn(move || carry(&shared.0, noise, gate, &shared.1, &shared.2));
         Self {
             paths,
             ptys,
@@ -136,7 +149,7 @@ impl Drop for Medium {
     }
 }
 
-fn carry(shared: &Ttys, noise: Noise, counts: &Counts, stop: &AtomicBool) {
+fn carry(shared: &Ttys, noise: Noise, mut gate: Gate, counts: &Counts, stop: &AtomicBool) {
     let mut rng = ChaCha8Rng::seed_from_u64(noise.seed);
     let look_up = Timespec {
         tv_sec: 0,
@@ -154,6 +167,9 @@ fn carry(shared: &Ttys, noise: Noise, counts: &Counts, stop: &AtomicBool) {
         for (from, source) in ptys.iter().enumerate() {
             let mut buffer = [0; 256];
             let sent = source.read(&mut buffer);
+            if sent.is_empty() || !gate(from, sent) {
+                continue;
+            }
             let others = ptys.iter().enumerate().filter(|(to, _)| *to != from);
             for (_, receiver) in others {
                 let mut arriving = Vec::new();

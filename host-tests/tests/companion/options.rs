@@ -21,6 +21,8 @@ const WRONG: &[&str] = &[
     "--index 2 --of 3 --downstream a",
     "--index 2 --of 2",
     "--shared x",
+    // The channel cannot carry the chain.
+    "--index 2 --of 50 --shared a --baud 57600",
     "--baud 1199",
     "--network 65536",
     "--probe-after-ms 0",

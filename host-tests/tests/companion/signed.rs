@@ -1,5 +1,7 @@
 //! Relay processes with signed frames.
 
+use std::os::unix::fs::PermissionsExt as _;
+
 use uav_relay_scenario::Scenario;
 
 use crate::chain::{Chain, QUICK, simulated};
@@ -112,6 +114,48 @@ fn a_bad_key_or_epoch_is_named() {
         assert_eq!(ended.status, Some(2));
         assert!(ended.stderr[0].contains("-file"), "{ended:?}");
     }
+}
+
+/// Checks a restart with an older epoch file: the neighbour logs the remedy, which helps.
+#[test]
+fn an_epoch_that_goes_back_is_told_of_with_the_remedy() {
+    let mut chain = Chain::on_wires(2, QUIET);
+    chain.files.write("epoch2", "41\n");
+    chain.relays = [1, 2].map(|index| start(&chain, index, "key")).into();
+    let settled = chain.settled();
+    chain.relays.remove(1).stopped();
+    chain.files.write("epoch2", "5\n");
+    let mut back = start(&chain, 2, "key");
+    assert!(back.line("signed: ").ends_with("epoch 6"));
+    let line = chain.relays[0].line("epoch: ");
+    let remedy = "epoch: the epoch of relay 2 went back, and its frames are rejected; raise the number in the --epoch-file of relay 2 and restart it";
+    assert!(line.ends_with(remedy), "{line}");
+    assert!(!back.has_said("converged: "));
+    back.stopped();
+    chain.files.write("epoch2", "42\n");
+    chain.relays.push(start(&chain, 2, "key"));
+    assert_eq!(chain.relays[1].settled(), settled[1]);
+}
+
+/// Checks a key file that other users can read, at each program that reads one.
+#[test]
+fn a_key_that_others_can_read_is_refused() {
+    let files = Files::new();
+    let (key, epoch) = (files.text("key"), files.text("epoch"));
+    let others = std::fs::Permissions::from_mode(0o644);
+    std::fs::set_permissions(&key, others).unwrap();
+    let signed = format!("--key-file {key} --epoch-file {epoch}");
+    let station = "--of 1 --end tx --tty /nowhere/tty --version 1 --new-altitude 30 --yes";
+    let line = format!(
+        "--key-file {key}: mode 0644: other users of this computer can read or write the key; allowed: at most 0660; type: chmod 600 {key}"
+    );
+    for program in [
+        Relay::start(&format!("--index 1 --of 1 {signed}")),
+        Relay::ground(&format!("{station} {signed}")),
+    ] {
+        assert_eq!(program.refused_at_once(2), line);
+    }
+    assert!(!files.path("epoch").exists(), "no epoch was used");
 }
 
 #[test]

@@ -1,8 +1,13 @@
 //! Upload of a mission from a ground station to relays that store it, and fly it after a restart.
 
 use std::fmt::Write as _;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use uav_relay::Upload;
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame;
+use uav_relay::wire::message::Message;
 use uav_relay_scenario::{Scenario, mission};
 
 use crate::chain::{Chain, QUICK, simulated};
@@ -94,6 +99,83 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     let begun = std::time::Instant::now();
     wait_until(|| kept.exists());
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+}
+
+/// State of a wire that is cut by the decision on a view.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Wire {
+    Open,
+    /// The next decision cuts the wire, and is lost.
+    Armed,
+    Cut,
+}
+
+/// Creates a wire whose tty 1 is that of the relay that decides.
+fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
+    let state = Arc::clone(state);
+    let mut deframer = Deframer::new();
+    Medium::gated(move |from, bytes| {
+        let mut state = state.lock().unwrap();
+        for &byte in bytes.iter().filter(|_| from == 1) {
+            let decides = deframer.push(byte).is_some_and(|plain| {
+                let message = plain.ok().and_then(|plain| frame::decode(plain).ok());
+                matches!(message, Some((_, Message::Decision(_))))
+            });
+            if decides && *state == Wire::Armed {
+                *state = Wire::Cut;
+            }
+        }
+        *state != Wire::Cut
+    })
+}
+
+/// Cuts the chain after the relay that decides on the view with the upload, the first that flies it.
+#[test]
+fn the_ground_tells_of_one_relay_that_flies_it_until_all_do() {
+    let state = Arc::new(Mutex::new(Wire::Open));
+    let mut chain = Chain::on_wires(3, QUIET);
+    chain.media[1] = cut_by_a_decision(&state);
+    let rx = Medium::new(2, QUIET);
+    let ends = [
+        String::new(),
+        String::new(),
+        format!("--downstream {}", rx.tty(0)),
+    ];
+    chain.relays = (1..)
+        .zip(&ends)
+        .map(|(index, end)| {
+            let signed = chain.files.signed("key", &format!("epoch{index}"));
+            chain.relay(index, &format!("{signed} {end}"))
+        })
+        .collect();
+    chain.settles_at(&simulated(&Scenario::default(), 3));
+    *state.lock().unwrap() = Wire::Armed;
+    let signed = chain.files.signed("key", "ground");
+    let mut station = Relay::ground(&format!(
+        "--of 3 --yes --version 5 {NEW} {signed} --end rx --tty {}",
+        rx.tty(1)
+    ));
+    let line = station.line("adopted: ");
+    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; polling it until the others do, too";
+    assert!(line.ends_with(first), "{line}");
+    assert_eq!(*state.lock().unwrap(), Wire::Cut);
+    // Several polls later the others still do not fly it.
+    std::thread::sleep(Duration::from_secs(4));
+    assert!(!station.has_said("flown: "), "the chain is cut");
+    chain.relays[2].says("adopted: the chain flies version 5");
+    for relay in &mut chain.relays[..2] {
+        assert!(!relay.has_said("adopted: "));
+    }
+    *state.lock().unwrap() = Wire::Open;
+    let line = station.line("flown: ");
+    assert!(
+        line.contains("flown: 3 of 3 relays fly version 5 in view "),
+        "{line}"
+    );
+    station.succeeds();
+    for relay in &mut chain.relays {
+        relay.says("adopted: the chain flies version 5");
+    }
 }
 
 /// Returns a relay's upload file of `config` as version 5, based on the loaded `base`.

@@ -84,9 +84,6 @@ impl<const IN: usize> Buffers<IN> {
 /// Longest time between two feedings of the watchdog while the relay makes progress.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Maximum delay of a relay's timer; with a longer one the watchdog is not fed, and resets the board.
-const LATE: uav_relay::Duration = uav_relay::Duration::from_millis(watchdog::LATE_MS);
-
 /// Calls `feed` every [`TURN`], so that the watchdog does not restart a board that takes no part.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
@@ -95,14 +92,17 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Calls `feed` every [`TURN`] while the relay's timers are served.
+/// Calls `feed` every [`TURN`] while the relay's timers are served, by [`watchdog::may_feed`].
 ///
 /// It runs in the task of ports and timers, so a hanging turn of that task, a panic or a fault ends the feeding.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     loop {
-        let now = EmbassyClock.now();
-        let served = |relay: &Relay| relay.poll_timeout().is_none_or(|due| now < due + LATE);
-        if relay.look(served) == Some(true) {
+        let now = EmbassyClock.now().as_micros();
+        let due = |relay: &Relay| relay.poll_timeout().map(Instant::as_micros);
+        if relay
+            .look(due)
+            .is_some_and(|due| watchdog::may_feed(now, due))
+        {
             feed();
         }
         Timer::after(TURN).await;

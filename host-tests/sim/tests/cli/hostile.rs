@@ -219,6 +219,21 @@ fn what_the_channel_cannot_carry_is_refused_before_flight() {
     assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
 }
 
+/// Checks fifty relays in one range: the refusal states what would fit. Its slower probing does fit.
+#[test]
+fn fifty_relays_on_a_slow_channel_are_refused_with_the_probing_that_works() {
+    let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
+    let (status, line) = refusal(arguments);
+    let expected = "--baud 57600: must be within 229974 to 10000000: 50 relays in range of each other overload the channel: it needs 229974 bit/s, or --probe-after-ms 19963 with three times that for --dead-after-ms, or at most 13 relays in range\n";
+    assert_eq!((status, line.as_str()), (2, expected));
+    // A millisecond less does not fit.
+    let (status, _) = refusal(&format!("{arguments} --probe-after-ms 19962"));
+    assert_eq!(status, 2);
+    let report = json(&format!("{arguments} --probe-after-ms 19963"));
+    assert_eq!(report["relays"].as_array().unwrap().len(), 50, "{report}");
+    assert!(report["sir"].as_f64().unwrap() > 1.0, "{report}");
+}
+
 #[test]
 fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
     let arguments = "--soak 200 --kill 4@20 --boot 4@60";

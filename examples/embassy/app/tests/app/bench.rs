@@ -1,6 +1,6 @@
 //! Test bench: a drone with the application as relay 1. It is wired to relay 2 of 2, or by radio with relays 2 and 3 of 3.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::future::poll_fn;
@@ -33,7 +33,11 @@ pub(crate) const KEY: [u8; 32] = [7; 32];
 static CLOCK: Mutex<()> = Mutex::new(());
 
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Pipe(Rc<RefCell<VecDeque<u8>>>);
+pub(crate) struct Pipe {
+    bytes: Rc<RefCell<VecDeque<u8>>>,
+    /// Time that a poll of a writer takes without taking a byte, ms; 0 for a writer that works.
+    stall_ms: Rc<Cell<u64>>,
+}
 
 impl ErrorType for Pipe {
     type Error = Infallible;
@@ -51,8 +55,17 @@ impl Read for Pipe {
 }
 
 impl Write for Pipe {
+    /// Needs no waker, as [`Read::read`].
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        self.0.borrow_mut().extend(bytes);
+        poll_fn(|_| match self.stall_ms.get() {
+            0 => Poll::Ready(()),
+            millis => {
+                MockDriver::get().advance(embassy_time::Duration::from_millis(millis));
+                Poll::Pending
+            }
+        })
+        .await;
+        self.bytes.borrow_mut().extend(bytes);
         Ok(bytes.len())
     }
 
@@ -64,7 +77,7 @@ impl Write for Pipe {
 impl Pipe {
     /// Takes as many bytes as are available and fit.
     pub(crate) fn take(&self, into: &mut [u8]) -> usize {
-        let mut bytes = self.0.borrow_mut();
+        let mut bytes = self.bytes.borrow_mut();
         let count = bytes.len().min(into.len());
         for (place, byte) in into.iter_mut().zip(bytes.drain(..count)) {
             *place = byte;
@@ -264,7 +277,7 @@ impl Bench {
     /// Restarts the drone. Bytes on the wires are lost.
     pub(crate) fn boot(&mut self, board: Board<Ram>) {
         for wire in &self.wire {
-            wire.0.borrow_mut().clear();
+            wire.bytes.borrow_mut().clear();
         }
         let [there, back] = self.wire.clone();
         let autopilot = self.vehicle.as_ref().map(Vehicle::port);
@@ -294,6 +307,11 @@ impl Bench {
 
     pub(crate) fn switch_off(&mut self) {
         self.drone = None;
+    }
+
+    /// Lets the drone's UART hang: each poll of its driver takes so long and sends nothing. 0 for a UART that works.
+    pub(crate) fn stall_uart(&mut self, millis: u64) {
+        self.wire[0].stall_ms.set(millis);
     }
 
     /// Runs for `millis` milliseconds; returns the neighbour's events meanwhile.
@@ -341,7 +359,7 @@ impl Bench {
                     continue;
                 }
                 let frame = &frame[..sent.len];
-                self.wire[1].0.borrow_mut().extend(frame);
+                self.wire[1].bytes.borrow_mut().extend(frame);
                 for to in (0..self.others.len()).filter(|to| *to != from) {
                     self.others[to].handle_bytes(now, port, frame);
                 }

@@ -1,5 +1,7 @@
 //! Watchdog: fed only while the relay's ports and timers are served.
 
+use relay_app::EmbassyClock;
+use uav_relay::asynch::Clock as _;
 use uav_relay::{Duration, Event, Placement};
 use uav_relay_chip::reset::Reset;
 
@@ -28,6 +30,27 @@ fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
     println!("{told:?}");
     assert!(told.contains(&Event::Converged), "{told:?}");
     assert!(FED.with_borrow(Vec::len) >= 60);
+}
+
+/// Checks turns of 12 s: the feeding task is polled in each, but the relay's timers are late.
+#[test]
+fn a_task_whose_timers_are_late_feeds_it_no_more() {
+    let mut bench = Bench::new();
+    bench.boot(Ram::blank().board(&block(Some(1), None), 1));
+    assert!(bench.run(60_000).contains(&Event::Converged));
+    let before = EmbassyClock.now();
+    bench.stall_uart(12_000);
+    // The relay sends within seconds, and hangs from then on.
+    bench.run(10_000);
+    let took = EmbassyClock.now().since(before);
+    assert!(took > Duration::from_millis(1_000_000), "{took:?}");
+    FED.with_borrow_mut(Vec::clear);
+    bench.run(100);
+    assert!(FED.with_borrow(Vec::is_empty));
+    // A task that recovers feeds it again.
+    bench.stall_uart(0);
+    bench.run(10_000);
+    assert!(FED.with_borrow(Vec::len) >= 18);
 }
 
 #[test]

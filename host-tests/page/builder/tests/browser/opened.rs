@@ -134,3 +134,27 @@ fn the_numbers_are_those_of_the_command_to_the_bit() {
     assert!(browser.value("player.ticks.length").as_u64() > Some(100));
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
+
+/// Checks the share of the optimum of relays that listen: one that is off does not count.
+#[test]
+fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
+    let mut browser = opened(1280, 900);
+    choose(&mut browser, "uavs", "6");
+    press(&mut browser, "listen");
+    let at = middle(&mut browser, "relay4");
+    browser.drag(at, at, 0);
+    browser.until("want.off.has(4) && window.last.told.report.left === 5");
+    settled(&mut browser);
+    is_native(&mut browser, "listening without relay 4");
+    let native: serde_json::Value = serde_json::from_str(&native(&mut browser)).unwrap();
+    let share = native["share_of_optimum"].as_f64().unwrap();
+    assert!(share > 0.9 && share < 1.01, "{native}");
+    let words = said(&mut browser, "summary");
+    let end = format!(
+        " {:.1} % of the optimum with the interferer known.",
+        100.0 * share
+    );
+    assert!(words.ends_with(&end), "{end}: {words}");
+    assert!(words.contains(" with 5 relays; "), "{words}");
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
