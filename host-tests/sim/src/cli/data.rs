@@ -13,8 +13,8 @@ use crate::simulator::traffic::TrafficSpec;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Data traffic")]
 pub struct Data {
-    /// Send packets through the chain from the first agreement on: from Tx to Rx (forward, the default), or both ways, each half of
-    /// the time. Every hop has its own data rate, by the data link of the scenario (link), and every node a queue. Reports promised,
+    /// Send packets through the chain: from Tx to Rx (forward, the default), or both ways. They start at the first agreement; both
+    /// ways have half of the time each. Every hop has its own data rate, by the data link of the scenario (link), and every node a queue. Reports promised,
     /// offered and delivered data rates, delays and queue lengths. A run that ends by itself goes on for 1000 packets, and 30 more
     /// for each hop
     #[arg(long, value_name = "WAY", value_enum, num_args = 0..=1, default_missing_value = "forward")]

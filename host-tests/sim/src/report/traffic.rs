@@ -10,6 +10,9 @@ use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec
 /// Number of periods in the text at its start and at its end.
 const ENDS: usize = 10;
 
+/// Number of queues up to which the text lists all; of more, it lists half as many.
+const SHOWN: usize = 16;
+
 /// Traffic of a run. Arrays have the way to Rx first and then, if data goes both ways, the way back.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
@@ -94,7 +97,7 @@ pub struct PeriodReport {
     pub view: u32,
     /// Number of relays of the view.
     pub relays: u16,
-    /// `agreed`; `moving` (an agreement is pending, or drones are on their way); `broken` (a hop carries nothing).
+    /// `agreed`; `pending`: no agreement yet, or drones on their way; `broken`: a relay is missing.
     pub state: &'static str,
     /// Data rates at the agreed positions, bit/s; absent unless the state is `agreed`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -255,8 +258,15 @@ impl FlowReport {
                 queue.node, queue.mean_packets, queue.most_packets
             )
         };
-        let queues: Vec<String> = self.queues.iter().map(queue).collect();
-        _ = writeln!(text, "    queues, mean (most): {}", queues.join(", "));
+        let mut queues: Vec<&QueueReport> = self.queues.iter().collect();
+        let (which, shown) = if queues.len() > SHOWN {
+            queues.sort_by(|one, other| other.mean_packets.total_cmp(&one.mean_packets));
+            ("longest queues", SHOWN / 2)
+        } else {
+            ("queues", SHOWN)
+        };
+        let queues: Vec<String> = queues.into_iter().take(shown).map(queue).collect();
+        _ = writeln!(text, "    {which}, mean (most): {}", queues.join(", "));
         text
     }
 }
@@ -281,7 +291,7 @@ impl PeriodReport {
             relays: period.relays,
             state: match period.state {
                 ChainState::Agreed => "agreed",
-                ChainState::Moving => "moving",
+                ChainState::Pending => "pending",
                 ChainState::Broken => "broken",
             },
             promised_bps: period.promised_bps.clone(),
@@ -305,8 +315,8 @@ impl PeriodReport {
         let of = if relays == 1 { "relay" } else { "relays" };
         let state = match (self.state, self.promised_bps.as_slice()) {
             ("agreed", promised) => format!("{} Mbit/s promised", list(promised)),
-            ("moving", _) => "not at agreed positions".to_owned(),
-            _ => "a hop carries nothing".to_owned(),
+            ("pending", _) => "no agreement yet, or drones on their way".to_owned(),
+            _ => "broken".to_owned(),
         };
         let mut text = format!(
             "{:>10.3} to {:.3} s: {relays} {of}, {state}, {} delivered",
@@ -335,14 +345,15 @@ fn milli(seconds: f64) -> String {
     rounded(seconds * 1e3)
 }
 
-/// Formats a number with four digits, small and large ones with an exponent.
+/// Formats a number with four significant digits; small numbers have an exponent.
 fn rounded(value: f64) -> String {
-    match value {
-        zero if !(zero > 0.0) => "0".to_owned(),
-        small if small < 1e-3 => format!("{small:.3e}"),
-        value if value < 10.0 => format!("{value:.4}"),
-        value if value < 100.0 => format!("{value:.3}"),
-        value if value < 1e6 => format!("{value:.2}"),
-        large => format!("{large:.3e}"),
+    if !(value > 0.0) {
+        return "0".to_owned();
     }
+    if value < 1e-3 {
+        return format!("{value:.3e}");
+    }
+    let bounds = [1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3];
+    let digits = bounds.iter().filter(|bound| value < **bound).count();
+    format!("{value:.digits$}")
 }

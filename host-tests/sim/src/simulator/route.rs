@@ -12,7 +12,7 @@
 //! A frame has one slot for each hop, in the order of the hops, so a packet can pass the whole chain in one frame. With equal slots
 //! a slot is the time of one packet on the worst hop, and with fitted slots the time of one packet on its own hop. With a frequency
 //! for each hop all hops send all the time. If data goes both ways, the first half of each frame is for the way to Rx and the
-//! second half for the way back.
+//! second half for the way back; the slots are then as long as the faster direction needs for one packet.
 //!
 //! Times are whole picoseconds since the start of the run, so slots do not drift.
 
@@ -139,7 +139,9 @@ impl TrueHops {
         self.scene.as_ref().is_some_and(moves)
     }
 
-    /// Returns the SIR (linear) of each hop from Tx to Rx, and with `back` also of each hop on the way back, in the order of packets.
+    /// Returns the SIR (linear) of each hop from Tx to Rx and, with `back`, of each hop on the way back.
+    ///
+    /// The hops of a direction are in the order in which a packet passes them.
     fn sirs(&self, at: Ps, version: u16, relays: &[(usize, Point)], back: bool) -> Vec<Vec<f64>> {
         let Some((scene, [vx, vy])) = &self.scene else {
             let mut missions = self.missions.iter();
@@ -196,6 +198,12 @@ pub struct Window {
 }
 
 impl Window {
+    /// Returns the end of the frame of `at`; `at` itself if a frame ends there.
+    pub const fn frame_end(&self, at: Ps) -> Ps {
+        let since = at.saturating_sub(self.anchor);
+        self.anchor + since.div_ceil(self.frame) * self.frame
+    }
+
     /// Returns the time within slots from the first frame to `at`.
     fn elapsed(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
@@ -239,9 +247,9 @@ pub struct Hop {
 pub enum ChainState {
     /// All relays of the view are at the positions of one agreement.
     Agreed,
-    /// All hops exist, but an agreement is pending, or drones are on their way.
-    Moving,
-    /// At least one hop is dead.
+    /// All relays can send, but an agreement is pending, or drones are on their way.
+    Pending,
+    /// A relay of the view is silent, has no position, or has not accepted the view.
     Broken,
 }
 
@@ -288,7 +296,7 @@ pub struct Route {
 struct Members {
     view: ViewId,
     version: u16,
-    /// State of each relay of the view by its index, with its number from 0; `None` for a relay that is missing.
+    /// Number (from 0) and state of each relay by its index in the view; `None` if it is missing.
     relays: Vec<Option<(usize, RelayState)>>,
 }
 
@@ -333,7 +341,7 @@ impl Members {
         self.relays.iter().enumerate().map(place).collect()
     }
 
-    /// Returns the node of each end of the hops, from Tx to Rx of `rx`; `None` for a relay that cannot send and receive.
+    /// Returns the nodes from Tx to Rx, whose number is `rx`; `None` for a relay that cannot send.
     fn nodes(&self, rx: usize) -> Vec<Option<usize>> {
         let alive = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
@@ -346,15 +354,17 @@ impl Members {
             .collect()
     }
 
-    /// Returns the agreed positions if all relays hold those of one agreement.
+    /// Returns the agreed positions if all relays hold those of one agreement, for one target SIR.
+    ///
+    /// Positions from which relays measure an unknown interferer have no target.
     fn agreed(&self) -> Option<Vec<(usize, Point)>> {
         let target = |state: &RelayState| state.seen.target.map(f32::to_bits);
-        let first = self.relays.first().copied().flatten();
+        let (_, first) = self.relays.first().copied().flatten()?;
+        let first = target(&first)?;
         let held = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
             let is_held = state.seen.phase == Phase::Holding && state.seen.place.is_some();
-            let is_same = first.is_some_and(|(_, first)| target(&first) == target(&state));
-            (is_held && is_same).then_some((relay, state.agreed?))
+            (is_held && target(&state) == Some(first)).then_some((relay, state.agreed?))
         });
         held.collect()
     }
@@ -411,31 +421,31 @@ impl DataLink {
             .map(|sirs| sirs.iter().map(|sir| self.packet(self.radio.hop_bps(*sir))))
             .map(Iterator::collect)
             .collect();
-        let longest = packets.iter().flatten().flatten().copied().max();
-        let longest = longest.unwrap_or(1);
+        let slowest = |packets: &Vec<Option<Ps>>| packets.iter().flatten().copied().max();
+        let longest = packets.iter().filter_map(slowest).max().unwrap_or(1);
+        // Of two directions the faster one sends one packet in a slot, so bursts stay short.
+        let slot = packets.iter().filter_map(slowest).min().unwrap_or(1);
         // A hop that carries nothing has a slot like that of the worst hop.
         let own = |packet: &Option<Ps>| packet.unwrap_or(longest);
-        let fitted = self.radio.link.access == Access::Fitted;
         let half = |packets: &Vec<Option<Ps>>| match self.radio.link.access {
-            Access::Slots => longest * packets.len() as Ps,
-            Access::Channels => longest,
+            Access::Slots => slot * packets.len() as Ps,
+            Access::Channels => slot,
             Access::Fitted => packets.iter().map(own).sum(),
         };
-        let longest_half = packets.iter().map(half).max().unwrap_or(1);
-        let frame = longest_half * packets.len() as Ps;
+        let shortest = packets.iter().map(half).min().unwrap_or(1);
+        let frame = shortest * packets.len() as Ps;
         let mut all = Vec::new();
         let mut begins = 0;
         for packets in &packets {
-            let stretch = |time: Ps| {
-                let wide = u128::from(time) * u128::from(longest_half) / u128::from(half(packets));
-                Ps::try_from(wide).unwrap_or(Ps::MAX)
+            let fitted = |time: Ps| {
+                let share = u128::from(time) * u128::from(shortest) / u128::from(half(packets));
+                Ps::try_from(share).unwrap_or(Ps::MAX)
             };
             let mut opens = begins;
             let windows = packets.iter().map(|packet| {
-                let open_for = if fitted {
-                    stretch(own(packet))
-                } else {
-                    longest
+                let open_for = match self.radio.link.access {
+                    Access::Fitted => fitted(own(packet)),
+                    Access::Slots | Access::Channels => slot,
                 };
                 let window = Window {
                     anchor,
@@ -449,7 +459,7 @@ impl DataLink {
                 window
             });
             all.push(windows.collect());
-            begins += longest_half;
+            begins += shortest;
         }
         all
     }
@@ -547,7 +557,7 @@ impl Route {
         let is_whole = nodes.iter().all(Option::is_some);
         let state = match &agreed {
             Some(agreed) if members.are_there(agreed) => ChainState::Agreed,
-            _ if is_whole => ChainState::Moving,
+            _ if is_whole => ChainState::Pending,
             _ => ChainState::Broken,
         };
         let period = Period {
@@ -594,5 +604,43 @@ impl Route {
             })
             .collect();
         self.stages.push(stage);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Window;
+
+    const WINDOW: Window = Window {
+        anchor: 100,
+        frame: 30,
+        opens: 10,
+        open_for: 7,
+    };
+
+    /// Counts the time within slots one by one.
+    fn counted(from: u64, until: u64) -> u64 {
+        let is_open = |at: &u64| (10..17).contains(&((at - 100) % 30));
+        (from..until).filter(is_open).count() as u64
+    }
+
+    #[test]
+    fn the_time_within_slots_is_counted() {
+        for from in 100..180 {
+            for until in from..240 {
+                assert_eq!(WINDOW.between(from, until), counted(from, until));
+            }
+        }
+    }
+
+    #[test]
+    fn a_transmission_ends_in_the_slot_in_which_its_time_is_over() {
+        for from in 100..180 {
+            for duration in 1..40 {
+                let end = WINDOW.ends(from, duration);
+                assert_eq!(counted(from, end), duration, "{from} {duration}");
+                assert_eq!(counted(from, end - 1), duration - 1, "{from} {duration}");
+            }
+        }
     }
 }

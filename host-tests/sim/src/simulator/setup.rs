@@ -60,6 +60,10 @@ const KEYS: u64 = 1;
 
 /// Setup of a run.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an option of its own"
+)]
 pub struct Setup {
     /// Mission of every relay.
     pub mission: Mission,

@@ -13,6 +13,8 @@
 //! Every packet that arrives at a relay in time for its slot is sent in that slot. Headers, guard times, acknowledgements and
 //! transmission errors are not modelled: a hop carries its rate. Nothing is random.
 //!
+//! Data of a period may include packets that waited in queues before it, so that it can be more than the promised rate of that period.
+//!
 //! Work: one event for each packet and hop, at most [`MOST_SENT`].
 
 use std::cmp::Reverse;
@@ -137,7 +139,9 @@ pub struct Traffic {
     pub flows: Vec<Flow>,
 }
 
-/// Returns the delay that a fraction of `delays` (ascending) does not exceed, s; `None` without packets.
+/// Returns the delay that a fraction of `delays` does not exceed, s; `None` without packets.
+///
+/// `delays` are ascending.
 pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
     #[expect(
         clippy::cast_possible_truncation,
@@ -175,8 +179,15 @@ pub fn traffic(
         None => promised.collect(),
     };
     let packets = |rate_bps: f64| rate_bps / spec.link.packet_bits;
-    let slowest = offered.iter().copied().filter(|rate| *rate > 0.0);
-    let slowest = slowest.reduce(f64::min);
+    let expected = offered.iter().zip(&route.promised_bps);
+    let expected = expected.map(|(offered, promised)| {
+        if *promised > 0.0 {
+            offered.min(*promised)
+        } else {
+            *offered
+        }
+    });
+    let slowest = expected.filter(|rate| *rate > 0.0).reduce(f64::min);
     let after_s = match (outcome.ending, slowest) {
         (Ending::Soaked | Ending::OutOfTime, _) | (_, None) => 0.0,
         (_, Some(rate_bps)) => (AFTER + AFTER_A_HOP * (relays + 1)) as f64 / packets(rate_bps),
@@ -190,7 +201,15 @@ pub fn traffic(
     if sent > MOST_SENT {
         return Err(TrafficError::TooMany(sent));
     }
-    let until = time(end_s);
+    // Whole frames: the promised rate is the mean over a frame.
+    let last = route.stages.last().and_then(|stage| {
+        let mut hops = stage.hops.iter().flatten();
+        hops.next().map(|hop| hop.window)
+    });
+    let until = match last {
+        Some(window) if after_s > 0.0 => window.frame_end(time(end_s)),
+        _ => time(end_s),
+    };
     let flows = offered.iter().zip(&route.promised_bps).enumerate();
     let flows = flows.map(|(direction, (offered_bps, promised_bps))| {
         let mut running = Running::new(spec, &route, direction, *offered_bps);

@@ -127,7 +127,9 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
-/// Returns an upper bound on the data rate of `relays` relays and more, bit/s, from that on the rate of the hop to Rx.
+/// Returns an upper bound on the data rate of `relays` relays and more, bit/s.
+///
+/// `receiver_bps` is that on the rate of the hop to Rx.
 ///
 /// Fitted slots have one below that only if the steps of the radio limit the rates of the other hops.
 fn most_bps(radio: &Radio, relays: u16, receiver_bps: f64) -> f64 {
