@@ -113,7 +113,8 @@ impl Case {
 
     /// Returns the planner's rates for both ways at once, bit/s, each with half of the time.
     fn both_bps(&self, plan: &Plan) -> [f64; 2] {
-        let scene = Scene::new(&self.scenario, self.relays).unwrap();
+        let relays = u16::try_from(plan.places.len()).unwrap();
+        let scene = Scene::new(&self.scenario, relays).unwrap();
         let places: Vec<Place> = plan.places.iter().map(|(at, _)| (*at).into()).collect();
         let back = scene.hop_sirs_back(&places);
         [&plan.sirs, &back].map(|sirs| self.radio.chain_bps(sirs) / 2.0)
@@ -128,11 +129,18 @@ impl Case {
             ..Setup::new(mission)
         };
         let hops = TrueHops::new(&self.scenario, &setup, &mission);
+        // Slow chains send small packets, so that the traffic ends in time.
+        let places = plan(&self.scenario, &self.ask(Number::Of(relays))).unwrap();
+        let rates = self
+            .both_bps(&places)
+            .into_iter()
+            .filter(|rate| *rate > 0.0);
+        let slowest = rates.reduce(f64::min).unwrap_or(1.0);
         let outcome = run(setup).unwrap();
         let spec = TrafficSpec {
             link: DataLink {
                 radio: self.radio.clone(),
-                packet_bits: 12_000.0,
+                packet_bits: (10.0 * slowest).min(12_000.0),
                 both,
             },
             queue_packets: 50,
@@ -146,8 +154,9 @@ impl Case {
 
 /// Returns the delivered share of the planner's rate, and checks its bounds and the count of packets.
 ///
-/// The agreed positions differ from the planned ones by the tolerance. The rate at the agreed positions is never exceeded.
-fn share(flow: &Flow, promised_bps: f64, what: &str) -> f64 {
+/// The rate at the agreed positions is never exceeded. These differ from the planned ones: the rate to Rx by the tolerance, and that
+/// of the way back, for which positions are not chosen, by up to `most`.
+fn share(flow: &Flow, promised_bps: f64, most: f64, what: &str) -> f64 {
     let packets = flow.packets;
     let gone = packets.delivered + packets.dropped + packets.lost + flow.queued;
     assert_eq!(packets.offered, gone, "{what}");
@@ -158,7 +167,7 @@ fn share(flow: &Flow, promised_bps: f64, what: &str) -> f64 {
     let share = flow.delivered_bps / promised_bps;
     let own = flow.delivered_bps / flow.promised_bps;
     assert!(
-        own <= 1.0 + 1e-12 && (0.95..=1.0 + TOLERANCE).contains(&share),
+        own <= 1.0 + 1e-12 && (0.95..=1.0 + most).contains(&share),
         "{what}: {share} of {promised_bps} bit/s"
     );
     share
@@ -175,17 +184,19 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
         let promised_bps = case.radio.chain_bps(&best.sirs);
         carried += u32::from(promised_bps > 0.0);
         let sent = case.send(case.relays, false, None);
-        worst = worst.min(share(&sent.flows[0], promised_bps, &what));
+        worst = worst.min(share(&sent.flows[0], promised_bps, TOLERANCE, &what));
         // More is offered than promised: no more passes.
         let sent = case.send(case.relays, false, Some([1.5 * promised_bps; 2]));
         if promised_bps > 0.0 {
-            worst = worst.min(share(&sent.flows[0], promised_bps, &what));
+            worst = worst.min(share(&sent.flows[0], promised_bps, TOLERANCE, &what));
         }
         let promised = case.both_bps(&best);
         let sent = case.send(case.relays, true, None);
         assert_eq!(sent.flows.len(), 2);
-        for (flow, promised_bps) in sent.flows.iter().zip(promised) {
-            worst = worst.min(share(flow, promised_bps, &format!("{what}, both ways")));
+        let ways = sent.flows.iter().zip(promised).zip([TOLERANCE, 0.01]);
+        for ((flow, promised_bps), most) in ways {
+            let what = format!("{what}, both ways");
+            worst = worst.min(share(flow, promised_bps, most, &what));
         }
         // A target rate is met by the number of relays that the planner names.
         if seed % 5 == 0 && promised_bps > 0.0 && case.scenario.relays.is_empty() {

@@ -39,7 +39,7 @@ pub struct TrafficDetails {
     pub queue_packets: usize,
     /// Start, s of virtual time.
     pub from_s: f64,
-    /// End, s of virtual time.
+    /// Latest end of a direction, s of virtual time.
     pub until_s: f64,
     /// Each direction.
     pub flows: Vec<FlowReport>,
@@ -55,6 +55,8 @@ pub struct TrafficDetails {
 pub struct FlowReport {
     /// `forward`, from Tx to Rx, or `backward`.
     pub direction: &'static str,
+    /// End of its traffic, s of virtual time.
+    pub until_s: f64,
     /// Packets of the source.
     pub offered_packets: u64,
     /// Packets that arrived.
@@ -224,6 +226,7 @@ impl FlowReport {
         };
         Self {
             direction,
+            until_s: seconds(flow.until),
             offered_packets: offered,
             delivered_packets: delivered,
             dropped_packets: dropped,
@@ -237,7 +240,8 @@ impl FlowReport {
 
     fn text(&self) -> String {
         let mut text = format!(
-            "    packets: {} offered, {} delivered, {} dropped by full queues, {} lost with silent relays, {} in queues at the end\n",
+            "    packets until {:.3} s: {} offered, {} delivered, {} dropped by full queues, {} lost with silent relays, {} in queues at the end\n",
+            self.until_s,
             self.offered_packets,
             self.delivered_packets,
             self.dropped_packets,
@@ -274,7 +278,11 @@ impl FlowReport {
 impl PeriodReport {
     fn new(traffic: &Traffic, packet_bits: f64, (at, period): (usize, &Period), until: Ps) -> Self {
         let own = || traffic.flows.iter().filter_map(|flow| flow.periods.get(at));
-        let span_s = seconds(until.saturating_sub(period.from).max(1));
+        // The last period of a direction ends with its traffic.
+        let spans_s = traffic.flows.iter().map(|flow| {
+            let end = until.min(flow.until);
+            seconds(end.saturating_sub(period.from).max(1))
+        });
         let delays = |fraction| {
             let all = own().filter_map(|own| quantile_s(&own.delays, fraction));
             let all: Vec<f64> = all.collect();
@@ -296,7 +304,8 @@ impl PeriodReport {
             },
             promised_bps: period.promised_bps.clone(),
             delivered_bps: own()
-                .map(|own| own.packets.delivered as f64 * packet_bits / span_s)
+                .zip(spans_s)
+                .map(|(own, span_s)| own.packets.delivered as f64 * packet_bits / span_s)
                 .collect(),
             missing_packets: own()
                 .map(|own| own.packets.dropped + own.packets.lost)

@@ -108,6 +108,8 @@ pub struct QueueLength {
 /// Traffic in one direction.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flow {
+    /// End of the traffic in this direction.
+    pub until: Ps,
     /// Promised data rate at the first agreement, bit/s.
     pub promised_bps: f64,
     /// Offered data rate, bit/s.
@@ -131,7 +133,7 @@ pub struct Flow {
 pub struct Traffic {
     /// Start: the first agreement.
     pub from: Ps,
-    /// End.
+    /// Latest end of a direction.
     pub until: Ps,
     /// Periods.
     pub periods: Vec<Period>,
@@ -155,7 +157,8 @@ pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
 
 /// Sends packets through the chain of a run from its first agreement on; `None` if there was none.
 ///
-/// `outcome` has the recorded states of `relays` relays. A run that ends by itself goes on for some packets in its final state.
+/// `outcome` has the recorded states of `relays` relays. A run that ends by itself goes on in its final state, in each direction for
+/// 1000 packets and 30 more for each hop.
 ///
 /// # Errors
 /// [`TrafficError`].
@@ -179,47 +182,48 @@ pub fn traffic(
         None => promised.collect(),
     };
     let packets = |rate_bps: f64| rate_bps / spec.link.packet_bits;
-    let expected = offered.iter().zip(&route.promised_bps);
-    let expected = expected.map(|(offered, promised)| {
-        if *promised > 0.0 {
-            offered.min(*promised)
-        } else {
-            *offered
-        }
-    });
-    let slowest = expected.filter(|rate| *rate > 0.0).reduce(f64::min);
-    let after_s = match (outcome.ending, slowest) {
-        (Ending::Soaked | Ending::OutOfTime, _) | (_, None) => 0.0,
-        (_, Some(rate_bps)) => (AFTER + AFTER_A_HOP * (relays + 1)) as f64 / packets(rate_bps),
-    };
-    let end_s = ended as f64 / SECOND + after_s;
-    if end_s > LATEST_S {
-        return Err(TrafficError::TooLong(end_s));
-    }
-    let all: f64 = offered.iter().map(|rate| packets(*rate)).sum();
-    let sent = all * (end_s - from as f64 / SECOND) * (relays + 1) as f64;
-    if sent > MOST_SENT {
-        return Err(TrafficError::TooMany(sent));
-    }
     // Whole frames: the promised rate is the mean over a frame.
     let last = route.stages.last().and_then(|stage| {
         let mut hops = stage.hops.iter().flatten();
         hops.next().map(|hop| hop.window)
     });
-    let until = match last {
-        Some(window) if after_s > 0.0 => window.frame_end(time(end_s)),
-        _ => time(end_s),
+    let ends_itself = !matches!(outcome.ending, Ending::Soaked | Ending::OutOfTime);
+    let end_s = |offered_bps: f64, promised_bps: f64| {
+        let expected_bps = if promised_bps > 0.0 {
+            offered_bps.min(promised_bps)
+        } else {
+            offered_bps
+        };
+        let after_s = if ends_itself && expected_bps > 0.0 {
+            (AFTER + AFTER_A_HOP * (relays + 1)) as f64 / packets(expected_bps)
+        } else {
+            0.0
+        };
+        ended as f64 / SECOND + after_s
     };
-    let flows = offered.iter().zip(&route.promised_bps).enumerate();
-    let flows = flows.map(|(direction, (offered_bps, promised_bps))| {
-        let mut running = Running::new(spec, &route, direction, *offered_bps);
+    let mut flows = Vec::new();
+    let mut sent = 0.0;
+    for (offered_bps, promised_bps) in offered.iter().zip(&route.promised_bps) {
+        let end_s = end_s(*offered_bps, *promised_bps);
+        if end_s > LATEST_S {
+            return Err(TrafficError::TooLong(end_s));
+        }
+        sent += packets(*offered_bps) * (end_s - from as f64 / SECOND) * (relays + 1) as f64;
+        if sent > MOST_SENT {
+            return Err(TrafficError::TooMany(sent));
+        }
+        let until = match last {
+            Some(window) if ends_itself => window.frame_end(time(end_s)),
+            _ => time(end_s),
+        };
+        let mut running = Running::new(spec, &route, flows.len(), *offered_bps);
         running.run(&route, until);
-        running.end((from, until), [*promised_bps, *offered_bps])
-    });
+        flows.push(running.end((from, until), [*promised_bps, *offered_bps]));
+    }
     Ok(Some(Traffic {
         from,
-        until,
-        flows: flows.collect(),
+        until: flows.iter().map(|flow| flow.until).max().unwrap_or(ended),
+        flows,
         periods: route.periods.clone(),
     }))
 }
@@ -477,6 +481,7 @@ impl<'a> Running<'a> {
         let nodes = self.queues.iter().enumerate();
         let senders = nodes.filter(|(node, _)| *node != sink);
         Flow {
+            until,
             promised_bps,
             offered_bps,
             delivered_bps: packets.delivered as f64 * self.spec.link.packet_bits / span * SECOND,
