@@ -1,14 +1,20 @@
 //! Data link: how the hops share the radio, and the data rate that an SINR carries.
 //!
+//! With the bandwidth B, the spectral efficiency b in bit/s/Hz of a [`RateModel`] and N + 1 hops a chain carries
+//!
 //! ```text
-//! R = B b(SINR of the worst hop) / slots
+//! slots      R = B b(SINR of the worst hop) / (N + 1)    one frequency, equal time slots, as the paper assumes
+//! channels   R = B b(SINR of the worst hop)              a frequency for each hop
+//! fitted     1 / R = sum over hops of 1 / (B b(SINR))    one frequency, each slot as long as its hop needs
 //! ```
 //!
-//! with the bandwidth B, and the spectral efficiency b in bit/s/Hz of a [`RateModel`]. On one frequency every hop has a time slot of
-//! its own, as the paper assumes; with a frequency for each hop all hops send at the same time.
+//! These formulas are defined only here ([`Radio::chain_bps`]). Where data goes both ways, each direction has half of the time.
+
+use std::fmt;
 
 use serde::Deserialize;
 
+use crate::Scenario;
 use crate::number::factor;
 
 /// Access of the hops to the radio.
@@ -20,24 +26,27 @@ pub enum Access {
     Slots,
     /// A frequency for each hop.
     Channels,
+    /// A single frequency, with a time slot for each hop that is as long as the hop needs.
+    Fitted,
 }
 
 impl Access {
     /// Names in files.
-    pub const NAMES: &'static [&'static str] = &["slots", "channels"];
+    pub const NAMES: &'static [&'static str] = &["slots", "channels", "fitted"];
 
     /// Returns the name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Slots => "slots",
             Self::Channels => "channels",
+            Self::Fitted => "fitted",
         }
     }
 
     /// Returns the number of time slots in which a chain of `relays` relays forwards one packet per hop.
     pub const fn slots(self, relays: u16) -> u32 {
         match self {
-            Self::Slots => relays as u32 + 1,
+            Self::Slots | Self::Fitted => relays as u32 + 1,
             Self::Channels => 1,
         }
     }
@@ -75,23 +84,13 @@ impl RateModel {
     /// Returns the spectral efficiency at `sinr` (linear), bit/s/Hz.
     pub fn bits_per_hz(&self, sinr: f64) -> f64 {
         match self {
-            Self::Shannon { gap_db } => (sinr / factor(*gap_db)).ln_1p() / std::f64::consts::LN_2,
+            // `libm` gives the same result on every machine.
+            Self::Shannon { gap_db } => {
+                libm::log1p(sinr / factor(*gap_db)) / std::f64::consts::LN_2
+            }
             Self::Steps(steps) => {
                 let met = steps.iter().rfind(|step| sinr >= factor(step.sinr_db));
                 met.map_or(0.0, |step| step.bits_per_hz)
-            }
-        }
-    }
-
-    /// Returns the lowest SINR (linear) with this spectral efficiency, bit/s/Hz; `None` if no step has it.
-    pub fn sinr_for(&self, bits_per_hz: f64) -> Option<f64> {
-        match self {
-            Self::Shannon { gap_db } => {
-                Some((bits_per_hz * std::f64::consts::LN_2).exp_m1() * factor(*gap_db))
-            }
-            Self::Steps(steps) => {
-                let enough = steps.iter().find(|step| step.bits_per_hz >= bits_per_hz);
-                enough.map(|step| factor(step.sinr_db))
             }
         }
     }
@@ -108,9 +107,104 @@ pub struct Link {
     pub model: RateModel,
 }
 
+/// Data link of a chain and the bandwidth of one frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Radio {
+    /// Access and spectral efficiency.
+    pub link: Link,
+    /// Bandwidth, Hz, 1 to 1e12.
+    pub bandwidth_hz: f64,
+}
+
+/// Bandwidth that is missing, or given twice with different values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BandwidthError {
+    /// Neither an option nor the scenario has a bandwidth.
+    Missing,
+    /// The option contradicts the scenario.
+    Contradicts {
+        /// Bandwidth of the option, Hz.
+        option_hz: f64,
+        /// Bandwidth of `[link]`, Hz.
+        file_hz: f64,
+    },
+}
+
+impl fmt::Display for BandwidthError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing => f.write_str(
+                "the bandwidth is missing; allowed: --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz",
+            ),
+            Self::Contradicts { option_hz, file_hz } => write!(
+                f,
+                "--bandwidth-hz {option_hz:?}: contradicts link.bandwidth_hz = {file_hz:?} of the scenario; allowed: one of the two"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for BandwidthError {}
+
+impl Radio {
+    /// Returns the data link of `scenario`, by default that of an empty `[link]`.
+    ///
+    /// `option_hz` is the bandwidth of a command's option, if given.
+    ///
+    /// # Errors
+    /// [`BandwidthError`].
+    pub fn new(scenario: &Scenario, option_hz: Option<f64>) -> Result<Self, BandwidthError> {
+        let link = scenario.link.clone().unwrap_or_default();
+        if let (Some(option_hz), Some(file_hz)) = (option_hz, link.bandwidth_hz)
+            && option_hz.total_cmp(&file_hz).is_ne()
+        {
+            return Err(BandwidthError::Contradicts { option_hz, file_hz });
+        }
+        let bandwidth_hz = option_hz.or_else(|| scenario.bandwidth_hz());
+        Ok(Self {
+            link,
+            bandwidth_hz: bandwidth_hz.ok_or(BandwidthError::Missing)?,
+        })
+    }
+
+    /// Returns the data rate of a hop while it sends, bit/s; the interference counts as noise. `sir` is linear.
+    pub fn hop_bps(&self, sir: f64) -> f64 {
+        self.bandwidth_hz * self.link.model.bits_per_hz(sir)
+    }
+
+    /// Returns the data rate of a chain in one direction, bit/s, from the SIR (linear) of each of its hops.
+    ///
+    /// 0 without hops, and if a hop carries nothing.
+    pub fn chain_bps(&self, sirs: &[f64]) -> f64 {
+        let rates = || sirs.iter().map(|sir| self.hop_bps(*sir));
+        let worst = rates().reduce(f64::min).unwrap_or(0.0);
+        match self.link.access {
+            Access::Slots => worst / sirs.len().max(1) as f64,
+            Access::Channels => worst,
+            Access::Fitted if worst > 0.0 => 1.0 / rates().map(|rate| 1.0 / rate).sum::<f64>(),
+            Access::Fitted => 0.0,
+        }
+    }
+
+    /// Returns how `hops` hops share the radio, as the beginning of a sentence.
+    pub fn sharing(&self, hops: usize) -> String {
+        match self.link.access {
+            Access::Slots => {
+                format!("{hops} hops share one frequency in {hops} equal time slots")
+            }
+            Access::Channels => format!("{hops} hops have a frequency each"),
+            Access::Fitted => {
+                format!("{hops} hops share one frequency in time slots as long as each hop needs")
+            }
+        }
+    }
+}
+
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
-    use super::{RateModel, RateStep};
+    use super::{Access, BandwidthError, Link, Radio, RateModel, RateStep};
+    use crate::Scenario;
 
     fn steps() -> RateModel {
         RateModel::Steps(vec![
@@ -130,8 +224,6 @@ mod tests {
         let model = RateModel::Shannon { gap_db: 3.0 };
         let expected = (1.0 + 7.0 / 10_f64.powf(0.3)).log2();
         assert!((model.bits_per_hz(7.0) - expected).abs() < 1e-12);
-        let back = model.sinr_for(expected).unwrap();
-        assert!((back - 7.0).abs() < 1e-9, "{back}");
     }
 
     #[test]
@@ -149,8 +241,49 @@ mod tests {
                 "{sinr}"
             );
         }
-        assert_eq!(model.sinr_for(0.1), Some(1.0));
-        assert_eq!(model.sinr_for(0.6), Some(10.0));
-        assert_eq!(model.sinr_for(2.1), None);
+    }
+
+    #[test]
+    fn access_divides_the_rates_of_the_hops() {
+        let rate = |access, sirs: &[f64]| {
+            let radio = Radio {
+                link: Link {
+                    access,
+                    bandwidth_hz: None,
+                    model: steps(),
+                },
+                bandwidth_hz: 1e6,
+            };
+            radio.chain_bps(sirs)
+        };
+        // Rates of 2, 0.5 and 2 Mbit/s.
+        let sirs = [10.0, 1.0, 20.0];
+        assert!((rate(Access::Slots, &sirs) - 5e5 / 3.0).abs() < 1e-6);
+        assert!((rate(Access::Channels, &sirs) - 5e5).abs() < 1e-6);
+        assert!((rate(Access::Fitted, &sirs) - 1e6 / 3.0).abs() < 1e-6);
+        for access in [Access::Slots, Access::Channels, Access::Fitted] {
+            assert!(rate(access, &[10.0, 0.9]).abs() < f64::EPSILON);
+            assert!(rate(access, &[]).abs() < f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn a_rate_needs_one_bandwidth() {
+        let mut scenario = Scenario::default();
+        assert_eq!(Radio::new(&scenario, None), Err(BandwidthError::Missing));
+        let own = Radio::new(&scenario, Some(2e6)).unwrap();
+        assert!((own.bandwidth_hz - 2e6).abs() < f64::EPSILON);
+        scenario.link = Some(Link {
+            bandwidth_hz: Some(1e6),
+            ..Link::default()
+        });
+        assert!(Radio::new(&scenario, None).is_ok());
+        assert!(Radio::new(&scenario, Some(1e6)).is_ok());
+        let differs = Radio::new(&scenario, Some(2e6)).unwrap_err();
+        assert!(
+            differs
+                .to_string()
+                .starts_with("--bandwidth-hz 2000000.0: contradicts link.bandwidth_hz = 1000000.0")
+        );
     }
 }

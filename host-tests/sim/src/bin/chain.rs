@@ -57,6 +57,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let outcome = fly(&run, recorded, capture.as_mut())?;
     capture.map_or(Ok(()), AirCapture::finish)?;
     let mut report = run.report(&outcome);
+    report.traffic = run.traffic(&outcome)?;
     if run.setup.attack.is_some() {
         let quiet = Setup {
             attack: None,

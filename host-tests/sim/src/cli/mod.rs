@@ -5,8 +5,9 @@
 //! | parse the options | [`Options`] |
 //! | prepare a run from a scenario and options | [`Prepared::new`] |
 //! | run the chain | [`Prepared::fly`] |
-//! | report and draw the outcome | [`Prepared::report`], [`Prepared::picture`] |
+//! | report and draw the outcome | [`Prepared::report`], [`Prepared::traffic`], [`Prepared::picture`] |
 
+mod data;
 mod hostile;
 mod options;
 mod prepared;

@@ -8,6 +8,7 @@ use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
+use super::data::Data;
 use super::hostile::Hostile;
 use crate::command::{Failure, file, number, whole};
 use crate::simulator::setup::Setup;
@@ -75,6 +76,9 @@ pub struct Options {
     /// Measurement options.
     #[command(flatten)]
     pub listening: Listening,
+    /// Data traffic options.
+    #[command(flatten)]
+    pub data: Data,
     /// Failure, attack and upload options.
     #[command(flatten)]
     pub hostile: Hostile,

@@ -8,11 +8,15 @@ use uav_relay_scenario::{Interference, Scenario};
 
 use super::options::{Method, Options};
 use crate::command::{self, Failure};
-use crate::report::{self, AirReport, AllInterferersReport, ChainReport, SensingReport, timeline};
+use crate::report::{
+    self, AirReport, AllInterferersReport, ChainReport, SensingReport, TrafficReport, timeline,
+};
 use crate::simulator::chain::Chain;
 use crate::simulator::faults::Faults;
 use crate::simulator::outcome::{Outcome, RelayEnd};
+use crate::simulator::route::TrueHops;
 use crate::simulator::setup::Setup;
+use crate::simulator::traffic::{TrafficSpec, traffic};
 use crate::simulator::true_interference::beta_w;
 use crate::svg::{OtherInterferers, Picture, room};
 
@@ -25,6 +29,8 @@ pub struct Prepared<'a> {
     /// Setup of the run.
     pub setup: Setup,
     told: Mission,
+    /// Requested data traffic.
+    data: Option<TrafficSpec>,
 }
 
 /// Reason why a run was not started.
@@ -108,6 +114,8 @@ impl<'a> Prepared<'a> {
         setup.profiles = profiles;
         setup.held = mission::held(&scenario, options.uavs);
         let told = setup.mission;
+        let data = options.data.spec(&scenario)?;
+        setup.track = data.is_some();
         options
             .listening
             .prepare(&mut setup, &scenario, options.uavs)?;
@@ -117,6 +125,7 @@ impl<'a> Prepared<'a> {
             method,
             setup,
             told,
+            data,
         })
     }
 
@@ -174,6 +183,20 @@ impl<'a> Prepared<'a> {
         report
     }
 
+    /// Returns the data traffic of a run; `None` if it is not requested, or without an agreement.
+    ///
+    /// # Errors
+    /// Traffic that is too much to simulate.
+    pub fn traffic(&self, outcome: &Outcome) -> Result<Option<TrafficReport>, Failure> {
+        let Some(spec) = &self.data else {
+            return Ok(None);
+        };
+        let hops = TrueHops::new(&self.scenario, &self.setup, &self.told);
+        let traffic = traffic(spec, &hops, outcome, self.options.uavs.into());
+        let traffic = traffic.map_err(|error| Failure::input(error.to_string()))?;
+        Ok(traffic.map(|traffic| TrafficReport::new(spec, &traffic)))
+    }
+
     /// Returns the SIR of every hop from Tx to Rx, linear, with the true interference at `then`.
     ///
     /// `places` has the relays' indices (from 1) and positions in the order of the chain. The mission is the one
@@ -204,6 +227,8 @@ impl<'a> Prepared<'a> {
 fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
     options.agree(method)?;
     options.listening.agree()?;
+    let uploads = options.hostile.uploads.are_planned();
+    options.data.agree(&scenario.interference, uploads)?;
     options
         .hostile
         .agree(options.uavs, options.closed_loop.is_some())?;
@@ -218,7 +243,6 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         };
         return Err(Failure::input(line));
     }
-    let uploads = options.hostile.uploads.are_planned();
     if uploads && is_field {
         let line = "--upload needs an [[interferer]], and the scenario has a [field]";
         return Err(Failure::input(line));

@@ -12,6 +12,7 @@ use super::attack::AttackReport;
 use super::hops::{LostReport, RelayReport, db, hop_sirs};
 use super::sensing::SensingReport;
 use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
+use super::traffic::TrafficReport;
 use super::{hops, timeline};
 use crate::simulator::drones::{Point, apart, point};
 use crate::simulator::medium::{Access, AirCounts};
@@ -119,6 +120,9 @@ pub struct ChainReport {
     /// Result of the attack, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attack: Option<AttackReport>,
+    /// Data traffic, if requested and if there was an agreement.
+    #[serde(flatten)]
+    pub traffic: Option<TrafficReport>,
     /// Seed of every random draw.
     pub seed: u64,
     /// True if relays may leave the line: the table then has a y column.
@@ -307,6 +311,9 @@ impl ChainReport {
         }
         text += &timeline::text(&self.timeline);
         text += &timeline::recovery_text(&self.recovery);
+        if let Some(traffic) = &self.traffic {
+            text += &traffic.text();
+        }
         text
     }
 

@@ -5,9 +5,11 @@ pub mod chain;
 pub mod hops;
 pub mod sensing;
 pub mod timeline;
+pub mod traffic;
 
 pub use attack::AttackReport;
 pub use chain::{AirReport, AllInterferersReport, ChainReport, flown};
 pub use hops::{RelayReport, db, hop_sirs, hops_table, relays};
 pub use sensing::SensingReport;
 pub use timeline::seconds;
+pub use traffic::TrafficReport;

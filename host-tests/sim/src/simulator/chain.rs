@@ -23,6 +23,7 @@ use super::faults::{Bursts, Line};
 use super::fleet::Vehicle;
 use super::medium::{Access, AirCounts, AirEvent, Medium};
 use super::outcome::{Film, Outcome, Record, RelayEnd, TimelineEvent};
+use super::route::Track;
 use super::setup::Setup;
 use super::watch::{Run, Seen, Watch};
 use fleet::LANDS_AFTER;
@@ -425,6 +426,7 @@ impl Chain {
             }
         }
         let film = setup.film.then(Film::default);
+        let track = setup.track.then(Track::default);
         let record = setup.record.then(Record::default);
         let mut chain = Self {
             stations,
@@ -435,6 +437,7 @@ impl Chain {
             outcome: Outcome {
                 margin_m: f64::INFINITY,
                 film,
+                track,
                 ..Outcome::default()
             },
             now: Instant::ZERO,

@@ -10,6 +10,8 @@
 //! | [`true_interference`] | interferers that the relays must find by measuring |
 //! | [`drones`] | simple drone dynamics with position errors |
 //! | [`fleet`] | drones with simulated autopilots and pilots |
+//! | [`route`] | the hops of the data through the chain over time: true rates and time slots |
+//! | [`traffic`] | packets on that route, with a queue at every node |
 //! | [`watch`] | availability of the chain over time, against the longest possible chain and its best positions |
 //! | [`chain`] | the event loop that connects the relays; the same run with many seeds |
 
@@ -20,6 +22,8 @@ pub mod faults;
 pub mod fleet;
 pub mod medium;
 pub mod outcome;
+pub mod route;
 pub mod setup;
+pub mod traffic;
 pub mod true_interference;
 pub mod watch;

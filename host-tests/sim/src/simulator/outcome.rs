@@ -10,6 +10,7 @@ use super::attack::Struck;
 use super::drones::{Nearest, Point};
 use super::faults::Injected;
 use super::medium::AirCounts;
+use super::route::Track;
 use super::true_interference::Stand;
 use super::watch::Seen;
 
@@ -213,6 +214,8 @@ pub struct Outcome {
     pub stands: Vec<Stand>,
     /// Film of the run, if [`Setup::film`](super::setup::Setup::film) was set.
     pub film: Option<Film>,
+    /// States of the relays for the traffic, if [`Setup::track`](super::setup::Setup::track) was set.
+    pub track: Option<Track>,
 }
 
 impl Outcome {

@@ -60,6 +60,10 @@ const KEYS: u64 = 1;
 
 /// Setup of a run.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an option of its own"
+)]
 pub struct Setup {
     /// Mission of every relay.
     pub mission: Mission,
@@ -109,6 +113,8 @@ pub struct Setup {
     pub record: bool,
     /// True to record [`Outcome::film`](super::outcome::Outcome::film).
     pub film: bool,
+    /// True to record [`Outcome::track`](super::outcome::Outcome::track).
+    pub track: bool,
     /// Seed of every random draw.
     pub seed: u64,
     /// Latest end of the run.
@@ -146,6 +152,7 @@ impl Setup {
             faults_end: None,
             record: false,
             film: false,
+            track: false,
             seed: 1,
             deadline: Instant::from_millis(1_000 * 3_600 * 24 * 30),
         }

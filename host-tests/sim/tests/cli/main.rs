@@ -11,6 +11,7 @@
 mod capture;
 mod hostile;
 mod methods;
+mod traffic;
 mod upload;
 
 use std::fmt::Write as _;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
 use uav_relay_scenario::deployment::{Companion, Deployment, agree};
-use uav_relay_scenario::link::Access;
+use uav_relay_scenario::link::{Access, BandwidthError, Radio};
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_sim::svg::{Picture, room};
@@ -13,7 +13,7 @@ use uav_relay_sim::{command, svg};
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
 use uav_relay_tools::plan::map::{Map, geojson, kml};
-use uav_relay_tools::plan::rate::{Radio, Rates};
+use uav_relay_tools::plan::rate::Rates;
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
@@ -68,16 +68,11 @@ fn run(options: &Options) -> Result<(), Failure> {
                 command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
             }
             write_map(options, &scenario, &plan)?;
-            let next = write_out(options, &scenario, &plan, number)?;
+            let next = write_out(options, &scenario, (&plan, number), radio.as_ref())?;
             let rates = rates.map(listed);
-            let asked = match options.wanted.target_rate_bps {
-                // The SIR that a rate needs was not itself requested.
-                Some(_) => Number::Of(uavs),
-                None => number,
-            };
             show(
                 options,
-                &PlanReport::new(&plan, asked, options.unit())
+                &PlanReport::new(&plan, number, options.unit())
                     .with_way_back(&scenario, &plan)
                     .with_rates(rates)
                     .in_noise(&scenario.noise),
@@ -131,29 +126,17 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     if !is_asked && scenario.link.is_none() {
         return Ok(None);
     }
-    let of_file = scenario.link.as_ref().and_then(|link| link.bandwidth_hz);
-    if let (Some(own), Some(file)) = (options.bandwidth_hz, of_file)
-        && own.total_cmp(&file).is_ne()
-    {
-        return Err(Failure::input(format!(
-            "--bandwidth-hz {own:?}: contradicts link.bandwidth_hz = {file:?} of {}; allowed: one of the two",
-            options.file()
-        )));
-    }
-    let Some(bandwidth_hz) = options.bandwidth_hz.or_else(|| scenario.bandwidth_hz()) else {
-        let asked = match (target_bps, options.rates) {
-            (Some(target_bps), _) => format!("--target-rate-bps {target_bps:?}"),
-            (None, true) => "--rates".to_owned(),
-            (None, false) => format!("{}: link", options.file()),
+    let refused = |error: BandwidthError| {
+        let asked = match (error, target_bps, options.rates) {
+            (BandwidthError::Contradicts { .. }, ..) => options.file(),
+            (_, Some(target_bps), _) => format!("--target-rate-bps {target_bps:?}"),
+            (_, None, true) => "--rates".to_owned(),
+            (_, None, false) => format!("{}: link", options.file()),
         };
-        return Err(Failure::input(format!(
-            "{asked}: the bandwidth is missing; allowed: --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz"
-        )));
+        Failure::input(format!("{asked}: {error}"))
     };
-    Ok(Some(Radio {
-        link: scenario.link.clone().unwrap_or_default(),
-        bandwidth_hz,
-    }))
+    let radio = Radio::new(scenario, options.bandwidth_hz).map_err(refused)?;
+    Ok(Some(radio))
 }
 
 /// Plans for a number of relays or an SIR, with data rates over `radio` if there is one.
@@ -182,12 +165,9 @@ fn by_rate(
     let Rates { best, all, meeting } = Rates::new(scenario, ask, radio, Some(target_bps))?;
     let rates = RateReport::new(meeting.as_ref(), radio, Some(target_bps), best, all);
     let relays = meeting.as_ref().map_or(0, |plan| plan.places.len());
-    let relays = u16::try_from(relays).unwrap_or(u16::MAX);
-    // A chain that carries the rate has the SIR for it.
-    let needed = radio.sir_for(relays, target_bps).unwrap_or(f64::INFINITY);
     Ok(Planned {
         plan: meeting,
-        number: Number::Meeting(needed),
+        number: Number::Of(u16::try_from(relays).unwrap_or(u16::MAX)),
         rates: Some(rates),
     })
 }
@@ -202,6 +182,8 @@ fn too_fast(rates: &RateReport) -> String {
     };
     let shared = if rates.access == Access::Slots.name() {
         "all hops share one frequency in equal time slots"
+    } else if rates.access == Access::Fitted.name() {
+        "all hops share one frequency in time slots as long as each hop needs"
     } else {
         "every hop has a frequency of its own"
     };
@@ -265,7 +247,7 @@ struct Options {
     x_m: Option<f64>,
     /// Bandwidth of one frequency, hertz, 1 to 1e12. The default is link.bandwidth_hz, or else noise.bandwidth_hz. Adds the data rate:
     /// that of the worst hop by the rate model of the scenario (link), by default log2(1 + SIR) bit/s per hertz, divided by the N + 1 time slots
-    /// unless link.access is "channels"; and the number of relays with the largest data rate
+    /// unless link.access is "channels" or "fitted"; and the number of relays with the largest data rate
     #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 1.0, 1e12))]
     bandwidth_hz: Option<f64>,
     /// List the data rate of 1, 2, 3 and more relays, up to the number where no larger one can carry more. Needs a bandwidth
@@ -390,8 +372,8 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
 fn write_out(
     options: &Options,
     scenario: &Scenario,
-    plan: &Plan,
-    number: Number,
+    (plan, number): (&Plan, Number),
+    radio: Option<&Radio>,
 ) -> Result<String, Failure> {
     let Some(file) = &options.out else {
         return Ok(String::new());
@@ -422,6 +404,16 @@ fn write_out(
             file.display(),
             db(target)
         )));
+    }
+    if let (Some(target_bps), Some(radio)) = (options.wanted.target_rate_bps, radio) {
+        let rate_bps = radio.chain_bps(&flown.plan.sirs);
+        if rate_bps < target_bps * (1.0 - options.tolerance) {
+            return Err(Failure::unmet(format!(
+                "--out {}: not written: {relays} relays by themselves carry {rate_bps:.6e} bit/s, and the target is {target_bps:.6e} \
+                 bit/s; ask for more by --uavs",
+                file.display()
+            )));
+        }
     }
     let text = match &options.scenario {
         Some(scenario) => std::fs::read_to_string(scenario)

@@ -1,11 +1,11 @@
 //! Data rates of a chain over the number of relays.
 //!
 //! The paper assumes one frequency, so each hop sends in one of N + 1 slots: more relays raise the SIR of the worst hop but shorten
-//! the slots. With a frequency for each hop only the SIR counts. Slots fitted to the hops, and frequencies that several hops use at
-//! the same time, are not modelled.
+//! the slots. With a frequency for each hop only the SIR counts. Slots fitted to the hops change the rate, not the positions: these
+//! are those of the largest SIR of the worst hop. Frequencies that several hops use at the same time are not modelled.
 
 use serde::Serialize;
-use uav_relay_scenario::link::Link;
+use uav_relay_scenario::link::{Access, Radio, RateModel};
 use uav_relay_scenario::{Interference, Scenario};
 
 use super::{NoPlan, Number, Plan, PlanRequest};
@@ -15,40 +15,6 @@ const MOST_FAST: u16 = 200;
 
 /// Largest number of relays tried where a plan takes seconds.
 const MOST_SLOW: u16 = 20;
-
-/// Data link of a chain and the bandwidth of one frequency.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Radio {
-    /// Access and spectral efficiency.
-    pub link: Link,
-    /// Bandwidth, Hz.
-    pub bandwidth_hz: f64,
-}
-
-impl Radio {
-    /// Returns the number of time slots of a chain of `relays` relays.
-    pub const fn slots(&self, relays: u16) -> u32 {
-        self.link.access.slots(relays)
-    }
-
-    /// Returns the data rate of a hop while it sends, bit/s; the interference counts as noise. `sir` is linear.
-    pub fn hop_bps(&self, sir: f64) -> f64 {
-        self.bandwidth_hz * self.link.model.bits_per_hz(sir)
-    }
-
-    /// Returns the data rate of a chain of `relays` relays, bit/s; `sir` is that of the worst hop, linear.
-    pub fn chain_bps(&self, relays: u16, sir: f64) -> f64 {
-        self.hop_bps(sir) / f64::from(self.slots(relays))
-    }
-
-    /// Returns the SIR (linear) that every hop of `relays` relays needs for a data rate.
-    ///
-    /// `None` if no step carries it.
-    pub fn sir_for(&self, relays: u16, rate_bps: f64) -> Option<f64> {
-        let hop_bps = rate_bps * f64::from(self.slots(relays));
-        self.link.model.sinr_for(hop_bps / self.bandwidth_hz)
-    }
-}
 
 /// Data rate of one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -98,11 +64,10 @@ impl Rates {
         let mut all = Vec::new();
         let mut meeting = None;
         let mut refused = None;
-        let mut bound_bps = f64::INFINITY;
+        let mut receiver_bps = f64::INFINITY;
         for relays in 1..=most {
             if let Some(best) = &mut best {
-                best.best_is_proven =
-                    bound_bps / f64::from(radio.slots(relays)) <= best.best_rate_bps;
+                best.best_is_proven = most_bps(radio, relays, receiver_bps) <= best.best_rate_bps;
                 if best.best_is_proven {
                     break;
                 }
@@ -120,9 +85,9 @@ impl Rates {
                 }
             };
             if relays == 1 {
-                bound_bps = radio.hop_bps(most_at_receiver(scenario, &plan));
+                receiver_bps = radio.hop_bps(most_at_receiver(scenario, &plan));
             }
-            let rate_bps = radio.chain_bps(relays, plan.sir());
+            let rate_bps = radio.chain_bps(&plan.sirs);
             all.push(RateOf {
                 uavs: relays,
                 rate_bps,
@@ -162,6 +127,22 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
+/// Returns an upper bound on the data rate of `relays` relays and more, bit/s.
+///
+/// `receiver_bps` is that on the rate of the hop to Rx.
+///
+/// Fitted slots have one below that only if the steps of the radio limit the rates of the other hops.
+fn most_bps(radio: &Radio, relays: u16, receiver_bps: f64) -> f64 {
+    let relays = f64::from(relays);
+    match (radio.link.access, &radio.link.model) {
+        (Access::Slots, _) => receiver_bps / (relays + 1.0),
+        (Access::Channels, _) | (Access::Fitted, RateModel::Shannon { .. }) => receiver_bps,
+        (Access::Fitted, RateModel::Steps(_)) => {
+            1.0 / (relays / radio.hop_bps(f64::INFINITY) + 1.0 / receiver_bps)
+        }
+    }
+}
+
 /// Returns an upper bound on the SIR (linear) at Rx for any number of relays, from that of `plan`.
 ///
 /// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest altitude and with
@@ -182,32 +163,4 @@ fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
         .filter_map(|own| own.power_w)
         .fold(scenario.uav_w, f64::max);
     sir * squared / (lowest * lowest) * largest_w / f64::from(profile.power_w)
-}
-
-#[cfg(test)]
-mod tests {
-    use uav_relay_scenario::link::{Access, Link, RateModel, RateStep};
-
-    use super::Radio;
-
-    #[test]
-    fn hops_with_frequencies_of_their_own_share_no_time() {
-        let steps = [(0.0, 0.5), (10.0, 2.0)].map(|(sinr_db, bits_per_hz)| RateStep {
-            sinr_db,
-            bits_per_hz,
-        });
-        let radio = |access| Radio {
-            link: Link {
-                access,
-                bandwidth_hz: None,
-                model: RateModel::Steps(steps.to_vec()),
-            },
-            bandwidth_hz: 1e6,
-        };
-        let rate = |access| radio(access).chain_bps(4, 20.0);
-        assert!((rate(Access::Slots) - 4e5).abs() < 1e-6);
-        assert!((rate(Access::Channels) - 2e6).abs() < 1e-6);
-        assert_eq!(radio(Access::Slots).sir_for(4, 4e5), Some(10.0));
-        assert_eq!(radio(Access::Slots).sir_for(4, 4.1e5), None);
-    }
 }

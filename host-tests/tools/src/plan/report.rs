@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use uav_relay::Placement;
+use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Noise, Scenario};
 use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
 
-use super::rate::{BestRate, Radio, RateOf};
+use super::rate::{BestRate, RateOf};
 use super::{Number, Plan, Unit, Why};
 
 /// The hypothetical interferer that replaces several.
@@ -41,7 +42,7 @@ pub struct HypotheticalReport {
 /// Data rates of a chain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
-    /// Data rate of the chain, bit/s: that of the worst hop over the number of slots. Absent without a plan.
+    /// Data rate of the chain, bit/s. Absent without a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<f64>,
     /// Data rate of the worst hop while it sends, bit/s.
@@ -66,6 +67,9 @@ pub struct RateReport {
     /// Number of relays of the plan; 0 without a plan.
     #[serde(skip)]
     relays: u16,
+    /// Description of the access of the plan's hops to the radio.
+    #[serde(skip)]
+    sharing: String,
 }
 
 impl RateReport {
@@ -80,9 +84,10 @@ impl RateReport {
         let relays = plan.map(|plan| u16::try_from(plan.places.len()).unwrap_or(u16::MAX));
         let relays = relays.unwrap_or(0);
         Self {
-            rate_bps: plan.map(|plan| radio.chain_bps(relays, plan.sir())),
+            rate_bps: plan.map(|plan| radio.chain_bps(&plan.sirs)),
             hop_rate_bps: plan.map(|plan| radio.hop_bps(plan.sir())),
-            slots: plan.map(|_| radio.slots(relays)),
+            slots: plan.map(|_| radio.link.access.slots(relays)),
+            sharing: radio.sharing(usize::from(relays) + 1),
             access: radio.link.access.name(),
             bandwidth_hz: radio.bandwidth_hz,
             target_rate_bps,
@@ -93,18 +98,11 @@ impl RateReport {
     }
 
     fn describe(&self, text: &mut String) {
-        if let (Some(rate_bps), Some(hop_bps), Some(slots)) =
-            (self.rate_bps, self.hop_rate_bps, self.slots)
-        {
-            let hops = u32::from(self.relays) + 1;
-            let shared = if slots > 1 {
-                format!("{hops} hops share one frequency in {slots} equal time slots, and ")
-            } else {
-                format!("{hops} hops have a frequency each, and ")
-            };
+        if let (Some(rate_bps), Some(hop_bps)) = (self.rate_bps, self.hop_rate_bps) {
             _ = writeln!(
                 text,
-                "data rate: {rate_bps:.6e} bit/s: {shared}the worst hop carries {hop_bps:.6e} bit/s while it sends"
+                "data rate: {rate_bps:.6e} bit/s: {}, and the worst hop carries {hop_bps:.6e} bit/s while it sends",
+                self.sharing
             );
         }
         if let Some(target_bps) = self.target_rate_bps {

@@ -10,7 +10,7 @@ use uav_relay_scenario::scene::Scene;
 use super::air::{Receiver, link};
 use super::{Chain, Member, QueuedEvent};
 use crate::simulator::attack::{AttackKind, Attacker, NETWORK, Way, destination, fate, forge};
-use crate::simulator::drones::{Drone, placement};
+use crate::simulator::drones::{Drone, Point, placement};
 use crate::simulator::faults::Line;
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::{Link, Moment, TimelineEvent};
@@ -192,6 +192,15 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
 }
 
 impl Chain {
+    /// Returns the position of the drone of relay `index` (from 0); `None` if drones are not simulated.
+    pub(super) fn drone(&self, index: usize) -> Option<Point> {
+        let flight = self.flight.as_ref();
+        flight
+            .and_then(|flight| flight.drones.get(index))
+            .map(Drone::taken)
+            .or_else(|| self.fleet.get(index).map(Vehicle::at))
+    }
+
     /// Measures at every living relay and takes a snapshot of the positions.
     pub(super) fn measure_all(&mut self) {
         let Some(sky) = self.setup.sky.clone() else {
@@ -209,13 +218,7 @@ impl Chain {
             }
         }
         for index in 0..self.members.len() {
-            let flown = self
-                .flight
-                .as_ref()
-                .and_then(|flight| flight.drones.get(index))
-                .map(Drone::taken)
-                .or_else(|| self.fleet.get(index).map(Vehicle::at))
-                .map(placement);
+            let flown = self.drone(index).map(placement);
             let Some(member) = self.members.get_mut(index) else {
                 continue;
             };

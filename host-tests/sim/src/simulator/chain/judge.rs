@@ -1,10 +1,14 @@
 //! Updates of the run's statistics after each event.
 
+use std::ops::Range;
+
 use uav_relay::{Event, Instant, Method, Phase, Placement, Side, Wiring};
 
 use super::ground::Station;
 use super::{Chain, Member, QueuedEvent};
+use crate::simulator::drones::point;
 use crate::simulator::outcome::{Ending, Moment, TimelineEvent};
+use crate::simulator::route::RelayState;
 use crate::simulator::watch::{Run, Seen, Watch, longest};
 
 /// Relays that an event may have changed.
@@ -39,6 +43,7 @@ impl Chain {
         if touched == Touched::Nobody {
             return;
         }
+        self.track(touched);
         let Some(mut watch) = self.watch.take() else {
             return;
         };
@@ -46,11 +51,38 @@ impl Chain {
         self.watch = Some(watch);
     }
 
-    fn take_in(&self, watch: &mut Watch, touched: Touched) {
-        let range = match touched {
+    /// Records the states of relays for the traffic.
+    fn track(&mut self, touched: Touched) {
+        let Some(mut track) = self.outcome.track.take() else {
+            return;
+        };
+        let range = self.range(touched);
+        let changed = self.members.get(range.clone()).unwrap_or_default();
+        for (index, member) in range.zip(changed) {
+            let setpoint = member.relay.setpoint().map(point);
+            let drone = self.drone(index);
+            let state = RelayState {
+                seen: Seen {
+                    place: setpoint.map(|setpoint| drone.unwrap_or(setpoint)),
+                    ..seen(member)
+                },
+                agreed: member.relay.agreed_place().map(point),
+            };
+            track.see(self.now, index, state);
+        }
+        self.outcome.track = Some(track);
+    }
+
+    /// Returns the relays that an event has touched, from 0.
+    fn range(&self, touched: Touched) -> Range<usize> {
+        match touched {
             Touched::One(index) => index..index + 1,
             _ => 0..self.members.len(),
-        };
+        }
+    }
+
+    fn take_in(&self, watch: &mut Watch, touched: Touched) {
+        let range = self.range(touched);
         let mut is_new = touched == Touched::All;
         let fresh = self.members.get(range.clone()).unwrap_or_default();
         for (at, member) in range.zip(fresh) {

@@ -1,0 +1,86 @@
+//! Options for data traffic over the agreed chain.
+
+use clap::{Args, ValueEnum};
+use uav_relay_scenario::link::Radio;
+use uav_relay_scenario::{Interference, Scenario};
+
+use super::options::given;
+use crate::command::{Failure, number, whole};
+use crate::simulator::route::DataLink;
+use crate::simulator::traffic::TrafficSpec;
+
+/// Command-line options for data traffic.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Data traffic")]
+pub struct Data {
+    /// Send packets through the chain: from Tx to Rx (forward, the default), or both ways. They start at the first agreement; both
+    /// ways have half of the time each. Every hop has its own data rate, by the data link of the scenario (link), and every node a queue. Reports promised,
+    /// offered and delivered data rates, delays and queue lengths. A run that ends by itself goes on for 1000 packets, and 30 more
+    /// for each hop
+    #[arg(long, value_name = "WAY", value_enum, num_args = 0..=1, default_missing_value = "forward")]
+    traffic: Option<Way>,
+    /// Bandwidth of one frequency, hertz, 1 to 1e12. The default is link.bandwidth_hz, or else noise.bandwidth_hz, of the scenario
+    #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e12))]
+    bandwidth_hz: Option<f64>,
+    /// Offered data rate, bit/s, 1e-3 to 1e12, each way; default: the promised rate of the first agreement
+    #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-3, 1e12))]
+    offer_bps: Option<f64>,
+    /// Size of a packet, bytes, 1 to 1000000000; default 1500
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 1_000_000_000))]
+    packet_bytes: Option<u32>,
+    /// Largest number of packets in the queue of a node, 1 to 100000; default 100
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
+    queue_packets: Option<u32>,
+}
+
+/// Direction of the traffic.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Way {
+    /// From Tx to Rx
+    Forward,
+    /// From Tx to Rx and from Rx to Tx
+    Both,
+}
+
+impl Data {
+    /// Rejects traffic options without `--traffic`, and a way back whose SIRs are not known.
+    pub(super) fn agree(&self, interference: &Interference, uploads: bool) -> Result<(), Failure> {
+        let told = [
+            given("--bandwidth-hz", self.bandwidth_hz),
+            given("--offer-bps", self.offer_bps),
+            given("--packet-bytes", self.packet_bytes),
+            given("--queue-packets", self.queue_packets),
+        ];
+        let line = match (told.into_iter().flatten().next(), self.traffic) {
+            (Some(option), None) => format!("{option}: would be ignored without --traffic"),
+            (_, Some(Way::Both)) if matches!(interference, Interference::Field(_)) => {
+                "--traffic both: in a [field] the interference at Tx is not known; allowed: forward"
+                    .to_owned()
+            }
+            (_, Some(Way::Both)) if uploads => {
+                "--traffic both: after an --upload the SIRs of the way back are not known; allowed: forward"
+                    .to_owned()
+            }
+            _ => return Ok(()),
+        };
+        Err(Failure::input(line))
+    }
+
+    /// Returns the requested traffic over the data link of `scenario`.
+    pub(super) fn spec(&self, scenario: &Scenario) -> Result<Option<TrafficSpec>, Failure> {
+        let Some(way) = self.traffic else {
+            return Ok(None);
+        };
+        let radio = Radio::new(scenario, self.bandwidth_hz)
+            .map_err(|error| Failure::input(format!("--traffic: {error}")))?;
+        Ok(Some(TrafficSpec {
+            link: DataLink {
+                radio,
+                packet_bits: 8.0 * f64::from(self.packet_bytes.unwrap_or(1_500)),
+                both: way == Way::Both,
+            },
+            queue_packets: self.queue_packets.unwrap_or(100) as usize,
+            offered_bps: self.offer_bps.map(|rate_bps| [rate_bps; 2]),
+        }))
+    }
+}

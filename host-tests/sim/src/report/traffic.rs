@@ -1,0 +1,368 @@
+//! Report of the data traffic: promised, offered and delivered rates, delays and queues.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use crate::simulator::route::{ChainState, Period, Ps, SECOND};
+use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec, quantile_s};
+
+/// Number of periods in the text at its start and at its end.
+const ENDS: usize = 10;
+
+/// Number of queues up to which the text lists all; of more, it lists half as many.
+const SHOWN: usize = 16;
+
+/// Traffic of a run. Arrays have the way to Rx first and then, if data goes both ways, the way back.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TrafficReport {
+    /// Data rates at the positions of the first agreement by the planner's formula, bit/s.
+    pub promised_bps: Vec<f64>,
+    /// Offered data rates, bit/s.
+    pub offered_bps: Vec<f64>,
+    /// Delivered data rates from the first agreement to the end, bit/s.
+    pub delivered_bps: Vec<f64>,
+    /// Details.
+    pub traffic: TrafficDetails,
+}
+
+/// Details of the traffic.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TrafficDetails {
+    /// Access of the hops to the radio, as in the file.
+    pub access: &'static str,
+    /// Bandwidth of one frequency, Hz.
+    pub bandwidth_hz: f64,
+    /// Size of a packet, bytes.
+    pub packet_bytes: f64,
+    /// Largest number of packets in a queue.
+    pub queue_packets: usize,
+    /// Start, s of virtual time.
+    pub from_s: f64,
+    /// Latest end of a direction, s of virtual time.
+    pub until_s: f64,
+    /// Each direction.
+    pub flows: Vec<FlowReport>,
+    /// Times in which the view, the state of the chain and the promised rate did not change.
+    pub periods: Vec<PeriodReport>,
+    /// Description of the access to the radio.
+    #[serde(skip)]
+    sharing: String,
+}
+
+/// Traffic in one direction.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct FlowReport {
+    /// `forward`, from Tx to Rx, or `backward`.
+    pub direction: &'static str,
+    /// End of its traffic, s of virtual time.
+    pub until_s: f64,
+    /// Packets of the source.
+    pub offered_packets: u64,
+    /// Packets that arrived.
+    pub delivered_packets: u64,
+    /// Packets dropped by full queues.
+    pub dropped_packets: u64,
+    /// Packets in the queues of relays that went silent.
+    pub lost_packets: u64,
+    /// Packets in queues at the end.
+    pub queued_packets: u64,
+    /// Median delay of the packets that arrived, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_median_s: Option<f64>,
+    /// Delay that 99 % of them do not exceed, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_99_s: Option<f64>,
+    /// Queue of every node that sends, from Tx to Rx.
+    pub queues: Vec<QueueReport>,
+}
+
+/// Queue of a node, with the packet that is being sent.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct QueueReport {
+    /// `Tx`, `Rx`, or the number of the relay.
+    pub node: String,
+    /// Mean length over time, packets.
+    pub mean_packets: f64,
+    /// Largest length, packets.
+    pub most_packets: usize,
+}
+
+/// Traffic of a period. Arrays are as in [`TrafficReport`].
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PeriodReport {
+    /// Start, s of virtual time.
+    pub from_s: f64,
+    /// End, s of virtual time.
+    pub until_s: f64,
+    /// Number of the view.
+    pub view: u32,
+    /// Number of relays of the view.
+    pub relays: u16,
+    /// `agreed`; `pending`: no agreement yet, or drones on their way; `broken`: a relay is missing.
+    pub state: &'static str,
+    /// Data rates at the agreed positions, bit/s; absent unless the state is `agreed`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub promised_bps: Vec<f64>,
+    /// Data rates of the packets that arrived in this time, bit/s.
+    pub delivered_bps: Vec<f64>,
+    /// Packets dropped or lost in this time.
+    pub missing_packets: Vec<u64>,
+    /// Median delays of the packets that arrived in this time, s; absent if none arrived.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub delay_median_s: Vec<f64>,
+    /// Delays that 99 % of them do not exceed, s.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub delay_99_s: Vec<f64>,
+}
+
+const DIRECTIONS: [&str; 2] = ["forward", "backward"];
+
+fn seconds(at: Ps) -> f64 {
+    at as f64 / SECOND
+}
+
+impl TrafficReport {
+    /// Creates the report of `traffic`.
+    pub fn new(spec: &TrafficSpec, traffic: &Traffic) -> Self {
+        let each = |of: fn(&Flow) -> f64| traffic.flows.iter().map(of).collect();
+        let nodes = traffic.flows.first().map_or(0, |flow| flow.queues.len());
+        let starts = traffic.periods.iter().skip(1).map(|period| period.from);
+        let ends = starts.chain([traffic.until]);
+        let periods = traffic.periods.iter().zip(ends).enumerate();
+        Self {
+            promised_bps: each(|flow| flow.promised_bps),
+            offered_bps: each(|flow| flow.offered_bps),
+            delivered_bps: each(|flow| flow.delivered_bps),
+            traffic: TrafficDetails {
+                access: spec.link.radio.link.access.name(),
+                bandwidth_hz: spec.link.radio.bandwidth_hz,
+                packet_bytes: spec.link.packet_bits / 8.0,
+                queue_packets: spec.queue_packets,
+                from_s: seconds(traffic.from),
+                until_s: seconds(traffic.until),
+                flows: traffic
+                    .flows
+                    .iter()
+                    .zip(DIRECTIONS)
+                    .map(|(flow, direction)| FlowReport::new(flow, direction, nodes))
+                    .collect(),
+                periods: periods
+                    .map(|(at, (period, until))| {
+                        PeriodReport::new(traffic, spec.link.packet_bits, (at, period), until)
+                    })
+                    .collect(),
+                sharing: spec.link.radio.sharing(nodes),
+            },
+        }
+    }
+
+    /// Formats the report as lines of text.
+    pub(super) fn text(&self) -> String {
+        let TrafficDetails {
+            packet_bytes,
+            queue_packets,
+            from_s,
+            until_s,
+            flows,
+            periods,
+            sharing,
+            ..
+        } = &self.traffic;
+        let halves = if flows.len() > 1 {
+            ", each way half of the time"
+        } else {
+            ""
+        };
+        let mut text = format!(
+            "traffic from {from_s:.3} to {until_s:.3} s: {sharing}{halves}; packets of {packet_bytes} bytes, up to {queue_packets} in a queue\n"
+        );
+        let rates = (self.promised_bps.iter())
+            .zip(&self.offered_bps)
+            .zip(&self.delivered_bps);
+        for (flow, ((promised, offered), delivered)) in flows.iter().zip(rates) {
+            let way = match flow.direction {
+                "forward" => "Tx to Rx",
+                _ => "Rx to Tx",
+            };
+            _ = writeln!(
+                text,
+                "{way}: {} Mbit/s promised, {} offered, {} delivered",
+                mega(*promised),
+                mega(*offered),
+                mega(*delivered)
+            );
+            text += &flow.text();
+        }
+        let skipped = periods.len().saturating_sub(2 * ENDS);
+        for (at, period) in periods.iter().enumerate() {
+            if skipped > 0 && at == ENDS {
+                _ = writeln!(text, "{:>12}  {skipped} more periods", "...");
+            }
+            if skipped == 0 || at < ENDS || at >= ENDS + skipped {
+                text += &period.text();
+            }
+        }
+        text
+    }
+}
+
+impl FlowReport {
+    fn new(flow: &Flow, direction: &'static str, rx: usize) -> Self {
+        let Packets {
+            offered,
+            delivered,
+            dropped,
+            lost,
+        } = flow.packets;
+        let queue = |queue: &QueueLength| QueueReport {
+            node: match queue.node {
+                0 => "Tx".to_owned(),
+                node if node == rx => "Rx".to_owned(),
+                node => node.to_string(),
+            },
+            mean_packets: queue.mean,
+            most_packets: queue.most,
+        };
+        Self {
+            direction,
+            until_s: seconds(flow.until),
+            offered_packets: offered,
+            delivered_packets: delivered,
+            dropped_packets: dropped,
+            lost_packets: lost,
+            queued_packets: flow.queued,
+            delay_median_s: quantile_s(&flow.delays, 0.5),
+            delay_99_s: quantile_s(&flow.delays, 0.99),
+            queues: flow.queues.iter().map(queue).collect(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "    packets until {:.3} s: {} offered, {} delivered, {} dropped by full queues, {} lost with silent relays, {} in queues at the end\n",
+            self.until_s,
+            self.offered_packets,
+            self.delivered_packets,
+            self.dropped_packets,
+            self.lost_packets,
+            self.queued_packets
+        );
+        if let (Some(median), Some(most)) = (self.delay_median_s, self.delay_99_s) {
+            _ = writeln!(
+                text,
+                "    delay: median {} ms, 99 % within {} ms",
+                milli(median),
+                milli(most)
+            );
+        }
+        let queue = |queue: &QueueReport| {
+            format!(
+                "{} {:.2} ({})",
+                queue.node, queue.mean_packets, queue.most_packets
+            )
+        };
+        let mut queues: Vec<&QueueReport> = self.queues.iter().collect();
+        let (which, shown) = if queues.len() > SHOWN {
+            queues.sort_by(|one, other| other.mean_packets.total_cmp(&one.mean_packets));
+            ("longest queues", SHOWN / 2)
+        } else {
+            ("queues", SHOWN)
+        };
+        let queues: Vec<String> = queues.into_iter().take(shown).map(queue).collect();
+        _ = writeln!(text, "    {which}, mean (most): {}", queues.join(", "));
+        text
+    }
+}
+
+impl PeriodReport {
+    fn new(traffic: &Traffic, packet_bits: f64, (at, period): (usize, &Period), until: Ps) -> Self {
+        let own = || traffic.flows.iter().filter_map(|flow| flow.periods.get(at));
+        // The last period of a direction ends with its traffic.
+        let spans_s = traffic.flows.iter().map(|flow| {
+            let end = until.min(flow.until);
+            seconds(end.saturating_sub(period.from).max(1))
+        });
+        let delays = |fraction| {
+            let all = own().filter_map(|own| quantile_s(&own.delays, fraction));
+            let all: Vec<f64> = all.collect();
+            if all.len() == traffic.flows.len() {
+                all
+            } else {
+                Vec::new()
+            }
+        };
+        Self {
+            from_s: seconds(period.from),
+            until_s: seconds(until),
+            view: period.view,
+            relays: period.relays,
+            state: match period.state {
+                ChainState::Agreed => "agreed",
+                ChainState::Pending => "pending",
+                ChainState::Broken => "broken",
+            },
+            promised_bps: period.promised_bps.clone(),
+            delivered_bps: own()
+                .zip(spans_s)
+                .map(|(own, span_s)| own.packets.delivered as f64 * packet_bits / span_s)
+                .collect(),
+            missing_packets: own()
+                .map(|own| own.packets.dropped + own.packets.lost)
+                .collect(),
+            delay_median_s: delays(0.5),
+            delay_99_s: delays(0.99),
+        }
+    }
+
+    fn text(&self) -> String {
+        let list = |rates: &[f64]| {
+            let rates: Vec<String> = rates.iter().map(|rate| mega(*rate)).collect();
+            rates.join(" and ")
+        };
+        let relays = self.relays;
+        let of = if relays == 1 { "relay" } else { "relays" };
+        let state = match (self.state, self.promised_bps.as_slice()) {
+            ("agreed", promised) => format!("{} Mbit/s promised", list(promised)),
+            ("pending", _) => "no agreement yet, or drones on their way".to_owned(),
+            _ => "broken".to_owned(),
+        };
+        let mut text = format!(
+            "{:>10.3} to {:.3} s: {relays} {of}, {state}, {} delivered",
+            self.from_s,
+            self.until_s,
+            list(&self.delivered_bps)
+        );
+        if let [median, ..] = self.delay_median_s.as_slice() {
+            _ = write!(text, ", median delay {} ms", milli(*median));
+        }
+        let missing: u64 = self.missing_packets.iter().sum();
+        if missing > 0 {
+            _ = write!(text, ", {missing} packets dropped or lost");
+        }
+        text + "\n"
+    }
+}
+
+/// Formats a data rate in Mbit/s with four digits.
+fn mega(bps: f64) -> String {
+    rounded(bps / 1e6)
+}
+
+/// Formats a time in ms with four digits.
+fn milli(seconds: f64) -> String {
+    rounded(seconds * 1e3)
+}
+
+/// Formats a number with four significant digits; small numbers have an exponent.
+fn rounded(value: f64) -> String {
+    if !(value > 0.0) {
+        return "0".to_owned();
+    }
+    if value < 1e-3 {
+        return format!("{value:.3e}");
+    }
+    let bounds = [1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3];
+    let digits = bounds.iter().filter(|bound| value < **bound).count();
+    format!("{value:.digits$}")
+}

@@ -1,0 +1,646 @@
+//! Route of the data through the chain over time: hops, their true data rates, and their time slots.
+//!
+//! The simulated relays are recorded as they change ([`Track`]). A [`Stage`] is a period without changes:
+//!
+//! | item | rule |
+//! | --- | --- |
+//! | route | relays of the view that most living relays have accepted, in the order of their indices in it |
+//! | rate of a hop | B b(SINR) with the SINR against all true interferers and noise at the true positions of the drones |
+//! | dead hop | rate 0: its sender or receiver is silent, has no position, or has not accepted the view |
+//! | slots | set at an agreement, from the rates at the agreed positions, and kept until the next one or until a new view |
+//!
+//! A frame has one slot for each hop, in the order of the hops, so a packet can pass the whole chain in one frame. With equal slots
+//! a slot is the time of one packet on the worst hop, and with fitted slots the time of one packet on its own hop. With a frequency
+//! for each hop all hops send all the time. If data goes both ways, the first half of each frame is for the way to Rx and the
+//! second half for the way back; the slots are then as long as the faster direction needs for one packet.
+//!
+//! Times are whole picoseconds since the start of the run, so slots do not drift.
+
+use std::collections::BTreeMap;
+
+use uav_relay::{Instant, Mission, Phase, Profile, ViewId};
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::link::{Access, Radio};
+use uav_relay_scenario::scene::{Place, Relay, Scene};
+
+use super::drones::{Point, apart, placement};
+use super::setup::Setup;
+use super::watch::Seen;
+use crate::report::hop_sirs;
+
+/// Time, ps.
+pub type Ps = u64;
+
+/// Picoseconds of a microsecond.
+const MICRO: Ps = 1_000_000;
+
+/// Picoseconds of a second.
+pub const SECOND: f64 = 1e12;
+
+/// Largest time of one packet on a hop, 1000 s in ps; a slower hop counts as dead.
+const SLOWEST: f64 = 1e15;
+
+/// Movement of a drone that is recorded, m.
+const MOVED_M: f64 = 0.1;
+
+/// Largest distance of a drone from its agreed position that counts as there, m.
+const THERE_M: f64 = 5.0;
+
+/// Period in which moving interferers are taken as fixed, ps.
+const FIXED: Ps = 1_000_000 * MICRO;
+
+/// Returns the time of `instant`.
+pub const fn ps(instant: Instant) -> Ps {
+    instant.as_micros().saturating_mul(MICRO)
+}
+
+/// Parts of a relay's state that decide about the route.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct RelayState {
+    /// State of the relay. Its place is the true position of the drone, and absent while the relay has no setpoint.
+    pub seen: Seen,
+    /// Agreed position.
+    pub agreed: Option<Point>,
+}
+
+impl RelayState {
+    /// Returns true if the difference from `other` does not concern the route.
+    fn is_like(&self, other: &Self) -> bool {
+        let near = match (self.seen.place, other.seen.place) {
+            (Some(one), Some(other)) => apart(one, other) < MOVED_M,
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        let rest = |state: &Self| {
+            let seen = Seen {
+                place: None,
+                leased: false,
+                ..state.seen
+            };
+            (seen, state.agreed)
+        };
+        near && rest(self) == rest(other)
+    }
+}
+
+/// Recorded states of all relays.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Track {
+    latest: BTreeMap<usize, RelayState>,
+    changes: Vec<(Instant, usize, RelayState)>,
+}
+
+impl Track {
+    /// Records the state of `relay` (from 0) at `at` if it changed.
+    pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
+        let known = self.latest.get(&relay);
+        if known.is_none_or(|known| !known.is_like(&state)) {
+            self.latest.insert(relay, state);
+            self.changes.push((at, relay, state));
+        }
+    }
+}
+
+/// Source of the true SIRs.
+#[derive(Debug)]
+pub struct TrueHops {
+    /// All relays and interferers at time 0, and the velocity of the latter, m/s. `None` in a field or after uploads.
+    scene: Option<(Scene, [f64; 2])>,
+    /// Missions by version, for runs without a scene.
+    missions: Vec<(u16, Mission)>,
+    /// Profiles of the relays, from relay 1.
+    profiles: Vec<Profile>,
+}
+
+impl TrueHops {
+    /// Returns the true SIRs of a run of `setup`, whose relays fly `mission` at first.
+    ///
+    /// They are against all interferers of `scenario`, in motion if the relays measure them. In a field, and in a run with uploads,
+    /// they are those of the mission that the chain flies.
+    pub fn new(scenario: &Scenario, setup: &Setup, mission: &Mission) -> Self {
+        let relays = mission.relays();
+        let moved = setup.sky.as_ref().map_or([0.0; 2], |sky| sky.velocity_mps);
+        let scene = Scene::new(scenario, relays).map(|scene| (scene, moved));
+        let uploads = setup.uploads.iter().filter_map(|spec| {
+            let mission = Mission::try_new(*spec.upload.config()).ok()?;
+            Some((spec.upload.version(), mission))
+        });
+        let own = |index: u16| setup.profiles.iter().find(|(of, _)| *of == index);
+        Self {
+            scene: scene.filter(|_| setup.uploads.is_empty()),
+            missions: [(0, *mission)].into_iter().chain(uploads).collect(),
+            profiles: (1..=relays)
+                .map(|index| own(index).map_or(mission.config().common, |(_, profile)| *profile))
+                .collect(),
+        }
+    }
+
+    fn are_moving(&self) -> bool {
+        let moves = |(_, [vx, vy]): &(Scene, [f64; 2])| vx.abs() + vy.abs() > 0.0;
+        self.scene.as_ref().is_some_and(moves)
+    }
+
+    /// Returns the SIR (linear) of each hop from Tx to Rx and, with `back`, of each hop on the way back.
+    ///
+    /// The hops of a direction are in the order in which a packet passes them.
+    fn sirs(&self, at: Ps, version: u16, relays: &[(usize, Point)], back: bool) -> Vec<Vec<f64>> {
+        let Some((scene, [vx, vy])) = &self.scene else {
+            let mut missions = self.missions.iter();
+            let known = missions.find(|(of, _)| *of == version);
+            let Some((_, mission)) = known.or_else(|| self.missions.first()) else {
+                return Vec::new();
+            };
+            let places: Vec<_> = relays
+                .iter()
+                .filter_map(|(relay, at)| Some((placement(*at), *self.profiles.get(*relay)?)))
+                .collect();
+            return vec![hop_sirs(mission, &places)];
+        };
+        let seconds = at as f64 / SECOND;
+        let mut sources = scene.sources.clone();
+        for source in &mut sources {
+            source.x_m += vx * seconds;
+            source.y_m += vy * seconds;
+        }
+        let of = |(relay, _): &(usize, Point)| scene.relays.get(*relay).copied();
+        let here = Scene {
+            sources,
+            relays: relays.iter().filter_map(of).collect::<Vec<Relay>>(),
+            ..scene.clone()
+        };
+        let places: Vec<Place> = relays
+            .iter()
+            .map(|(_, [x, y, h])| Place {
+                x: *x,
+                y: *y,
+                h: *h,
+            })
+            .collect();
+        let mut sirs = vec![here.hop_sirs(&places)];
+        if back {
+            let back = here.hop_sirs_back(&places);
+            sirs.push(back.into_iter().rev().collect());
+        }
+        sirs
+    }
+}
+
+/// Recurring time of a hop.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Window {
+    /// Start of the first frame.
+    anchor: Ps,
+    /// Length of a frame.
+    frame: Ps,
+    /// Start of the slot in a frame.
+    opens: Ps,
+    /// Length of the slot, at least 1.
+    open_for: Ps,
+}
+
+impl Window {
+    /// Returns the end of the frame of `at`; `at` itself if a frame ends there.
+    pub const fn frame_end(&self, at: Ps) -> Ps {
+        let since = at.saturating_sub(self.anchor);
+        self.anchor + since.div_ceil(self.frame) * self.frame
+    }
+
+    /// Returns the time within slots from the first frame to `at`.
+    fn elapsed(&self, at: Ps) -> Ps {
+        let since = at.saturating_sub(self.anchor);
+        let (frames, into) = (since / self.frame, since % self.frame);
+        frames * self.open_for + into.saturating_sub(self.opens).min(self.open_for)
+    }
+
+    /// Returns the time within slots from `from` to `until`.
+    pub fn between(&self, from: Ps, until: Ps) -> Ps {
+        self.elapsed(until) - self.elapsed(from)
+    }
+
+    /// Returns the time when a transmission that takes `duration`, above 0, and continues at `from`, ends.
+    pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
+        let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
+        let open_for = u128::from(self.open_for);
+        let end = u128::from(self.anchor)
+            + due / open_for * u128::from(self.frame)
+            + u128::from(self.opens)
+            + due % open_for
+            + 1;
+        Ps::try_from(end).unwrap_or(Ps::MAX)
+    }
+}
+
+/// Hop of a stage. Node 0 is Tx, and the node after the last relay is Rx.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Hop {
+    /// Sending node.
+    pub from: usize,
+    /// Receiving node.
+    pub to: usize,
+    /// Time of one packet at the present data rate; above 0.
+    pub packet: Ps,
+    /// Slots of the hop.
+    pub window: Window,
+}
+
+/// State of the chain that a [`Period`] has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ChainState {
+    /// All relays of the view are at the positions of one agreement.
+    Agreed,
+    /// All relays can send, but an agreement is pending, or drones are on their way.
+    Pending,
+    /// A relay of the view is silent, has no position, or has not accepted the view.
+    Broken,
+}
+
+/// Time in which the view, the state of the chain and the promised rate do not change.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Period {
+    /// Start.
+    pub from: Ps,
+    /// Number of relays of the view.
+    pub relays: u16,
+    /// Number of the view.
+    pub view: u32,
+    /// State of the chain.
+    pub state: ChainState,
+    /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, back. Empty without an agreement.
+    pub promised_bps: Vec<f64>,
+}
+
+/// Time in which no hop changes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Stage {
+    /// Start.
+    pub from: Ps,
+    /// Number of its period.
+    pub period: usize,
+    /// True for each relay that is switched on, from relay 1.
+    pub on: Vec<bool>,
+    /// Hops that are not dead, for each direction.
+    pub hops: Vec<Vec<Hop>>,
+}
+
+/// Route from the first agreement on.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Route {
+    /// Stages in order of time; at least one.
+    pub stages: Vec<Stage>,
+    /// Periods in order of time; at least one.
+    pub periods: Vec<Period>,
+    /// Data rates promised at the first agreement, bit/s: to Rx, back.
+    pub promised_bps: Vec<f64>,
+}
+
+/// Relays of the present view.
+struct Members {
+    view: ViewId,
+    version: u16,
+    /// Number (from 0) and state of each relay by its index in the view; `None` if it is missing.
+    relays: Vec<Option<(usize, RelayState)>>,
+}
+
+impl Members {
+    /// Returns the view that most relays have accepted, the newest of several.
+    fn of(states: &BTreeMap<usize, RelayState>) -> Option<Self> {
+        let on = || states.iter().filter(|(_, state)| state.seen.is_on);
+        let mut counts: BTreeMap<(ViewId, u16), usize> = BTreeMap::new();
+        for (_, state) in on() {
+            let view = (state.seen.view, state.seen.relays);
+            *counts.entry(view).or_default() += 1;
+        }
+        let (view, relays) = counts
+            .into_iter()
+            .max_by_key(|(view, count)| (*count, *view))?
+            .0;
+        let mut members = Self {
+            view,
+            version: 0,
+            relays: vec![None; usize::from(relays)],
+        };
+        for (relay, state) in on() {
+            let seen = state.seen;
+            let place = usize::from(seen.index).checked_sub(1);
+            if let Some(place) = place
+                && (seen.view, seen.relays) == (view, relays)
+                && let Some(member) = members.relays.get_mut(place)
+            {
+                members.version = members.version.max(seen.version);
+                member.get_or_insert((*relay, *state));
+            }
+        }
+        Some(members)
+    }
+
+    /// Returns the present positions, with a stand-in for those that are missing; their hops are dead.
+    fn places(&self) -> Vec<(usize, Point)> {
+        let place = |(index, member): (usize, &Option<(usize, RelayState)>)| {
+            let known = member.and_then(|(relay, state)| Some((relay, state.seen.place?)));
+            known.unwrap_or((index, [0.0; 3]))
+        };
+        self.relays.iter().enumerate().map(place).collect()
+    }
+
+    /// Returns the nodes from Tx to Rx, whose number is `rx`; `None` for a relay that cannot send.
+    fn nodes(&self, rx: usize) -> Vec<Option<usize>> {
+        let alive = self.relays.iter().map(|member| {
+            let (relay, state) = (*member)?;
+            state.seen.place.map(|_| relay + 1)
+        });
+        [Some(0)]
+            .into_iter()
+            .chain(alive)
+            .chain([Some(rx)])
+            .collect()
+    }
+
+    /// Returns the agreed positions if all relays hold those of one agreement, for one target SIR.
+    ///
+    /// Positions from which relays measure an unknown interferer have no target.
+    fn agreed(&self) -> Option<Vec<(usize, Point)>> {
+        let target = |state: &RelayState| state.seen.target.map(f32::to_bits);
+        let (_, first) = self.relays.first().copied().flatten()?;
+        let first = target(&first)?;
+        let held = self.relays.iter().map(|member| {
+            let (relay, state) = (*member)?;
+            let is_held = state.seen.phase == Phase::Holding && state.seen.place.is_some();
+            (is_held && target(&state) == Some(first)).then_some((relay, state.agreed?))
+        });
+        held.collect()
+    }
+
+    /// Returns true if all drones are at the agreed positions.
+    fn are_there(&self, agreed: &[(usize, Point)]) -> bool {
+        let mut pairs = self.places().into_iter().zip(agreed);
+        pairs.all(|((_, at), (_, goal))| apart(at, *goal) < THERE_M)
+    }
+}
+
+/// Slots of all hops for each direction, set at an agreement or for a new view.
+struct Layout {
+    view: ViewId,
+    agreed: Option<Vec<(usize, Point)>>,
+    promised_bps: Vec<f64>,
+    windows: Vec<Vec<Window>>,
+}
+
+/// Data link of a route.
+#[derive(Clone, PartialEq, Debug)]
+pub struct DataLink {
+    /// Access, spectral efficiency and bandwidth.
+    pub radio: Radio,
+    /// Size of a packet, bits, above 0.
+    pub packet_bits: f64,
+    /// True if data goes both ways.
+    pub both: bool,
+}
+
+impl DataLink {
+    /// Returns the time of one packet on a hop; `None` if that carries nothing.
+    fn packet(&self, rate_bps: f64) -> Option<Ps> {
+        let time = self.packet_bits / rate_bps * SECOND;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 to 1e15"
+        )]
+        (time <= SLOWEST).then(|| (time.ceil() as Ps).max(1))
+    }
+
+    /// Returns the data rates promised by these SIRs (linear), bit/s, one for each direction.
+    fn promised_bps(&self, sirs: &[Vec<f64>]) -> Vec<f64> {
+        let directions = sirs.len().max(1) as f64;
+        let rate = |sirs: &Vec<f64>| self.radio.chain_bps(sirs) / directions;
+        sirs.iter().map(rate).collect()
+    }
+
+    /// Returns the slots from `anchor` on for hops with these SIRs (linear).
+    fn windows(&self, anchor: Ps, sirs: &[Vec<f64>]) -> Vec<Vec<Window>> {
+        let packets: Vec<Vec<Option<Ps>>> = sirs
+            .iter()
+            .map(|sirs| sirs.iter().map(|sir| self.packet(self.radio.hop_bps(*sir))))
+            .map(Iterator::collect)
+            .collect();
+        let slowest = |packets: &Vec<Option<Ps>>| packets.iter().flatten().copied().max();
+        let longest = packets.iter().filter_map(slowest).max().unwrap_or(1);
+        // Of two directions the faster one sends one packet in a slot, so bursts stay short.
+        let slot = packets.iter().filter_map(slowest).min().unwrap_or(1);
+        // A hop that carries nothing has a slot like that of the worst hop.
+        let own = |packet: &Option<Ps>| packet.unwrap_or(longest);
+        let half = |packets: &Vec<Option<Ps>>| match self.radio.link.access {
+            Access::Slots => slot * packets.len() as Ps,
+            Access::Channels => slot,
+            Access::Fitted => packets.iter().map(own).sum(),
+        };
+        let shortest = packets.iter().map(half).min().unwrap_or(1);
+        let frame = shortest * packets.len() as Ps;
+        let mut all = Vec::new();
+        let mut begins = 0;
+        for packets in &packets {
+            let fitted = |time: Ps| {
+                let share = u128::from(time) * u128::from(shortest) / u128::from(half(packets));
+                Ps::try_from(share).unwrap_or(Ps::MAX)
+            };
+            let mut opens = begins;
+            let windows = packets.iter().map(|packet| {
+                let open_for = match self.radio.link.access {
+                    Access::Fitted => fitted(own(packet)),
+                    Access::Slots | Access::Channels => slot,
+                };
+                let window = Window {
+                    anchor,
+                    frame,
+                    opens,
+                    open_for: open_for.max(1),
+                };
+                if self.radio.link.access != Access::Channels {
+                    opens += window.open_for;
+                }
+                window
+            });
+            all.push(windows.collect());
+            begins += shortest;
+        }
+        all
+    }
+}
+
+/// Returns the route of the data from the first agreement to `until`; `None` if there is no agreement.
+///
+/// `relays` is the number of simulated relays.
+pub fn route(
+    track: &Track,
+    true_hops: &TrueHops,
+    link: &DataLink,
+    relays: usize,
+    until: Ps,
+) -> Option<Route> {
+    let mut states: BTreeMap<usize, RelayState> = BTreeMap::new();
+    let mut layout: Option<Layout> = None;
+    let mut route = Route {
+        stages: Vec::new(),
+        periods: Vec::new(),
+        promised_bps: Vec::new(),
+    };
+    let mut changes = track
+        .changes
+        .chunk_by(|one, next| one.0 == next.0)
+        .peekable();
+    while let Some(same) = changes.next() {
+        for (_, relay, state) in same {
+            states.insert(*relay, *state);
+        }
+        let from = same.first().map_or(0, |(at, ..)| ps(*at));
+        let next = changes.peek().and_then(|next| next.first());
+        let next = next.map_or(until, |(at, ..)| ps(*at)).min(until);
+        let mut at = from;
+        loop {
+            if let Some(members) = Members::of(&states) {
+                let stage = Stage {
+                    from: at,
+                    period: 0,
+                    on: (0..relays)
+                        .map(|relay| states.get(&relay).is_some_and(|state| state.seen.is_on))
+                        .collect(),
+                    hops: Vec::new(),
+                };
+                route.add(stage, &members, &mut layout, (true_hops, link));
+            }
+            at += FIXED;
+            if !true_hops.are_moving() || at >= next {
+                break;
+            }
+        }
+    }
+    (!route.stages.is_empty()).then_some(route)
+}
+
+impl Route {
+    /// Adds `stage` with the hops of `members`, unless there was no agreement yet.
+    fn add(
+        &mut self,
+        mut stage: Stage,
+        members: &Members,
+        layout: &mut Option<Layout>,
+        (true_hops, link): (&TrueHops, &DataLink),
+    ) {
+        let agreed = members.agreed();
+        if agreed.is_none() && self.stages.is_empty() {
+            return;
+        }
+        let sirs = |places: &[(usize, Point)]| {
+            true_hops.sirs(stage.from, members.version, places, link.both)
+        };
+        let present = sirs(&members.places());
+        let is_current = layout.as_ref().is_some_and(|layout| {
+            let same = agreed.is_none() || layout.agreed == agreed;
+            layout.view == members.view && same && !(agreed.is_some() && true_hops.are_moving())
+        });
+        if !is_current {
+            let at_agreed = agreed.as_ref().map(|places| sirs(places));
+            *layout = Some(Layout {
+                view: members.view,
+                promised_bps: at_agreed
+                    .as_ref()
+                    .map_or_else(Vec::new, |sirs| link.promised_bps(sirs)),
+                windows: link.windows(stage.from, at_agreed.as_ref().unwrap_or(&present)),
+                agreed: agreed.clone(),
+            });
+        }
+        let Some(layout) = layout else {
+            return;
+        };
+        if self.stages.is_empty() {
+            self.promised_bps.clone_from(&layout.promised_bps);
+        }
+        let nodes = members.nodes(stage.on.len() + 1);
+        let is_whole = nodes.iter().all(Option::is_some);
+        let state = match &agreed {
+            Some(agreed) if members.are_there(agreed) => ChainState::Agreed,
+            _ if is_whole => ChainState::Pending,
+            _ => ChainState::Broken,
+        };
+        let period = Period {
+            from: stage.from,
+            relays: u16::try_from(members.relays.len()).unwrap_or(u16::MAX),
+            view: members.view.number(),
+            state,
+            promised_bps: match state {
+                ChainState::Agreed => layout.promised_bps.clone(),
+                _ => Vec::new(),
+            },
+        };
+        let is_same = |last: &Period| {
+            let start = Period {
+                from: last.from,
+                ..period.clone()
+            };
+            start == *last
+        };
+        if !self.periods.last().is_some_and(is_same) {
+            self.periods.push(period);
+        }
+        stage.period = self.periods.len() - 1;
+        stage.hops = present
+            .iter()
+            .zip(&layout.windows)
+            .enumerate()
+            .map(|(direction, (sirs, windows))| {
+                let ends: Vec<Option<usize>> = match direction {
+                    0 => nodes.clone(),
+                    _ => nodes.iter().rev().copied().collect(),
+                };
+                let pairs = ends.iter().zip(ends.iter().skip(1));
+                let hops = pairs.zip(sirs.iter().zip(windows));
+                hops.filter_map(|((from, to), (sir, window))| {
+                    Some(Hop {
+                        from: (*from)?,
+                        to: (*to)?,
+                        packet: link.packet(link.radio.hop_bps(*sir))?,
+                        window: *window,
+                    })
+                })
+                .collect()
+            })
+            .collect();
+        self.stages.push(stage);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Window;
+
+    const WINDOW: Window = Window {
+        anchor: 100,
+        frame: 30,
+        opens: 10,
+        open_for: 7,
+    };
+
+    /// Counts the time within slots one by one.
+    fn counted(from: u64, until: u64) -> u64 {
+        let is_open = |at: &u64| (10..17).contains(&((at - 100) % 30));
+        (from..until).filter(is_open).count() as u64
+    }
+
+    #[test]
+    fn the_time_within_slots_is_counted() {
+        for from in 100..180 {
+            for until in from..240 {
+                assert_eq!(WINDOW.between(from, until), counted(from, until));
+            }
+        }
+    }
+
+    #[test]
+    fn a_transmission_ends_in_the_slot_in_which_its_time_is_over() {
+        for from in 100..180 {
+            for duration in 1..40 {
+                let end = WINDOW.ends(from, duration);
+                assert_eq!(counted(from, end), duration, "{from} {duration}");
+                assert_eq!(counted(from, end - 1), duration - 1, "{from} {duration}");
+            }
+        }
+    }
+}

@@ -1,0 +1,505 @@
+//! Packets on the [route](super::route) of the chain, with a queue at every node.
+//!
+//! | item | rule |
+//! | --- | --- |
+//! | source | a packet every P / offered rate at Tx, from the first agreement to the end; at Rx for the way back |
+//! | queue | one at each node for each direction, first in, first out; it includes the packet that is being sent |
+//! | full queue | the new packet is dropped |
+//! | transmission | at the present rate of the hop, within its slots; a packet may continue in the next slot of its hop |
+//! | change of the rate | the rest of the packet is sent at the new rate |
+//! | change of the receiver, dead hop | the packet stays in the queue and is sent anew |
+//! | silent relay | its queue is lost |
+//!
+//! Every packet that arrives at a relay in time for its slot is sent in that slot. Headers, guard times, acknowledgements and
+//! transmission errors are not modelled: a hop carries its rate. Nothing is random.
+//!
+//! Data of a period may include packets that waited in queues before it, so that it can be more than the promised rate of that period.
+//!
+//! Work: one event for each packet and hop, at most [`MOST_SENT`].
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+use std::fmt;
+
+use super::outcome::{Ending, Outcome};
+use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
+
+/// Packets that are offered after the last event of a run, and further packets for each hop.
+const AFTER: usize = 1_000;
+const AFTER_A_HOP: usize = 30;
+
+/// Largest number of transmissions, over all hops.
+pub const MOST_SENT: f64 = 1e8;
+
+/// Latest end of the traffic, s.
+pub const LATEST_S: f64 = 1e6;
+
+/// Traffic of a run.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TrafficSpec {
+    /// Data link, size of a packet and directions.
+    pub link: DataLink,
+    /// Largest number of packets in a queue, at least 1.
+    pub queue_packets: usize,
+    /// Offered data rate, bit/s, to Rx and back; the promised one if absent.
+    pub offered_bps: Option<[f64; 2]>,
+}
+
+/// Traffic that is too much to simulate.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum TrafficError {
+    /// Number of transmissions.
+    TooMany(f64),
+    /// End of the traffic, s.
+    TooLong(f64),
+}
+
+impl fmt::Display for TrafficError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooMany(sent) => write!(
+                f,
+                "--traffic: {sent:.3e} transmissions of packets; allowed: up to {MOST_SENT:e}, with larger --packet-bytes or a shorter run"
+            ),
+            Self::TooLong(end_s) => write!(
+                f,
+                "--traffic: the packets take until {end_s:.3e} s of virtual time; allowed: up to {LATEST_S:e} s, with smaller --packet-bytes or a \
+                 larger bandwidth"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for TrafficError {}
+
+/// Counts of packets.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Packets {
+    /// Packets of the source.
+    pub offered: u64,
+    /// Packets that arrived at their end of the chain.
+    pub delivered: u64,
+    /// Packets dropped by full queues.
+    pub dropped: u64,
+    /// Packets in the queues of relays that went silent.
+    pub lost: u64,
+}
+
+/// Delivered packets of a period.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Delivery {
+    /// Counts of the period.
+    pub packets: Packets,
+    /// Delays from source to end, ascending once the traffic has ended.
+    pub delays: Vec<Ps>,
+}
+
+/// Queue length of a node.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct QueueLength {
+    /// Node: 0 is Tx, then the relays; the last one is Rx.
+    pub node: usize,
+    /// Mean over the time of the traffic, packets.
+    pub mean: f64,
+    /// Largest number of packets.
+    pub most: usize,
+}
+
+/// Traffic in one direction.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Flow {
+    /// End of the traffic in this direction.
+    pub until: Ps,
+    /// Promised data rate at the first agreement, bit/s.
+    pub promised_bps: f64,
+    /// Offered data rate, bit/s.
+    pub offered_bps: f64,
+    /// Delivered data rate over the whole time, bit/s.
+    pub delivered_bps: f64,
+    /// Counts over the whole time.
+    pub packets: Packets,
+    /// Packets in queues at the end.
+    pub queued: u64,
+    /// Delays of all delivered packets, ascending.
+    pub delays: Vec<Ps>,
+    /// Queue of every node that sends.
+    pub queues: Vec<QueueLength>,
+    /// Delivery in each period of the traffic.
+    pub periods: Vec<Delivery>,
+}
+
+/// Traffic over the whole chain.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Traffic {
+    /// Start: the first agreement.
+    pub from: Ps,
+    /// Latest end of a direction.
+    pub until: Ps,
+    /// Periods.
+    pub periods: Vec<Period>,
+    /// Way to Rx and, if data goes both ways, way back.
+    pub flows: Vec<Flow>,
+}
+
+/// Returns the delay that a fraction of `delays` does not exceed, s; `None` without packets.
+///
+/// `delays` are ascending.
+pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to the number of delays"
+    )]
+    let rank = (fraction * delays.len() as f64).ceil() as usize;
+    let delay = delays.get(rank.saturating_sub(1));
+    delay.map(|delay| *delay as f64 / SECOND)
+}
+
+/// Sends packets through the chain of a run from its first agreement on; `None` if there was none.
+///
+/// `outcome` has the recorded states of `relays` relays. A run that ends by itself goes on in its final state, in each direction for
+/// 1000 packets and 30 more for each hop.
+///
+/// # Errors
+/// [`TrafficError`].
+pub fn traffic(
+    spec: &TrafficSpec,
+    true_hops: &TrueHops,
+    outcome: &Outcome,
+    relays: usize,
+) -> Result<Option<Traffic>, TrafficError> {
+    let Some(track) = &outcome.track else {
+        return Ok(None);
+    };
+    let ended = route::ps(outcome.ended);
+    let Some(route) = route::route(track, true_hops, &spec.link, relays, ended) else {
+        return Ok(None);
+    };
+    let from = route.stages.first().map_or(0, |stage| stage.from);
+    let promised = route.promised_bps.iter().copied();
+    let offered: Vec<f64> = match spec.offered_bps {
+        Some(offered) => promised.zip(offered).map(|(_, offered)| offered).collect(),
+        None => promised.collect(),
+    };
+    let packets = |rate_bps: f64| rate_bps / spec.link.packet_bits;
+    // Whole frames: the promised rate is the mean over a frame.
+    let last = route.stages.last().and_then(|stage| {
+        let mut hops = stage.hops.iter().flatten();
+        hops.next().map(|hop| hop.window)
+    });
+    let ends_itself = !matches!(outcome.ending, Ending::Soaked | Ending::OutOfTime);
+    let end_s = |offered_bps: f64, promised_bps: f64| {
+        let expected_bps = if promised_bps > 0.0 {
+            offered_bps.min(promised_bps)
+        } else {
+            offered_bps
+        };
+        let after_s = if ends_itself && expected_bps > 0.0 {
+            (AFTER + AFTER_A_HOP * (relays + 1)) as f64 / packets(expected_bps)
+        } else {
+            0.0
+        };
+        ended as f64 / SECOND + after_s
+    };
+    let mut flows = Vec::new();
+    let mut sent = 0.0;
+    for (offered_bps, promised_bps) in offered.iter().zip(&route.promised_bps) {
+        let end_s = end_s(*offered_bps, *promised_bps);
+        if end_s > LATEST_S {
+            return Err(TrafficError::TooLong(end_s));
+        }
+        sent += packets(*offered_bps) * (end_s - from as f64 / SECOND) * (relays + 1) as f64;
+        if sent > MOST_SENT {
+            return Err(TrafficError::TooMany(sent));
+        }
+        let until = match last {
+            Some(window) if ends_itself => window.frame_end(time(end_s)),
+            _ => time(end_s),
+        };
+        let mut running = Running::new(spec, &route, flows.len(), *offered_bps);
+        running.run(&route, until);
+        flows.push(running.end((from, until), [*promised_bps, *offered_bps]));
+    }
+    Ok(Some(Traffic {
+        from,
+        until: flows.iter().map(|flow| flow.until).max().unwrap_or(ended),
+        flows,
+        periods: route.periods.clone(),
+    }))
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 1e18"
+)]
+fn time(seconds: f64) -> Ps {
+    (seconds * SECOND) as Ps
+}
+
+/// Queue of a node.
+#[derive(Clone, Debug, Default)]
+struct Queue {
+    /// Creation times of the packets.
+    packets: VecDeque<Ps>,
+    /// Hop on which the node sends.
+    hop: Option<Hop>,
+    /// Rest of the first packet's transmission at `since`; 0 before its start.
+    rest: Ps,
+    since: Ps,
+    /// Number of the valid end of a transmission; others are ignored.
+    number: u32,
+    /// Sum of the queue length over time, packets times ps, until `counted`.
+    sum: u128,
+    counted: Ps,
+    most: usize,
+}
+
+impl Queue {
+    /// Adds the time since the last change to the mean.
+    fn count(&mut self, now: Ps) {
+        self.sum += self.packets.len() as u128 * u128::from(now.saturating_sub(self.counted));
+        self.counted = now;
+        self.most = self.most.max(self.packets.len());
+    }
+
+    /// Begins or continues the transmission of the first packet and returns its end.
+    fn send(&mut self, now: Ps) -> Option<Ps> {
+        self.number += 1;
+        let hop = self.hop.filter(|_| !self.packets.is_empty())?;
+        if self.rest == 0 {
+            self.rest = hop.packet;
+        }
+        self.since = now;
+        Some(hop.window.ends(now, self.rest))
+    }
+
+    /// Takes the hop that is valid from `now` on.
+    fn change(&mut self, hop: Option<Hop>, now: Ps) {
+        self.rest = match (self.hop, hop) {
+            (Some(old), Some(new)) if old.to == new.to && self.rest > 0 => {
+                let sent = old.window.between(self.since, now);
+                let rest = u128::from(self.rest.saturating_sub(sent).max(1));
+                let scaled = (rest * u128::from(new.packet)).div_ceil(u128::from(old.packet));
+                Ps::try_from(scaled).unwrap_or(Ps::MAX)
+            }
+            _ => 0,
+        };
+        self.since = now;
+        self.hop = hop;
+    }
+}
+
+/// End of a transmission; of several at the same time the one nearest to the end of the chain is first.
+type End = Reverse<(Ps, usize, usize, u32)>;
+
+/// Simulation of one direction.
+struct Running<'a> {
+    spec: &'a TrafficSpec,
+    direction: usize,
+    /// Queues of Tx, the relays and Rx.
+    queues: Vec<Queue>,
+    ends: BinaryHeap<End>,
+    /// Time between two packets of the source; `None` if it has none.
+    interval: Option<Ps>,
+    next: Ps,
+    period: usize,
+    periods: Vec<Delivery>,
+}
+
+impl<'a> Running<'a> {
+    fn new(spec: &'a TrafficSpec, route: &Route, direction: usize, offered_bps: f64) -> Self {
+        let first = route.stages.first();
+        let from = first.map_or(0, |stage| stage.from);
+        let queue = Queue {
+            counted: from,
+            since: from,
+            ..Queue::default()
+        };
+        let nodes = first.map_or(0, |stage| stage.on.len()) + 2;
+        let interval_s = spec.link.packet_bits / offered_bps;
+        Self {
+            spec,
+            direction,
+            queues: vec![queue; nodes],
+            ends: BinaryHeap::new(),
+            // Not longer than a frame at the promised rate: each packet is there before its slot.
+            interval: (interval_s <= LATEST_S).then(|| time(interval_s).max(1)),
+            next: from,
+            period: 0,
+            periods: vec![Delivery::default(); route.periods.len()],
+        }
+    }
+
+    /// Returns the nodes at which packets begin and end.
+    fn ends_of_chain(&self) -> [usize; 2] {
+        let rx = self.queues.len() - 1;
+        if self.direction == 0 {
+            [0, rx]
+        } else {
+            [rx, 0]
+        }
+    }
+
+    fn run(&mut self, route: &Route, until: Ps) {
+        let next = route.stages.iter().skip(1).map(|stage| stage.from);
+        for (stage, end) in route.stages.iter().zip(next.chain([until])) {
+            self.enter(stage);
+            self.pass(end.min(until));
+        }
+        for queue in &mut self.queues {
+            queue.count(until);
+        }
+    }
+
+    /// Changes the hops to those of `stage`.
+    fn enter(&mut self, stage: &Stage) {
+        self.period = stage.period;
+        let mut hops: Vec<Option<Hop>> = vec![None; self.queues.len()];
+        for hop in stage.hops.get(self.direction).into_iter().flatten() {
+            if let Some(own) = hops.get_mut(hop.from) {
+                *own = Some(*hop);
+            }
+        }
+        for (node, hop) in hops.into_iter().enumerate() {
+            let Some(queue) = self.queues.get_mut(node) else {
+                continue;
+            };
+            let relay = node.checked_sub(1).and_then(|relay| stage.on.get(relay));
+            let is_off = relay.is_some_and(|on| !on);
+            if is_off && !queue.packets.is_empty() {
+                queue.count(stage.from);
+                let lost = queue.packets.len() as u64;
+                queue.packets.clear();
+                queue.rest = 0;
+                self.counts(|packets| packets.lost += lost);
+            }
+            if let Some(queue) = self.queues.get_mut(node) {
+                queue.change(hop, stage.from);
+            }
+            self.send(node, stage.from);
+        }
+    }
+
+    /// Processes all events before `until`.
+    fn pass(&mut self, until: Ps) {
+        loop {
+            let end = self.ends.peek().map_or(Ps::MAX, |Reverse((at, ..))| *at);
+            let next = self.interval.map_or(Ps::MAX, |_| self.next);
+            // A packet that ends at the end of a stage still belongs to it.
+            if end <= next && end <= until {
+                if let Some(Reverse((at, _, node, number))) = self.ends.pop() {
+                    self.arrive(at, node, number);
+                }
+            } else if next < end && next < until {
+                let [source, _] = self.ends_of_chain();
+                self.counts(|packets| packets.offered += 1);
+                self.put(source, next, next);
+                self.next += self.interval.unwrap_or(Ps::MAX);
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// Moves the first packet of `node` to the receiver, if its transmission is the valid one.
+    fn arrive(&mut self, at: Ps, node: usize, number: u32) {
+        let Some(queue) = self.queues.get_mut(node) else {
+            return;
+        };
+        let Some(hop) = queue.hop.filter(|_| queue.number == number) else {
+            return;
+        };
+        queue.count(at);
+        queue.rest = 0;
+        let Some(created) = queue.packets.pop_front() else {
+            return;
+        };
+        self.send(node, at);
+        let [_, sink] = self.ends_of_chain();
+        if hop.to == sink {
+            self.counts(|packets| packets.delivered += 1);
+            if let Some(period) = self.periods.get_mut(self.period) {
+                period.delays.push(at - created);
+            }
+        } else {
+            self.put(hop.to, at, created);
+        }
+    }
+
+    /// Adds a packet to the queue of `node`, or drops it.
+    fn put(&mut self, node: usize, now: Ps, created: Ps) {
+        let Some(queue) = self.queues.get_mut(node) else {
+            return;
+        };
+        if queue.packets.len() >= self.spec.queue_packets {
+            self.counts(|packets| packets.dropped += 1);
+            return;
+        }
+        queue.count(now);
+        queue.packets.push_back(created);
+        queue.most = queue.most.max(queue.packets.len());
+        if queue.packets.len() == 1 {
+            self.send(node, now);
+        }
+    }
+
+    /// Schedules the end of the present transmission of `node`.
+    fn send(&mut self, node: usize, now: Ps) {
+        let order = if self.direction == 0 {
+            self.queues.len() - node
+        } else {
+            node
+        };
+        if let Some(queue) = self.queues.get_mut(node)
+            && let Some(end) = queue.send(now)
+        {
+            self.ends.push(Reverse((end, order, node, queue.number)));
+        }
+    }
+
+    fn counts(&mut self, change: impl FnOnce(&mut Packets)) {
+        if let Some(period) = self.periods.get_mut(self.period) {
+            change(&mut period.packets);
+        }
+    }
+
+    fn end(mut self, (from, until): (Ps, Ps), [promised_bps, offered_bps]: [f64; 2]) -> Flow {
+        let mut packets = Packets::default();
+        let mut delays = Vec::new();
+        for period in &mut self.periods {
+            packets.offered += period.packets.offered;
+            packets.delivered += period.packets.delivered;
+            packets.dropped += period.packets.dropped;
+            packets.lost += period.packets.lost;
+            delays.extend_from_slice(&period.delays);
+            period.delays.sort_unstable();
+        }
+        delays.sort_unstable();
+        let span = until.saturating_sub(from).max(1) as f64;
+        let [_, sink] = self.ends_of_chain();
+        let nodes = self.queues.iter().enumerate();
+        let senders = nodes.filter(|(node, _)| *node != sink);
+        Flow {
+            until,
+            promised_bps,
+            offered_bps,
+            delivered_bps: packets.delivered as f64 * self.spec.link.packet_bits / span * SECOND,
+            packets,
+            queued: self
+                .queues
+                .iter()
+                .map(|queue| queue.packets.len() as u64)
+                .sum(),
+            delays,
+            queues: senders
+                .map(|(node, queue)| QueueLength {
+                    node,
+                    mean: queue.sum as f64 / span,
+                    most: queue.most,
+                })
+                .collect(),
+            periods: self.periods,
+        }
+    }
+}
