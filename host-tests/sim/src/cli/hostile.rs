@@ -360,6 +360,10 @@ impl Air {
             setup.settings.dead_after = Duration::from_millis(3 * ms);
         }
         if let Some(reach) = self.reach {
+            if setup.settings.wiring == Wiring::Pair {
+                let line = format!("--reach {reach}: would be ignored without --air");
+                return Err(Failure::input(line));
+            }
             setup.radio_reach = reach;
         }
         setup.deaf.clone_from(&self.deaf);
