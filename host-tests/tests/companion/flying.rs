@@ -33,7 +33,9 @@ impl Flight {
     fn found_by(kind: &str, key: Option<&str>, options: &str) -> Self {
         let mut flight = Self::started(kind, [key; 2], options);
         if key.is_some() {
-            flight.relay.line("autopilot: frames to the autopilot are signed");
+            flight
+                .relay
+                .line("autopilot: frames to the autopilot are signed");
         }
         let found = flight.relay.line("autopilot: found a");
         assert!(found.to_lowercase().contains(kind), "{found}");
