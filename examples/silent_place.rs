@@ -31,6 +31,8 @@ const MISSION: Mission = Mission::new(MissionConfig {
         y_m: 400.0,
     }),
     noise_w: 0.0,
+    reverse: 0.0,
+    rx_power_w: 80.0,
     tolerance: 1e-4,
 });
 

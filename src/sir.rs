@@ -83,6 +83,16 @@ impl Sender {
         }
     }
 
+    /// Returns the ground receiver, node N + 1, as the sender of the way back.
+    pub fn receiver(mission: &Mission) -> Self {
+        let config = mission.config();
+        let relative = f64::from(config.rx_power_w) / f64::from(config.tx_power_w);
+        Self {
+            cross_section: CrossSection::on_line(0.0),
+            gain: PowerRatio::new(mission.tx_gain().wide() * relative),
+        }
+    }
+
     /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x. Infinite if both are at one place.
     ///
     /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's
@@ -100,6 +110,29 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
     mission.receiver_gain(power_w) / (square(distance) + across)
+}
+
+/// Returns the SIR at the ground transmitter on the way back, for a relay of `power_w` watts at `from`; 0 without a known interferer.
+pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
+    let across = square(from.y_m) + square(from.altitude_m);
+    transmitter_gain(mission, power_w) / (square(from.x_m) + across)
+}
+
+/// Returns K of the last hop of the way back, m^2: the counterpart of [`Mission::receiver_gain`] at Tx.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a float that fits by the ranges of the mission"
+)]
+pub(crate) fn transmitter_gain(mission: &Mission, power_w: f32) -> f32 {
+    let (config, Some(interferer)) = (mission.config(), mission.known_source()) else {
+        return 0.0;
+    };
+    let (x, y) = (f64::from(interferer.x_m), f64::from(interferer.y_m));
+    let squared = x * x + y * y;
+    let (eta, mu_nlos) = (config.channel.eta(), config.channel.mu_nlos());
+    // P / mu_nlos / squared + N, times squared.
+    let heard = f64::from(interferer.power_w) / mu_nlos + f64::from(config.noise_w) * squared;
+    (f64::from(power_w) * squared / (eta * heard)) as f32
 }
 
 pub(crate) const fn square(x: f32) -> f32 {

@@ -310,6 +310,10 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
     given.value("--tx-power", Some(config.tx_power_w));
     given.value("--uav-power", Some(config.common.power_w));
     given.value("--noise", Some(config.noise_w));
+    if config.reverse > 0.0 {
+        given.value("--reverse", Some(config.reverse));
+        given.value("--rx-power", Some(config.rx_power_w));
+    }
     given.value("--min-separation", Some(config.min_separation_m));
     let mut field = None;
     match config.interference {

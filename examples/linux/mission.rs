@@ -25,6 +25,9 @@ pub const POWER_W: [f32; 2] = [1e-6, 1e6];
 /// Range of a noise power, W.
 pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 
+/// Range of the SIR needed on the way back, relative to that on the way there.
+pub const REVERSE: [f32; 2] = [0.0, 1.0];
+
 /// Range of a minimum separation, m.
 pub const SEPARATION_M: [f32; 2] = [0.0, 1e5];
 
@@ -87,6 +90,12 @@ pub struct MissionOptions {
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
     pub noise: f32,
+    /// SIR that a hop needs on the way back from the receiver, relative to that on the way there, 0 to 1. 0 is one direction
+    #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE))]
+    pub reverse: f32,
+    /// Power of the receiver on the way back, W, 1e-6 to 1e6; default: --tx-power
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
+    pub rx_power: Option<f32>,
     /// Minimum distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
     pub min_separation: f32,
@@ -131,6 +140,8 @@ impl MissionOptions {
             },
             interference,
             noise_w: self.noise,
+            reverse: self.reverse,
+            rx_power_w: self.rx_power.unwrap_or(self.tx_power),
             tolerance: 1e-4,
         })
     }

@@ -51,9 +51,10 @@ fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
             relay,
             measured_per_w: None,
         });
+        let from_m = from[0];
         from = reaches;
         let Some(next) = mission.after(index) else {
-            let end = link.ending(target as f32, reach);
+            let end = link.ending(target as f32, from_m, reach);
             return end.is_some_and(|(slack, _)| slack >= 0.0);
         };
         index = next;

@@ -21,6 +21,8 @@ pub const MISSION: uav_relay::Mission = uav_relay::Mission::new(uav_relay::Missi
         y_m: 400.0,
     }),
     noise_w: 0.0,
+    reverse: 0.0,
+    rx_power_w: 80.0,
     tolerance: 1e-4,
 });
 

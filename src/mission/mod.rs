@@ -49,6 +49,11 @@ pub struct MissionConfig {
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
+    /// SIR that a hop needs on the way back from Rx to Tx, relative to that on the way there (r): 0 to 1. 0 is the paper, with one
+    /// direction; otherwise the worse of SIR and backward SIR / r counts. Above 0 it needs a known interferer.
+    pub reverse: f32,
+    /// Transmit power of the ground receiver on the way back, W: 1e-6 to 1e6. Without effect if `reverse` is 0.
+    pub rx_power_w: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
 }
@@ -62,6 +67,23 @@ impl MissionConfig {
         let step = self.min_separation_m + self.distance_m * ROUNDING;
         if (self.relays - 1) as f32 * step > self.distance_m {
             return Err(MissionError::TooManyForDistance);
+        }
+        Ok(())
+    }
+
+    /// Checks the parameters of the way back.
+    const fn way_back(&self) -> Result<(), MissionError> {
+        if !within(self.reverse, 0.0, 1.0) {
+            return Err(MissionError::Reverse);
+        }
+        if !within(self.rx_power_w, 1e-6, 1e6) {
+            return Err(MissionError::RxPower);
+        }
+        if self.reverse > 0.0 && !cfg!(feature = "reverse") {
+            return Err(MissionError::ReverseFeature);
+        }
+        if self.reverse > 0.0 && !matches!(self.interference, Interference::Source(_)) {
+            return Err(MissionError::ReverseInterference);
         }
         Ok(())
     }
@@ -98,6 +120,14 @@ pub enum MissionError {
     NoiseFeature,
     /// The crate was built without its feature `field`.
     Field,
+    /// `reverse` is not within 0 to 1.
+    Reverse,
+    /// `reverse` is above 0, and the interference is a field or an unknown interferer.
+    ReverseInterference,
+    /// `reverse` is above 0, and the crate was built without its feature `reverse`.
+    ReverseFeature,
+    /// `rx_power_w` is not within 1e-6 to 1e6.
+    RxPower,
     /// `tolerance` is not within 1e-6 to 0.1.
     Tolerance,
 }
@@ -126,6 +156,12 @@ impl core::fmt::Display for MissionError {
             }
             Self::NoiseFeature => "a noise_w above 0 needs the feature `noise`",
             Self::Field => "a field of interference needs the feature `field`",
+            Self::Reverse => "reverse must be within 0 to 1",
+            Self::ReverseInterference => {
+                "a reverse above 0 needs a known interferer: no field of interference, and none that relays locate"
+            }
+            Self::ReverseFeature => "a reverse above 0 needs the feature `reverse`",
+            Self::RxPower => "rx_power_w must be within 1e-6 to 1e6",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
         })
     }
@@ -325,6 +361,8 @@ impl Mission {
             channel,
             interference,
             noise_w,
+            reverse: _,
+            rx_power_w: _,
             tolerance,
         } = config;
         if !within(distance_m, 1.0, 1e6) {
@@ -358,6 +396,9 @@ impl Mission {
         }
         if !within(tolerance, 1e-6, 0.1) {
             return Err(MissionError::Tolerance);
+        }
+        if let Err(error) = config.way_back() {
+            return Err(error);
         }
         if !within(noise_w, 0.0, 1.0) {
             return Err(MissionError::Noise);
@@ -434,6 +475,8 @@ impl Mission {
     ///     channel: CHANNEL,
     ///     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
     ///     noise_w: 0.0,
+    ///     reverse: 0.0,
+    ///     rx_power_w: 80.0,
     ///     tolerance: 1e-4,
     /// });
     /// assert_eq!(MISSION.relays(), 5);
@@ -460,6 +503,8 @@ impl Mission {
     /// #   channel: CHANNEL,
     /// #   interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
     /// #   noise_w: 0.0,
+    /// #   reverse: 0.0,
+    /// #   rx_power_w: 80.0,
     /// #   tolerance: 1e-4,
     /// });
     /// # assert_eq!(MISSION.relays(), 0);
@@ -534,6 +579,17 @@ impl Mission {
     pub const fn noise_at_a_metre(&self) -> f32 {
         if cfg!(feature = "noise") {
             self.noise_at_a_metre
+        } else {
+            0.0
+        }
+    }
+
+    /// r: the SIR that a hop needs on the way back, relative to that on the way there. 0 for one direction.
+    ///
+    /// A constant without the feature `reverse`, so that the compiler drops what is for two directions.
+    pub const fn reverse(&self) -> f32 {
+        if cfg!(feature = "reverse") {
+            self.config.reverse
         } else {
             0.0
         }

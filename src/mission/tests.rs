@@ -27,6 +27,8 @@ pub(crate) fn paper(relays: u16) -> MissionConfig {
         channel: Channel::from_db(2e9, 0.1, 21.0, AirGround::Los).unwrap(),
         interference: Interference::Source(interferer()),
         noise_w: 0.0,
+        reverse: 0.0,
+        rx_power_w: 80.0,
         tolerance: 1e-4,
     }
 }
@@ -40,7 +42,7 @@ fn with_source(config: &mut MissionConfig, change: impl FnOnce(&mut Interferer))
 #[test]
 fn every_parameter_is_checked_at_both_ends_and_for_nan() {
     type Set = fn(&mut MissionConfig, f32);
-    let table: [(Set, f32, f32, MissionError); 12] = [
+    let table: [(Set, f32, f32, MissionError); 14] = [
         (|c, v| c.distance_m = v, 1.0, 1e6, MissionError::Distance),
         (
             |c, v| c.min_separation_m = v,
@@ -89,6 +91,8 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
             1.0,
             MissionError::Noise,
         ),
+        (|c, v| c.reverse = v, 0.0, 1.0, MissionError::Reverse),
+        (|c, v| c.rx_power_w = v, 1e-6, 1e6, MissionError::RxPower),
         (|c, v| c.tolerance = v, 1e-6, 0.1, MissionError::Tolerance),
     ];
     for (set, least, most, error) in table {
@@ -98,11 +102,12 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
             Mission::try_new(config).map(|_| ())
         };
         assert_eq!(with(least), Ok(()), "{error}");
-        let refused = error == MissionError::Noise && !cfg!(feature = "noise");
-        let at_most = if refused {
-            Err(MissionError::NoiseFeature)
-        } else {
-            Ok(())
+        let at_most = match error {
+            MissionError::Noise if !cfg!(feature = "noise") => Err(MissionError::NoiseFeature),
+            MissionError::Reverse if !cfg!(feature = "reverse") => {
+                Err(MissionError::ReverseFeature)
+            }
+            _ => Ok(()),
         };
         assert_eq!(with(most), at_most, "{error}");
         for bad in [

@@ -3,6 +3,7 @@
 //! | purpose | files |
 //! | --- | --- |
 //! | reach of one hop for a target SIR | [`spacing`] toward Rx, [`retreat`] toward Tx in a field |
+//! | the same with a way back | [`reverse`] |
 //! | pass of targets at given altitudes | [`ladder`], [`pass`](mod@pass); [`search`] selects the next targets; [`plan`] runs all of it for a whole chain without messages |
 //! | joint optimum of x, y and altitude | [`joint`] |
 //! | one relay between its neighbours | [`local`]: Algorithm 2 |
@@ -15,6 +16,7 @@ pub mod local;
 pub mod pass;
 pub mod plan;
 pub mod retreat;
+pub mod reverse;
 pub mod search;
 pub mod spacing;
 

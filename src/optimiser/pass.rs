@@ -15,11 +15,15 @@
 use super::PerTarget;
 use super::ladder::{Ladder, TARGETS};
 use super::retreat::{HopInterference, Retreat, Step, least};
+use super::reverse::FromRx;
 use super::spacing::{Hop, RequiredPosition, receiver_reach};
 use crate::mission::{Heading, Mission, Profile};
 use crate::place::Station;
 use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square};
+
+/// Maximum number of positions at which the last relay tries to hold for the way back.
+const HOLDS: u8 = 4;
 
 /// Maximum number of field points per call, for as many targets as that allows, but at least one.
 const POINTS_AT_ONCE: usize = 128;
@@ -86,7 +90,7 @@ impl Link<'_> {
         let mut pairs = targets.iter().zip(from).skip(done);
         match self.onward() {
             // Checked once for all the targets of a sweep.
-            Some(Onward::Rx(hop)) if hop.is_silent() && !self.plain => {
+            Some(Onward::Rx(hop)) if hop.is_simple() && !self.plain => {
                 let reach =
                     |(&target, &from_m): (&f32, &f32)| hop.outermost_in_silence(target, from_m);
                 fill(reaches, pairs.map_while(reach));
@@ -143,7 +147,8 @@ impl Link<'_> {
                 self.index,
                 self.own.cross_section,
                 0.0,
-            );
+            )
+            .both_ways(mission, self.own.power_w);
             return Some(Onward::Rx(match self.end_m {
                 Some(end_m) => hop.ending(end_m),
                 None if self.plain => hop,
@@ -192,14 +197,18 @@ impl Link<'_> {
 
     /// Returns the slack of a chain for `target`, m, and this last relay's position. The position is in its range.
     ///
-    /// `reach` is the end of that range. A slack of 0 or more means that the chain closes. `None` if Rx is out of reach from
+    /// `reach` is the end of that range, and `from_m` that of the relay before. A slack of 0 or more means that the chain closes. `None` if Rx is out of reach from
     /// everywhere. Toward Rx the slack is reach + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the
     /// position, at the position of the range that maximises it.
-    pub fn ending(&self, target: f32, reach: f32) -> Option<(f32, f32)> {
+    pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
             let last_hop = receiver_reach(mission, self.own, target)?;
-            return Some((reach - mission.config().distance_m + last_hop, reach));
+            let slack = |place: f32| place - mission.config().distance_m + last_hop;
+            return Some(match FromRx::new(mission, self.own) {
+                Some(hop) => self.held(&hop, target, from_m, reach, slack),
+                None => (slack(reach), reach),
+            });
         }
         let c = mission.tx_gain().value() / target;
         let beyond = square(self.own.cross_section.altitude_m);
@@ -225,6 +234,45 @@ impl Link<'_> {
             least(interference, c, [beyond, beyond], reach, high, value)?
         };
         Some(((-step.from_m).max(-1e9), step.to_m))
+    }
+
+    /// Returns the largest x up to `most_m` that this relay reaches from the one before, m.
+    fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
+        match self.onward()? {
+            Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
+            _ => Some(most_m),
+        }
+    }
+
+    /// Returns [`Link::ending`] with a way back, over the last hop `hop`. `slack` is that of the way there at a position.
+    fn held(
+        &self,
+        hop: &FromRx,
+        target: f32,
+        from_m: f32,
+        reach: f32,
+        slack: impl Fn(f32) -> f32,
+    ) -> (f32, f32) {
+        let margin = hop.margin(target, reach);
+        if !(margin >= 0.0) && !self.plain {
+            let before = f32::from(self.index.saturating_sub(1));
+            let least_m = before * self.mission.step_with_room(0.0);
+            let mut most_m = reach;
+            for _ in 0..HOLDS {
+                let Some(held) = hop.hold(target, least_m, most_m) else {
+                    break;
+                };
+                let place = self.reached(target, from_m, held);
+                let Some(place) = place.filter(|place| slack(*place) >= 0.0) else {
+                    break;
+                };
+                if place >= held || hop.margin(target, place) >= 0.0 {
+                    return (slack(place), place);
+                }
+                most_m = place;
+            }
+        }
+        (slack(reach).min(margin), reach)
     }
 
     /// Returns the required position of the relay before, with this one at `place`. The reach of the relay before for `target` is
@@ -283,14 +331,14 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the verdict of the last relay, `link`, which has these `reaches`.
-pub fn close(link: &Link<'_>, ladder: Ladder, reaches: &[f32]) -> Verdict {
+/// Returns the verdict of the last relay, `link`, which has these `reaches`. `from` are those of the relay before.
+pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
-    let ends = targets.iter().zip(reaches);
+    let ends = targets.iter().zip(from.iter().zip(reaches));
     fill(
         &mut slacks,
-        ends.map_while(|(&target, &reach)| Some(link.ending(target, reach)?.0)),
+        ends.map_while(|(&target, (&from_m, &reach))| Some(link.ending(target, from_m, reach)?.0)),
     );
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
@@ -371,10 +419,11 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         let mut at = self.mission.leader();
         loop {
             let link = self.link(at);
+            let before_m = from_m;
             from_m = link.reach(self.target, from_m)?;
             visit(at, from_m);
             let Some(next) = self.mission.after(at) else {
-                return link.ending(self.target, from_m);
+                return link.ending(self.target, before_m, from_m);
             };
             at = next;
         }
@@ -404,12 +453,13 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             if !same {
                 return None;
             }
+            let before_m = from_m;
             from_m = reach;
             if at == index || index == 0 {
                 place = Some(reach);
             }
             let Some(next) = self.mission.after(at) else {
-                let (_, end) = self.link(at).ending(self.target, reach)?;
+                let (_, end) = self.link(at).ending(self.target, before_m, reach)?;
                 return place.filter(|_| end.to_bits() == reach.to_bits());
             };
             at = next;
@@ -445,7 +495,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             Heading::TowardRx => self.mission.relays(),
             Heading::TowardTx => 1,
         };
-        let mut place = self.link(at).ending(self.target, self.reach(Some(at))?)?.1;
+        let last = (self.reach(before(self.mission, at))?, self.reach(Some(at))?);
+        let mut place = self.link(at).ending(self.target, last.0, last.1)?.1;
         loop {
             if at == index {
                 return Some(place);

@@ -93,13 +93,13 @@ impl Planner {
             if !link.go_on(&targets, &self.reaches, &mut self.next) {
                 continue;
             }
-            self.reaches = core::mem::take(&mut self.next);
+            let from = core::mem::replace(&mut self.reaches, core::mem::take(&mut self.next));
             if let Some(next) = mission.after(self.index) {
                 self.behind = Some(Behind::of(profile));
                 self.index = next;
                 continue;
             }
-            let verdict = pass::close(&link, *self.search.ladder(), &self.reaches);
+            let verdict = pass::close(&link, *self.search.ladder(), &from, &self.reaches);
             if let Some(commit) = verdict.commit
                 && let Some(&target) = targets.get(usize::from(commit))
             {

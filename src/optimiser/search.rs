@@ -83,6 +83,8 @@ pub struct Search {
     most: Option<f32>,
     /// Bisection after a relay has refused its required position.
     trials: Option<StandTrials>,
+    /// True for a mission with a way back.
+    both_ways: bool,
 }
 
 impl Search {
@@ -110,6 +112,7 @@ impl Search {
                 (ceiling, ceiling, met)
             }
         };
+        let (start, met) = with_way_back(mission, leader, start, met);
         // A subnormal target has no digits left to search with; the lowest of a ladder is up to eight times below `DEPTH`.
         if !(start >= 8.0 * f32::MIN_POSITIVE / DEPTH) {
             return Err(Infeasible);
@@ -136,6 +139,7 @@ impl Search {
             plain,
             most: None,
             trials: None,
+            both_ways: mission.reverse() > 0.0,
         })
     }
 
@@ -152,6 +156,10 @@ impl Search {
 
     /// Returns the lowest target that no chain can meet, after a pass with these `slacks`. `None` after plain passes only.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
+        if cfg!(feature = "reverse") && self.both_ways {
+            // Reaches and held positions of both directions are not proven to exclude no chain.
+            return None;
+        }
         if self.plain || self.trials.is_some() {
             return self.most;
         }
@@ -255,6 +263,27 @@ impl Search {
             None => Ladder::between(low, high),
         }
     }
+}
+
+/// Returns bounds of the target, lowered to those of the way back: the most that Tx receives, and that of relays gathered at Rx.
+fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
+    let MissionConfig {
+        distance_m, common, ..
+    } = *mission.config();
+    let reverse = mission.reverse();
+    if !(reverse > 0.0) {
+        return (start, met);
+    }
+    let to_tx = |x_m| {
+        let from = Placement::on_line(x_m, leader.altitude_m);
+        sir::at_transmitter(mission, from, leader.power_w) / reverse
+    };
+    let above_receiver = Placement::on_line(distance_m, common.altitude_m);
+    let from_rx = Sender::receiver(mission).sir_at(mission, distance_m, above_receiver) / reverse;
+    (
+        start.min(to_tx(0.0)),
+        met.min(to_tx(distance_m)).min(from_rx),
+    )
 }
 
 /// Returns the target with zero slack, by a cubic of log target in the slack. The cubic passes through the four points about the

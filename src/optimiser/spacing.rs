@@ -73,6 +73,7 @@
 //! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and rises with
 //! the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
 
+use super::reverse::{Back, before, closest};
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
@@ -89,7 +90,7 @@ pub enum RequiredPosition {
 }
 
 /// Maximum ratio of target and gain. Above it no hop is short enough, and below it every term of f is finite.
-const MOST_RATIO: f32 = 1e18;
+pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Hop toward Rx, prepared for evaluation with many targets.
 ///
@@ -114,6 +115,8 @@ pub struct Hop {
     end_m: f32,
     /// Maximum x of the receiver and of its sender that leaves the relays after each their separation, m.
     gathered_m: [f32; 2],
+    /// The same hop on the way back; `None` for a chain of one direction.
+    back: Option<Back>,
 }
 
 impl Hop {
@@ -167,7 +170,25 @@ impl Hop {
             least_step: 0.0,
             end_m,
             gathered_m: [end_m; 2],
+            back: None,
         }
+    }
+
+    fn back(&self) -> Option<&Back> {
+        if cfg!(feature = "reverse") {
+            self.back.as_ref()
+        } else {
+            None
+        }
+    }
+
+    /// Returns this hop for a mission with a way back. `power_w` is the power of its receiver, W.
+    #[inline]
+    pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
+        if mission.reverse() > 0.0 {
+            self.back = Back::new(mission, self.sender.cross_section, power_w, self.from_tx);
+        }
+        self
     }
 
     /// Returns this hop with a range that reserves no separation for the relays after `index`.
@@ -187,6 +208,25 @@ impl Hop {
     /// `target` is a linear SIR above zero, `from_m` the sender's x in [0, D]. The result is rounded toward the sender, so it
     /// meets the target as an f32. Constant work; with noise at most 96 evaluations of the hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
+        if self.is_simple() {
+            self.in_silence(target, from_m)
+        } else {
+            self.in_noise_or_both_ways(target, from_m)
+        }
+    }
+
+    #[inline(never)] // keeps the reach of a simple hop small
+    fn in_noise_or_both_ways(&self, target: f32, from_m: f32) -> Option<f32> {
+        let Some(back) = self.back() else {
+            return self.onward(target, from_m);
+        };
+        let longest = back.reach(target, from_m, self.across_squared)?;
+        let place = rounded(from_m, longest)?.min(self.end_m);
+        self.ending(place).onward(target, from_m)
+    }
+
+    /// Returns the reach in the direction of Rx alone.
+    fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
         } else {
@@ -242,8 +282,58 @@ impl Hop {
     /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step before.
     /// Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
-        self.reach(target, from_m)
-            .or_else(|| self.held_back(target, from_m))
+        let place = self
+            .reach(target, from_m)
+            .or_else(|| self.held_back(target, from_m))?;
+        Some(match self.back() {
+            Some(back) if !self.from_tx => self.beyond(back, target, from_m, place),
+            _ => place,
+        })
+    }
+
+    /// Returns the largest x of the receiver for any position of its sender up to `from_m`; `place` for the sender there.
+    #[inline(never)] // keeps a sweep without a way back small
+    fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
+        let end_m = self.end_m;
+        let limit = back
+            .reach(target, from_m, self.across_squared)
+            .map_or(0.0, |d| from_m + d);
+        let is_met = |x: f32| self.sender(back, target, from_m, x).is_some();
+        let (mut low, mut high) = (place, end_m);
+        if place >= end_m || place < limit.next_down().next_down() || !is_met(place + 1e-5 * end_m)
+        {
+            return place;
+        }
+        if is_met(end_m) {
+            return end_m;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if !(middle > low && middle < high) {
+                break;
+            }
+            if is_met(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
+    /// Returns the largest x up to `near` of the sender of a receiver at `place`, in both directions; `None` if there is none.
+    fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
+        let hop = back.from(target, place, self.across_squared);
+        let least = place - near;
+        let from = if hop.is_met(least) {
+            near
+        } else {
+            before(place, closest(&hop, least, place)?)
+        };
+        let heard = square(self.interferer_x_m - place) + self.aside_squared;
+        let squared = square(place - from) + self.across_squared;
+        let needed = self.sender.gain.ratio(target) * squared * (1.0 - ROUNDING);
+        (from >= 0.0 && in_noise(heard, self.nu()) >= needed).then_some(from)
     }
 
     pub(super) fn outermost_in_silence(&self, target: f32, from_m: f32) -> Option<f32> {
@@ -251,6 +341,7 @@ impl Hop {
             .or_else(|| self.held_back(target, from_m))
     }
 
+    #[inline(never)] // keeps a sweep in which no relay holds back small
     fn held_back(&self, target: f32, from_m: f32) -> Option<f32> {
         let ratio = self.sender.gain.ratio(target);
         if self.from_tx || !(ratio <= MOST_RATIO) {
@@ -266,11 +357,20 @@ impl Hop {
             return None;
         }
         let zone = sqrt(needed / left - self.aside_squared);
-        let place = if (near - self.interferer_x_m).abs() < zone {
-            (self.interferer_x_m - zone).next_down()
-        } else {
-            near
+        let before_zone = |place: f32| {
+            if (place - self.interferer_x_m).abs() < zone {
+                (self.interferer_x_m - zone).next_down()
+            } else {
+                place
+            }
         };
+        let mut place = before_zone(near);
+        if let Some(back) = self.back() {
+            let zone = back.zone(target, square(nearest) + self.across_squared)?;
+            if (self.before(place) - self.interferer_x_m).abs() < zone {
+                place = before_zone((self.interferer_x_m - zone + self.least_step).next_down());
+            }
+        }
         (self.before(place) >= 0.0).then_some(place)
     }
 
@@ -295,7 +395,7 @@ impl Hop {
     ) -> Option<RequiredPosition> {
         if self
             .reach(target, from_m)
-            .is_some_and(|reach| place >= reach)
+            .is_some_and(|reach| place >= reach && (place <= reach || self.back().is_none()))
         {
             return Some(RequiredPosition::AtReach);
         }
@@ -303,8 +403,13 @@ impl Hop {
         let heard = in_noise(heard, self.nu());
         let ratio = self.sender.gain.ratio(target);
         let at = |from: f32| {
-            let needed = ratio * (square(place - from) + self.across_squared);
-            let met = from >= 0.0 && heard >= needed * (1.0 - ROUNDING);
+            let squared = square(place - from) + self.across_squared;
+            let allowed = 1.0 - ROUNDING;
+            let met = from >= 0.0
+                && heard >= ratio * squared * allowed
+                && self
+                    .back()
+                    .is_none_or(|back| back.hears(from) >= target * squared * allowed);
             met.then_some(if from < from_m {
                 RequiredPosition::At(from)
             } else {
@@ -318,7 +423,11 @@ impl Hop {
         // If all relays gather at the end, they are spaced as evenly as by a pass that leaves them room from the start.
         let [own, sender] = self.gathered_m;
         let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
-        gathered.flatten().or_else(|| at(near))
+        let required = gathered.flatten().or_else(|| at(near));
+        required.or_else(|| {
+            let from = self.sender(self.back()?, target, near, place)?;
+            Some(RequiredPosition::At(from))
+        })
     }
 
     /// Returns the reach without a minimum step, as a smooth function of all parameters. `None` if there is none. It is before
@@ -417,6 +526,11 @@ const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 const CLOSE: f32 = 5e-7;
 
 impl Hop {
+    /// Returns true for a hop without noise and without a way back.
+    pub(super) fn is_simple(&self) -> bool {
+        self.is_silent() && self.back().is_none()
+    }
+
     pub(in crate::optimiser) fn is_silent(&self) -> bool {
         !(self.nu() > 0.0)
     }

@@ -60,6 +60,8 @@ use crate::wire::upload::{Upload, UploadError};
 ///     lateral: Band::NONE,
 ///     interference: Interference::Source(Interferer { power_w: 80.0, x_m: 500.0, y_m: 400.0 }),
 ///     noise_w: 0.0,
+///     reverse: 0.0,
+///     rx_power_w: 80.0,
 ///     tolerance: 1e-4,
 /// })?;
 /// let identity = Identity { network: 7, index: 1 };

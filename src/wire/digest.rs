@@ -61,6 +61,11 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
     if c.noise_w > 0.0 {
         add(&mut crc, &c.noise_w.to_le_bytes());
     }
+    // Likewise for the way back. With noise or without it, the two numbers make the input longer by eight bytes.
+    if cfg!(feature = "reverse") && c.reverse > 0.0 {
+        add(&mut crc, &c.reverse.to_le_bytes());
+        add(&mut crc, &c.rx_power_w.to_le_bytes());
+    }
     low_half(crc.finalize())
 }
 
@@ -142,6 +147,19 @@ mod tests {
         assert_ne!(same, of(|c| c.tolerance = 2e-4));
         if cfg!(feature = "noise") {
             assert_ne!(same, of(|c| c.noise_w = 1e-13));
+        }
+        assert_eq!(same, of(|c| c.rx_power_w = 5.0));
+        if cfg!(feature = "reverse") {
+            let back = of(|c| c.reverse = 1.0);
+            assert_ne!(same, back);
+            assert_ne!(back, of(|c| c.reverse = 0.5));
+            assert_ne!(
+                back,
+                of(|c| {
+                    c.reverse = 1.0;
+                    c.rx_power_w = 5.0;
+                })
+            );
         }
     }
 }

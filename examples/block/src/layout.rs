@@ -49,6 +49,8 @@ pub(super) struct Layout {
     pub(super) listen_us: [U64; 2],
     pub(super) relative_error: F32,
     pub(super) probe_after_ms: U32,
+    pub(super) reverse: F32,
+    pub(super) rx_power_w: F32,
     pub(super) crc: U32,
 }
 

@@ -54,7 +54,9 @@
 //! | 360 | u64 | half-life of a measurement's weight, us |
 //! | 368 | f32 | relative error of one measurement, 1e-3 to 1 |
 //! | 372 | u32 | silence until a neighbour is probed, ms, at most 1200000; it is lost after three times as long. 0 means 5000 |
-//! | 376 | u32 | CRC-32C of bytes 0 to 375 |
+//! | 376 | f32 | SIR needed on the way back from Rx to Tx, relative to that on the way there: 0 (one direction) to 1 |
+//! | 380 | f32 | power of the receiver on the way back, W; without effect if the number before is 0 |
+//! | 384 | u32 | CRC-32C of bytes 0 to 383 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by
 //! `course.rs`, `Axis`.
@@ -94,10 +96,10 @@ pub const BAUD: u32 = 115_200;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// Version of the table above.
-pub const VERSION: u16 = 9;
+pub const VERSION: u16 = 10;
 
 /// Length of a block, bytes.
-pub const LEN: usize = 380;
+pub const LEN: usize = 388;
 
 /// Maximum number of points of a field in a block.
 pub const MAX_POINTS: usize = 16;
@@ -109,7 +111,7 @@ const CHECKED: usize = LEN - 4;
 pub const MOST_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of [`LEN`] in the block.
-const LEN_FIELD: u16 = 380;
+const LEN_FIELD: u16 = 388;
 
 /// Block as stored.
 pub type Block = [u8; LEN];
@@ -175,6 +177,8 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         channel: numbers.channel().map_err(ConfigError::Channel)?,
         interference,
         noise_w: raw.noise_w.get(),
+        reverse: raw.reverse.get(),
+        rx_power_w: raw.rx_power_w.get(),
         tolerance: raw.tolerance.get(),
     })
     .map_err(ConfigError::Mission)?;
@@ -190,6 +194,10 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     }
     if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
+    }
+    let is_one_way = !(mission.config().reverse > 0.0);
+    if !(is_one_way || method == Method::Align && listen.is_none()) {
+        return Err(ConfigError::Reverse);
     }
     Ok(Config {
         identity: Identity {

@@ -61,6 +61,8 @@ pub fn write(
         rounds: rounds.into(),
         points: u16::try_from(points.len()).unwrap_or(u16::MAX).into(),
         noise_w: mission.noise_w.into(),
+        reverse: mission.reverse.into(),
+        rx_power_w: mission.rx_power_w.into(),
         autopilot_key: autopilot_key.unwrap_or_default(),
         probe_after_ms: config.probe_after_ms.into(),
         ..Layout::new_zeroed()

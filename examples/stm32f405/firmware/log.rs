@@ -189,6 +189,9 @@ pub(crate) fn refused(error: ConfigError) {
                 "configuration refused: settings for measurements (listen) out of range, or in a field"
             );
         }
+        ConfigError::Reverse => {
+            error!("configuration refused: a way back needs align, and no listen");
+        }
         ConfigError::Interferer => {
             error!("configuration refused: it has both an interferer and a field");
         }

@@ -36,6 +36,8 @@ pub fn paper(relays: u16) -> Mission {
             y_m: 400.0,
         }),
         noise_w: 0.0,
+        reverse: 0.0,
+        rx_power_w: 80.0,
         tolerance: 1e-4,
     })
     .expect("in range")

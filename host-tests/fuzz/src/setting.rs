@@ -77,6 +77,8 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             y_m: 400.0,
         }),
         noise_w: 0.0,
+        reverse: 0.0,
+        rx_power_w: 80.0,
         tolerance: 1e-4,
     };
     Some(match kind {
@@ -159,6 +161,8 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         lateral,
         interference,
         noise_w: 0.0,
+        reverse: 0.0,
+        rx_power_w: 80.0,
         tolerance: input.scaled(1e-6, 0.1),
     })
 }

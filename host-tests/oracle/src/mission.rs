@@ -41,6 +41,8 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
             y_m: narrow(link.y_i),
         }),
         noise_w: narrow(link.noise_w),
+        reverse: 0.0,
+        rx_power_w: narrow(link.tx_w),
         tolerance: narrow(tolerance),
     };
     let own = (1..)
@@ -111,6 +113,8 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
         .ok()?,
         interference: uav_relay::Interference::Field(Field::try_new(points.leak()).ok()?),
         noise_w: 0.0,
+        reverse: 0.0,
+        rx_power_w: narrow(link.tx_w),
         tolerance: 1e-4,
     };
     Mission::try_new(config).ok()

@@ -87,11 +87,22 @@ struct RawNoise {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawDataLink {
-    #[serde(default)]
-    access: Access,
+    access: Option<Access>,
     bandwidth_hz: Option<f64>,
     gap_db: Option<f64>,
     steps: Option<Vec<RateStep>>,
+    reverse: Option<f64>,
+}
+
+impl RawDataLink {
+    /// Returns true if the table describes a radio, and not only the way back.
+    const fn has_radio(&self) -> bool {
+        self.access.is_some()
+            || self.bandwidth_hz.is_some()
+            || self.gap_db.is_some()
+            || self.steps.is_some()
+            || self.reverse.is_none()
+    }
 }
 
 #[derive(Deserialize)]
@@ -206,8 +217,14 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
             relative_error: raw.relative_error,
         }),
         noise: noise(&raw.noise, &powers),
+        reverse: raw
+            .link
+            .as_ref()
+            .and_then(|link| link.reverse)
+            .unwrap_or(0.0),
         link: raw
             .link
+            .filter(RawDataLink::has_radio)
             .map(|link| data_link(file, link, raw.noise.bandwidth_hz))
             .transpose()?,
         relays: relays(file, raw.relay, powers.uav_gain_dbi)?,
@@ -268,7 +285,7 @@ fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link
         }
     }
     Ok(Link {
-        access: raw.access,
+        access: raw.access.unwrap_or_default(),
         bandwidth_hz: raw.bandwidth_hz,
         model: if steps.is_empty() {
             RateModel::Shannon {

@@ -210,6 +210,7 @@ const LINK: Keys = &[
     optional("bandwidth_hz", Number(range(1.0, 1e12, "Hz"))),
     without(&["steps"], "gap_db", Number(range(0.0, 30.0, "dB"))),
     optional("steps", Rule::Tables(RATE_STEP, 1)),
+    optional("reverse", Number(range(0.0, 1.0, ""))),
 ];
 
 const RATE_STEP: Keys = &[

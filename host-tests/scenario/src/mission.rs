@@ -18,6 +18,8 @@ use crate::{Interference, Scenario, Source};
 pub enum Refusal {
     /// No single hypothetical interferer can replace the scenario's interferers.
     NoHypothetical,
+    /// Several interferers and a way back: the hypothetical interferer is fitted to one direction.
+    ReverseSources,
     /// The relays do not fit on the distance with their least separation.
     NoRoom {
         /// Number of relays.
@@ -41,6 +43,9 @@ impl fmt::Display for Refusal {
             Self::NoHypothetical => {
                 f.write_str("no single interferer has the same effect as these [[interferer]]")
             }
+            Self::ReverseSources => f.write_str(
+                "link.reverse above 0 needs one [[interferer]]: one that replaces several is fitted for one direction",
+            ),
             Self::NoRoom {
                 relays,
                 apart_m,
@@ -76,6 +81,8 @@ pub fn mission(
         Interference::Sources(sources) => {
             let one = if let [source] = sources.as_slice() {
                 interferer(source)
+            } else if scenario.reverse > 0.0 {
+                return Err(Refusal::ReverseSources);
             } else {
                 let one = hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
                 interferer(&one.source())
@@ -107,6 +114,8 @@ pub fn mission(
         channel: channel(scenario).map_err(Refusal::Channel)?,
         interference,
         noise_w: narrow(scenario.noise.power_w()),
+        reverse: narrow(scenario.reverse),
+        rx_power_w: narrow(scenario.rx_w),
         tolerance: narrow(tolerance),
     };
     let mission = Mission::try_new(config).map_err(|error| match error {

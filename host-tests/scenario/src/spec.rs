@@ -46,6 +46,8 @@ pub struct Scenario {
     pub noise: Noise,
     /// Data link, if the file has one.
     pub link: Option<Link>,
+    /// SIR that a hop needs on the way back from Rx to Tx, relative to that on the way there, 0 to 1. With 0 only the way there counts.
+    pub reverse: f64,
     /// Differences of single relays, by index (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
     /// Plan, if the file has one.
@@ -261,6 +263,7 @@ impl Default for Scenario {
             listen: None,
             noise: Noise::default(),
             link: None,
+            reverse: 0.0,
             relays: BTreeMap::new(),
             plan: None,
         }

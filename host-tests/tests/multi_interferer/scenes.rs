@@ -72,6 +72,7 @@ pub(crate) fn scenario(
         line: None,
         listen: None,
         link: None,
+        reverse: 0.0,
         plan: None,
         distance_m: d,
         altitude_m,

@@ -73,6 +73,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
         line: None,
         listen: None,
         link: None,
+        reverse: 0.0,
         plan: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,

@@ -79,6 +79,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         line: None,
         listen: None,
         link: None,
+        reverse: 0.0,
         plan: None,
         distance_m: d,
         altitude_m,

@@ -106,9 +106,17 @@ pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
             1 => scaled(rng, 1e-13, 1e-30, 1.0),
             _ => scaled(rng, 1e-13, f32::from_bits(1), 1e-9),
         },
+        reverse: 0.0,
+        rx_power_w: scaled(rng, 80.0, 1e-6, 1e6),
         tolerance: scaled(rng, 1e-4, 1e-6, 0.1),
     };
-    Mission::try_new(config).ok()
+    let is_known = matches!(config.interference, Interference::Source(_));
+    let reverse = match rng.random_range(0..4) {
+        0 if is_known => 1.0,
+        1 if is_known => scaled(rng, 0.3, f32::from_bits(1), 1.0),
+        _ => 0.0,
+    };
+    Mission::try_new(MissionConfig { reverse, ..config }).ok()
 }
 
 fn channel(rng: &mut impl Rng) -> Option<Channel> {
@@ -125,10 +133,11 @@ fn channel(rng: &mut impl Rng) -> Option<Channel> {
 
 /// Draws the common settings of a chain of `mission`.
 pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
+    let one_way = mission.config().reverse == 0.0;
     let sourced = mission.field().is_none();
     let method = match rng.random_range(0..3) {
-        0 if sourced => Method::Joint,
-        1 if sourced => Method::Adjust(Adjust {
+        0 if sourced && one_way => Method::Joint,
+        1 if sourced && one_way => Method::Adjust(Adjust {
             rounds: rng.random_range(0..4),
             explore_m: match rng.random_range(0..4) {
                 0 => 0.0,
@@ -154,7 +163,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let probe_after = micros(rng, 5e6, 1e6);
     Settings {
         method,
-        listen: (sourced && rng.random()).then(|| Listen {
+        listen: (sourced && one_way && rng.random()).then(|| Listen {
             every: micros(rng, 5e6, 1e5),
             half_life: micros(rng, 6e7, 1.0),
             relative_error: scaled(rng, 0.03, 1e-3, 1.0),

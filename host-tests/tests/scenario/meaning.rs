@@ -47,6 +47,7 @@ fn a_file_with_every_key_means_what_it_says() {
         line: None,
         listen: None,
         link: None,
+        reverse: 0.0,
         plan: None,
         distance_m: 1500.0,
         altitude_m: 25.0,

@@ -95,7 +95,12 @@ fn a_data_link_that_cannot_be_is_refused() {
         steps("{ sinr_db = 5, bits_per_hz = 0.5 }"),
         steps("{ sinr_db = 5, bits_per_hz = 0 }"),
         steps("{ sinr_db = nan, bits_per_hz = 1 }"),
+        small("[link]\nreverse = 1.5\n"),
+        small("[link]\nreverse = -0.1\n"),
+        small("[link]\nreverse = nan\n"),
     ]));
+    let both = parse(&small("[link]\nreverse = 0.5\n")).unwrap();
+    assert!(both.link.is_none() && (both.reverse - 0.5).abs() < 1e-12);
     // Without noise its bandwidth may be 0.
     let silent = parse(&small(
         "[link]\nbandwidth_hz = 1e7\n[noise]\nbandwidth_hz = 0\n",

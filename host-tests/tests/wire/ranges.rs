@@ -80,6 +80,8 @@ fn other(channel: Channel) -> MissionConfig {
             y_m: -300.0,
         }),
         noise_w: 1e-12,
+        reverse: 0.0,
+        rx_power_w: 70.0,
         tolerance: 2e-4,
     }
 }

@@ -234,10 +234,11 @@ impl SweepPass {
         let targets = self.ladder.targets();
         self.done = link.go_on(&targets, &self.from, &mut self.reaches);
         if self.done && link.mission.after(link.index).is_none() {
-            self.verdict = close(&link, self.ladder, &self.reaches);
+            self.verdict = close(&link, self.ladder, &self.from, &self.reaches);
             let place = self
                 .committed()
-                .and_then(|(target, reach)| Some(link.ending(target, reach)?.1));
+                .zip(self.committed_before())
+                .and_then(|((target, reach), from_m)| Some(link.ending(target, from_m, reach)?.1));
             self.settle(&link, place);
         }
         self.done
@@ -273,10 +274,10 @@ impl SweepPass {
 
     /// Takes the position of the verdict; revokes the commit if it leaves the previous relay none.
     fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
-        let Some(commit) = self.verdict.commit else {
+        if self.verdict.commit.is_none() {
             return;
-        };
-        let before = self.from.get(usize::from(commit)).copied();
+        }
+        let before = self.committed_before();
         let required = match (self.committed(), before, place) {
             (Some((target, _)), Some(from_m), Some(place)) => {
                 link.required_position(target, from_m, place)
@@ -302,6 +303,11 @@ impl SweepPass {
             *self.ladder.targets().get(commit)?,
             *self.reaches.get(commit)?,
         ))
+    }
+
+    /// Returns the reach of the previous relay for the committed target, m.
+    fn committed_before(&self) -> Option<f32> {
+        self.from.get(usize::from(self.verdict.commit?)).copied()
     }
 
     /// Returns this relay's agreed position, m along x, and the committed target.

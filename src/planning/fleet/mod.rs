@@ -166,15 +166,17 @@ fn toward_rx(
     profile_of: &impl Fn(u16) -> Profile,
 ) -> Option<Fewest> {
     let mut from_m = 0.0;
-    let mut proven = true;
+    // Reaches of both directions are not proven to exclude no chain.
+    let mut proven = !(mission.reverse() > 0.0);
     for index in 1..=MAX_RELAYS {
         let mission = mission.with_relays(index).ok()?;
         // The last relay of its chain may go to the very end.
         let last = chain(&mission, target, profile_of);
         let link = last.link(index);
+        let before_m = from_m;
         from_m = link.reach(target, from_m)?;
         if !link
-            .ending(target, from_m)
+            .ending(target, before_m, from_m)
             .is_some_and(|(slack, _)| slack >= 0.0)
         {
             continue;

@@ -134,6 +134,9 @@ impl OfferBody {
                 })
             },
             noise_w: self.noise_w,
+            // An upload has one direction.
+            reverse: 0.0,
+            rx_power_w: tx_power_w,
             tolerance,
         };
         let pass = self.pass;

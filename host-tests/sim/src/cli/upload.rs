@@ -238,6 +238,8 @@ impl Planned {
                 y_m: to(Key::Y, at.y_m),
             }),
             noise_w: to(Key::Noise, base.noise_w),
+            reverse: base.reverse,
+            rx_power_w: base.rx_power_w,
             tolerance: to(Key::Tolerance, base.tolerance),
             ..*base
         })

@@ -9,7 +9,7 @@ use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Scenario, mission};
 
 use super::attack::AttackReport;
-use super::hops::{LostReport, RelayReport, db, hop_sirs};
+use super::hops::{LostReport, RelayReport, WorstBack, db, hop_sirs, hop_sirs_back};
 use super::sensing::SensingReport;
 use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
 use super::traffic::TrafficReport;
@@ -52,11 +52,16 @@ pub struct ChainReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// SIR of the worst hop, linear; absent unless every relay of the chain has a position.
+    ///
+    /// With a way back the worse of that of the way there, and of the way back divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the worst hop, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
+    /// Worst hop of the way back; absent in a mission of one direction.
+    #[serde(flatten)]
+    pub back: Option<WorstBack>,
     /// Target SIR that the relays agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
@@ -141,9 +146,17 @@ impl ChainReport {
             .collect();
         let places = places.unwrap_or_default();
         let sirs = hop_sirs(mission, &places);
+        let sirs_back = hop_sirs_back(mission, &places);
+        let back = WorstBack::of(mission, &sirs_back);
         let worst = sirs.iter().copied().reduce(f64::min);
+        let worst = worst.map(|sir| back.map_or(sir, |back| back.both(sir)));
         let mut relays = hops::relays(&places, &sirs);
         let offered = outcome.offered();
+        if back.is_some() {
+            for (report, sir) in relays.iter_mut().zip(&sirs_back) {
+                report.sir_back = Some(*sir);
+            }
+        }
         for (report, (node, relay)) in relays.iter_mut().zip(&chain) {
             report.index = *node;
             report.version = offered.map(|_| relay.version);
@@ -170,6 +183,7 @@ impl ChainReport {
                 .then_some(0.0),
             sir: worst,
             sir_db: worst.map(db),
+            back,
             target: target.map(f64::from),
             promised,
             rounds: outcome.rounds.iter().copied().map(f64::from).collect(),
@@ -229,24 +243,14 @@ impl ChainReport {
                 self.method
             );
         }
-        match self.version {
-            None => {}
-            Some(0) if self.timeline.iter().any(|moment| moment.what == "adopted") => {
-                _ = writeln!(
-                    text,
-                    "no remaining relay flies the mission that was uploaded and adopted"
-                );
-            }
-            Some(0) => {
-                _ = writeln!(
-                    text,
-                    "the chain flies the mission that it took off with: no upload was adopted"
-                );
-            }
-            Some(version) => {
-                _ = writeln!(text, "the chain flies mission {version}, as uploaded");
-            }
+        if let Some(back) = self.back {
+            _ = writeln!(
+                text,
+                "way back: worst hop SIR {:.6} ({:.3} dB); it needs {:?} of the SIR of the way there (link.reverse)",
+                back.worst_back, back.worst_back_db, back.reverse
+            );
         }
+        text += &self.flown_text();
         if self.channel.is_some() {
             _ = writeln!(
                 text,
@@ -315,6 +319,19 @@ impl ChainReport {
             text += &traffic.text();
         }
         text
+    }
+
+    /// Formats the mission that the chain flies; empty without uploads.
+    fn flown_text(&self) -> String {
+        match self.version {
+            None => String::new(),
+            Some(0) if self.timeline.iter().any(|moment| moment.what == "adopted") => {
+                "no remaining relay flies the mission that was uploaded and adopted\n".to_owned()
+            }
+            Some(0) => "the chain flies the mission that it took off with: no upload was adopted\n"
+                .to_owned(),
+            Some(version) => format!("the chain flies mission {version}, as uploaded\n"),
+        }
     }
 
     /// Formats the number of remaining relays, with the total if some are lost.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use uav_relay::place::Station;
-use uav_relay::sir::{Sender, at_receiver};
+use uav_relay::sir::{Sender, at_receiver, at_transmitter};
 use uav_relay::{Mission, Placement, Profile};
 
 /// Position and SIR of a relay.
@@ -81,6 +81,57 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
         sirs.push(f64::from(at_receiver(mission, *place, profile.power_w)));
     }
     sirs
+}
+
+/// Returns the SIR of every hop on the way back from Rx to Tx. Hop k is received by node k - 1.
+///
+/// Uses the crate's formulas, limited as [`hop_sirs`]. Empty unless the mission has one known interferer.
+pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
+    let (Some((first, profile)), Some(_)) = (places.first(), mission.known_source()) else {
+        return Vec::new();
+    };
+    let limited = |sir: f32| f64::from(sir.min(f32::MAX));
+    let mut sirs = vec![limited(at_transmitter(mission, *first, profile.power_w))];
+    let senders = places.iter().skip(1).map(|(place, profile)| {
+        let relay = Station {
+            cross_section: place.cross_section(),
+            power_w: profile.power_w,
+        };
+        (Sender::relay(mission, relay), place.x_m)
+    });
+    let rx = (Sender::receiver(mission), mission.config().distance_m);
+    let hops = places.iter().zip(senders.chain([rx]));
+    sirs.extend(hops.map(|((to, _), (sender, x_m))| limited(sender.sir_at(mission, x_m, *to))));
+    sirs
+}
+
+/// SIR of the worst hop on the way back.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct WorstBack {
+    /// SIR needed on the way back, relative to that on the way there: `link.reverse`.
+    pub reverse: f64,
+    /// SIR of the worst hop on the way back, linear.
+    pub worst_back: f64,
+    /// SIR of the worst hop on the way back, dB.
+    pub worst_back_db: f64,
+}
+
+impl WorstBack {
+    /// Returns the worst of `sirs`, if the mission has a way back.
+    pub fn of(mission: &Mission, sirs: &[f64]) -> Option<Self> {
+        let reverse = f64::from(mission.config().reverse);
+        let worst_back = sirs.iter().copied().reduce(f64::min)?;
+        (reverse > 0.0).then(|| Self {
+            reverse,
+            worst_back,
+            worst_back_db: db(worst_back),
+        })
+    }
+
+    /// Returns the worse of `sir`, that of the way there, and of the way back divided by `reverse`.
+    pub fn both(&self, sir: f64) -> f64 {
+        sir.min(self.worst_back / self.reverse)
+    }
 }
 
 /// Reports the relays at `places` with the SIR of the hop that ends at each.

@@ -282,7 +282,7 @@ const IGNORED: &[&str] = &[
     "--tolerance 0.01 --method align-step",
     "--closed-loop 2",
     "--burst 3",
-        "--reach 3",
+    "--reach 3",
     "--samples 5",
     "--shadow 0",
     "--move-interferer 1,-2",

@@ -7,6 +7,33 @@ use uav_relay_scenario::scene::Scene;
 use super::{chain, example, json, refusal};
 
 #[test]
+fn a_way_back_is_flown_by_align_and_refused_by_the_other_methods() {
+    let file = std::env::temp_dir().join(format!("way_back_{}.toml", std::process::id()));
+    let text = uav_relay_scenario::DEFAULT;
+    std::fs::write(&file, format!("{text}\n[link]\nreverse = 1.0\n")).unwrap();
+    let ask = format!("--uavs 5 --scenario {}", file.display());
+    let report = json(&ask);
+    let [sir, back, reverse] =
+        ["sir", "worst_back", "reverse"].map(|key| report[key].as_f64().unwrap());
+    assert_eq!(reverse, 1.0);
+    assert_eq!(report["messages"], 8);
+    assert!(
+        sir <= back && sir > 0.99 * report["target"].as_f64().unwrap(),
+        "{report}"
+    );
+    assert!(
+        report["relays"][0]["sir_back"].as_f64().unwrap() >= sir,
+        "{report}"
+    );
+    for method in ["joint", "adjust"] {
+        let (status, line) = refusal(&format!("{ask} --method {method}"));
+        assert_eq!(status, 2);
+        assert!(line.contains("reverse") && line.contains("Align"), "{line}");
+    }
+    std::fs::remove_file(&file).unwrap();
+}
+
+#[test]
 fn the_fixed_step_reports_the_papers_sweeps() {
     let report = json("--uavs 2 --method align-step --epsilon 0.1");
     assert_eq!(report["sweeps"].as_u64(), Some(10_245));

@@ -126,6 +126,14 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     if !is_asked && scenario.link.is_none() {
         return Ok(None);
     }
+    if scenario.reverse > 0.0 {
+        return Err(Failure::input(format!(
+            "{}: link.reverse = {:?}: data rates are for one direction; allowed: link.reverse = 0.0, or no other key of link, --rates, \
+             --bandwidth-hz and --target-rate-bps",
+            options.file(),
+            scenario.reverse
+        )));
+    }
     let refused = |error: BandwidthError| {
         let asked = match (error, target_bps, options.rates) {
             (BandwidthError::Contradicts { .. }, ..) => options.file(),

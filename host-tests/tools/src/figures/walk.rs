@@ -99,6 +99,8 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
                 end_m: None,
             },
             ladder,
+            // Without effect in the forward direction.
+            &reached,
             &reached,
         );
         sweeps.push(Sweep {

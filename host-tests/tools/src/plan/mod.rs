@@ -21,7 +21,7 @@ use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;
 use uav_relay_scenario::mission::Refusal;
 use uav_relay_scenario::{Interference, Scenario, mission};
-use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::report::{WorstBack, hop_sirs, hop_sirs_back};
 
 pub use altitude::solved;
 
@@ -44,6 +44,17 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
 
 /// Checks that the options of the request are compatible.
 fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
+    let is_several =
+        matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
+    if scenario.reverse > 0.0 && is_several {
+        return Err(Refusal::ReverseSources.into());
+    }
+    if ask.x_m.is_some() {
+        both_ways_only_by_align(scenario, "--x-m")?;
+    }
+    if ask.free_altitude {
+        both_ways_only_by_align(scenario, "--altitude free")?;
+    }
     let Some(x_m) = ask.x_m else { return Ok(()) };
     let d = scenario.distance_m;
     let wrong = if !(0.0..=d).contains(&x_m) {
@@ -57,6 +68,18 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
         return Ok(());
     };
     Err(NoPlan::Wrong(wrong))
+}
+
+/// Refuses `what` for a scenario with a way back.
+fn both_ways_only_by_align(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
+    if scenario.reverse > 0.0 {
+        return Err(NoPlan::Wrong(format!(
+            "{what} is for one direction, and link.reverse = {:?}: Algorithm 1 places relays at their own altitudes for both directions; \
+             allowed: link.reverse = 0.0 or no {what}",
+            scenario.reverse
+        )));
+    }
+    Ok(())
 }
 
 /// Requested number of relays.
@@ -115,6 +138,8 @@ pub struct Plan {
     pub places: Vec<(Placement, Profile)>,
     /// SIR (linear) of hops 1 to N + 1.
     pub sirs: Vec<f64>,
+    /// Worst hop of the way back, if the positions are chosen for both directions.
+    pub back: Option<WorstBack>,
     /// Name of the algorithm that found the positions.
     pub how: &'static str,
     /// True if it is proven that no positions are better, or that no fewer relays suffice.
@@ -193,9 +218,10 @@ impl From<Refusal> for NoPlan {
 }
 
 impl Plan {
-    /// Returns the SIR (linear) of the worst hop.
+    /// Returns the SIR (linear) of the worst hop; in a plan for both directions the worse of both, the way back divided by r.
     pub fn sir(&self) -> f64 {
-        self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0)
+        let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
+        self.back.map_or(there, |back| back.both(there))
     }
 
     fn chain(&self) -> Vec<Placement> {
@@ -252,6 +278,7 @@ impl ProfiledMission {
         Plan {
             mission: self.mission,
             sirs: hop_sirs(&self.mission, &held),
+            back: WorstBack::of(&self.mission, &hop_sirs_back(&self.mission, &held)),
             places: held,
             how,
             proven,

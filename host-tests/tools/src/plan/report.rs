@@ -167,7 +167,7 @@ const fn relays_carry(number: u16) -> (&'static str, &'static str) {
     }
 }
 
-/// SIR on the way back from Rx to Tx. The positions are not chosen for it.
+/// SIR on the way back from Rx to Tx. The positions are chosen for it if `reverse` is present.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WayBack {
     /// SIR at the last relay of the hop from Rx, linear.
@@ -176,6 +176,9 @@ pub struct WayBack {
     pub worst_back: f64,
     /// SIR of the worst hop, dB.
     pub worst_back_db: f64,
+    /// SIR needed on the way back, relative to that on the way there, if the positions are chosen for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reverse: Option<f64>,
     /// Node that receives the worst hop: 0 for Tx, otherwise the relay.
     #[serde(skip)]
     hop: usize,
@@ -195,16 +198,21 @@ impl WayBack {
         } else {
             format!("relay {}", self.hop + 1)
         };
+        let needed = self.reverse.map_or_else(String::new, |reverse| {
+            format!("; it needs {reverse:?} of the SIR of the way there (link.reverse)")
+        });
         format!(
-            "way back: worst hop {}, from {sender} to {receiver}",
+            "way back: worst hop {}, from {sender} to {receiver}{needed}",
             unit.both(self.worst_back)
         )
     }
 }
 
 /// Limits of the model.
-const NOT_MODELLED: &str =
-    "not modelled: terrain and obstacles; not optimised: the way back from Rx to Tx";
+const NOT_MODELLED: &str = "not modelled: terrain and obstacles";
+
+/// Limit of a plan for one direction.
+const ONE_WAY: &str = "; not optimised: the way back from Rx to Tx";
 
 /// Result of `cargo plan`.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
@@ -221,7 +229,7 @@ pub struct PlanReport {
     /// `best_sir` in dB, if above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
-    /// SIR of the worst hop, linear.
+    /// SIR of the worst hop, linear; with `reverse` the worse of that of the way there, and of the way back divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the worst hop, dB.
@@ -379,6 +387,7 @@ impl PlanReport {
             rx_sir_back: *rx_sir,
             worst_back: sir,
             worst_back_db: db(sir),
+            reverse: Some(scenario.reverse).filter(|reverse| *reverse > 0.0),
             hop,
             relays,
         });
@@ -432,7 +441,9 @@ impl PlanReport {
                 "target: SIR {target}; that many relays reach up to {most} (--uavs {uavs})"
             );
         }
-        _ = writeln!(text, "{}; {NOT_MODELLED}", self.certainty());
+        let is_for_both = self.way_back.is_some_and(|back| back.reverse.is_some());
+        let one_way = if is_for_both { "" } else { ONE_WAY };
+        _ = writeln!(text, "{}; {NOT_MODELLED}{one_way}", self.certainty());
         if let Some(noise) = &self.noise {
             _ = writeln!(text, "{noise}");
         }

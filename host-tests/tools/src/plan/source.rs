@@ -12,7 +12,12 @@ use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, al
 
 /// Returns the fewest relays at their own altitudes, by eq. (Opt).
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
-    let plan = fewest(scenario, target, tolerance, "eq. (Opt)")?;
+    let how = if scenario.reverse > 0.0 {
+        "eq. (Opt) for both directions"
+    } else {
+        "eq. (Opt)"
+    };
+    let plan = fewest(scenario, target, tolerance, how)?;
     let most = best(scenario, plan.mission.relays(), tolerance);
     Ok(Plan {
         most: most.ok().map(|best| best.sir()),
@@ -123,12 +128,19 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
-    let proven = briefed.level()
+    let is_one_way = !(scenario.reverse > 0.0);
+    let proven = is_one_way
+        && briefed.level()
         && is_free(scenario, |free| {
             let most = solved(&ProfiledMission::new(free, relays, tolerance).ok()?).ok()?;
             Some(f64::from(most) <= f64::from(target) * (1.0 + 2.0 * tolerance))
         });
-    Ok(briefed.plan(&places, "Algorithm 1", proven))
+    let how = if is_one_way {
+        "Algorithm 1"
+    } else {
+        "Algorithm 1 for both directions"
+    };
+    Ok(briefed.plan(&places, how, proven))
 }
 
 /// Returns the target that the relays would agree on.
@@ -207,7 +219,8 @@ fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     match ask.number {
-        Number::Of(1) => alone(scenario, ask),
+        // The theorems are for one direction.
+        Number::Of(1) if !(scenario.reverse > 0.0) => alone(scenario, ask),
         Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
         Number::Of(relays) => best(scenario, relays, ask.tolerance),
         Number::Meeting(target) if ask.free_altitude => {

@@ -145,7 +145,7 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
     for (arguments, says) in [
         (
             &*format!("--board pico2 --block {}", path("short.bin")),
-            "7 bytes; a block has 380",
+            "7 bytes; a block has 388",
         ),
         ("--board pico3", "one of stm32f405"),
         ("--board pico2 --block nowhere.bin", "nowhere.bin"),

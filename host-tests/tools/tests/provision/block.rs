@@ -17,7 +17,7 @@ use super::{changed, example, field, in_a_field, paper, reads, with};
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x09\0\x7c\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x0a\0\x84\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -34,6 +34,8 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     bytes.extend(rounds.to_le_bytes());
     bytes.extend(rest);
     bytes.resize(376, 0);
+    bytes.extend(0_f32.to_le_bytes());
+    bytes.extend(80_f32.to_le_bytes());
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -371,6 +373,13 @@ fn a_field_out_of_range_is_named() {
         (148, &one, ConfigError::Unused),
         (248, &one, ConfigError::Unused),
         (372, &1_200_001_u32.to_le_bytes(), ConfigError::Silence),
+        (
+            376,
+            &one,
+            ConfigError::Mission(MissionError::ReverseInterference),
+        ),
+        (376, &nan, ConfigError::Mission(MissionError::Reverse)),
+        (380, &[0; 4], ConfigError::Mission(MissionError::RxPower)),
     ] {
         assert_eq!(
             reads(&changed(field(3), at, bytes)),
@@ -378,6 +387,33 @@ fn a_field_out_of_range_is_named() {
             "byte {at}"
         );
     }
+}
+
+#[test]
+fn a_way_back_is_stored_and_is_for_align_without_sensing() {
+    let scenario = Scenario {
+        reverse: 0.25,
+        rx_w: 5.0,
+        ..Scenario::default()
+    };
+    let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap();
+    let block = flight.block(3).unwrap();
+    assert_eq!(block[376..380], 0.25_f32.to_le_bytes());
+    assert_eq!(block[380..384], 5.0_f32.to_le_bytes());
+    let config = reads(&block).unwrap();
+    let mission = config.mission.config();
+    assert!((mission.reverse, mission.rx_power_w) == (0.25, 5.0));
+    flies(&config);
+    for error in [
+        flight.by(Method::Joint).block(3).unwrap_err(),
+        BlockError::Config(reads(&changed(block, 14, &[1])).unwrap_err()),
+    ] {
+        assert_eq!(error, BlockError::Config(ConfigError::Reverse));
+        assert!(error.to_string().contains("link.reverse"), "{error}");
+    }
+    let higher = 1.0_f32.next_up().to_le_bytes();
+    let error = ConfigError::Mission(MissionError::Reverse);
+    assert_eq!(reads(&changed(block, 376, &higher)), Err(error));
 }
 
 fn flies(config: &Config) {

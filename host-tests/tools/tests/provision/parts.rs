@@ -8,7 +8,7 @@ use uav_relay::{Duration, Geodetic, Interference, Listen, Mission};
 use uav_relay_scenario::{Scenario, key};
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{
-    Block, ConfigError, LEN, Secret, Sites, autopilot_key, secret,
+    Block, ConfigError, Secret, Sites, autopilot_key, secret,
 };
 
 use super::{changed, field, of_paper, paper, provision, reads, refusal, with};
@@ -367,7 +367,7 @@ fn listening_stands_where_the_table_says() {
     bytes.extend(250_000_u64.to_le_bytes());
     bytes.extend(1_000_000_000_000_000_000_u64.to_le_bytes());
     bytes.extend(0.5_f32.to_le_bytes());
-    assert_eq!(block[352..LEN - 8], bytes);
+    assert_eq!(block[352..372], bytes);
     let without = listening_flight(SOURCE).block(3).unwrap();
     assert_eq!(changed(without, 352, &bytes), block, "nothing else changes");
     assert_eq!(reads(&without).unwrap().listen, None);

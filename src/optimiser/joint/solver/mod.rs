@@ -305,6 +305,8 @@ mod tests {
                 y_m: rng.between(10.0, 900.0),
             }),
             noise_w: 0.0,
+            reverse: 0.0,
+            rx_power_w: 80.0,
             tolerance: 1e-4,
         });
         let holds = rng.next() < 0.3;

@@ -145,6 +145,8 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
             y_m: 400.0,
         }),
         noise_w: 0.0,
+        reverse: 0.0,
+        rx_power_w: 80.0,
         tolerance: 1e-4,
     });
     Config {

@@ -23,7 +23,7 @@ const SETS: [&str; 7] = [
     "guard,flight",
     "mavlink-signing",
     "altitude,adjust",
-    "field,noise,guard,auth",
+    "field,noise,reverse,guard,auth",
     "guard,upload",
 ];
 

@@ -1,0 +1,182 @@
+//! Judge of chains with a way back: a grid search in f64, refined. It shares no code with the crate.
+
+/// Chain of relays at one altitude above the line from Tx (0) to Rx.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Chain {
+    /// Distance from Tx to Rx, m.
+    pub(crate) distance_m: f64,
+    /// Powers of Tx, of the relays from Tx on, and of Rx, W.
+    pub(crate) powers_w: Vec<f64>,
+    /// Altitude of the relays, m.
+    pub(crate) altitude_m: f64,
+    /// Power of the interferer, W, its x and its y, m.
+    pub(crate) interferer: [f64; 3],
+    /// Path-loss factors between drones or drone and ground, and on the ground, 1/m^2.
+    pub(crate) loss: [f64; 2],
+    /// Noise power of every receiver, W.
+    pub(crate) noise_w: f64,
+    /// Share of the target that the way back needs, above 0.
+    pub(crate) reverse: f64,
+}
+
+/// Grid points of the first search.
+const GRID: usize = 300;
+
+/// Points of a relay's window in the refinement, odd.
+const WINDOW: usize = 15;
+
+impl Chain {
+    /// Number of relays.
+    pub(crate) fn relays(&self) -> usize {
+        self.powers_w.len() - 2
+    }
+
+    /// Returns interference plus noise at a node, W.
+    fn disturbance_w(&self, node: usize, x: f64) -> f64 {
+        let [power_w, xi, yi] = self.interferer;
+        let on_ground = node == 0 || node > self.relays();
+        let (h, loss) = if on_ground {
+            (0.0, self.loss[1])
+        } else {
+            (self.altitude_m, self.loss[0])
+        };
+        power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
+    }
+
+    /// Returns the smaller one of the forward SIR, and of the backward SIR over r, of the hop to `node` at `to` from the node before.
+    pub(crate) fn hop(&self, node: usize, from: f64, to: f64) -> f64 {
+        let climb = if node == 1 || node > self.relays() {
+            self.altitude_m
+        } else {
+            0.0
+        };
+        let gain = 1.0 / (self.loss[0] * ((to - from).powi(2) + climb * climb));
+        let there = self.powers_w[node - 1] * gain / self.disturbance_w(node, to);
+        let back = self.powers_w[node] * gain / self.disturbance_w(node - 1, from);
+        there.min(back / self.reverse)
+    }
+
+    /// Returns the worst hop of relays at `x`.
+    pub(crate) fn value(&self, x: &[f64]) -> f64 {
+        let mut from = 0.0;
+        let mut worst = f64::INFINITY;
+        for (node, &to) in (1..).zip(x.iter().chain([&self.distance_m])) {
+            worst = worst.min(self.hop(node, from, to));
+            from = to;
+        }
+        worst
+    }
+
+    /// Returns the best positions with relay k on one of `grids[k - 1]`, whose points rise.
+    fn best_on(&self, grids: &[Vec<f64>]) -> Vec<f64> {
+        let first = grids[0].iter().map(|&x| self.hop(1, 0.0, x));
+        let mut best: Vec<f64> = first.collect();
+        let mut before: Vec<Vec<usize>> = Vec::new();
+        for (node, pair) in (2..).zip(grids.windows(2)) {
+            let step = |&to: &f64| {
+                let mut found = (f64::NEG_INFINITY, 0);
+                for (at, (&from, &sofar)) in pair[0].iter().zip(&best).enumerate() {
+                    if from > to {
+                        break;
+                    }
+                    if sofar > found.0 {
+                        let value = sofar.min(self.hop(node, from, to));
+                        if value > found.0 {
+                            found = (value, at);
+                        }
+                    }
+                }
+                found
+            };
+            let next: Vec<(f64, usize)> = pair[1].iter().map(step).collect();
+            best = next.iter().map(|(value, _)| *value).collect();
+            before.push(next.iter().map(|(_, at)| *at).collect());
+        }
+        let last = grids.last().unwrap();
+        let ends = last.iter().zip(&best);
+        let ends = ends.map(|(&x, &v)| v.min(self.hop(grids.len() + 1, x, self.distance_m)));
+        let at = ends
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap()
+            .0;
+        let mut ats = vec![at];
+        for table in before.iter().rev() {
+            ats.push(table[*ats.last().unwrap()]);
+        }
+        let places = grids.iter().zip(ats.iter().rev());
+        places.map(|(grid, &at)| grid[at]).collect()
+    }
+
+    /// Returns the points of the first search: even ones, and ones that are dense about the interferer and at both ends.
+    fn grid(&self) -> Vec<f64> {
+        let d = self.distance_m;
+        let mut points: Vec<f64> = (0..=GRID).map(|i| d * i as f64 / GRID as f64).collect();
+        for about in [0.0, d, self.interferer[1]] {
+            for i in 0..24 {
+                let off = d * 1e-4 * 1.35_f64.powi(i);
+                points.extend([about - off, about, about + off]);
+            }
+        }
+        points.retain(|x| (0.0..=d).contains(x));
+        points.sort_by(f64::total_cmp);
+        points.dedup();
+        points
+    }
+
+    /// Improves positions: searches windows about all of them at once, as long as that helps, and then smaller ones.
+    pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
+        let mut x = start.to_vec();
+        let mut value = self.value(&x);
+        let mut width = self.distance_m / 50.0;
+        let mut tries = 0;
+        while width > 1e-7 * self.distance_m && tries < 400 {
+            tries += 1;
+            let half = WINDOW as f64 / 2.0;
+            let around = |&at: &f64| -> Vec<f64> {
+                let point = |i: usize| at + width * (i as f64 + 0.5 - half) / half;
+                (0..WINDOW)
+                    .map(|i| point(i).clamp(0.0, self.distance_m))
+                    .collect()
+            };
+            let grids: Vec<Vec<f64>> = x.iter().map(around).collect();
+            let next = self.best_on(&grids);
+            let better = self.value(&next);
+            let gained = better > value * (1.0 + 1e-3 * (width / self.distance_m).min(1e-2));
+            if better > value {
+                (x, value) = (next, better);
+            }
+            if !gained {
+                width *= 0.6;
+            }
+        }
+        (value, x)
+    }
+
+    /// Returns the best value found, and its positions.
+    pub(crate) fn best(&self) -> (f64, Vec<f64>) {
+        let grid = self.grid();
+        let start = self.best_on(&vec![grid; self.relays()]);
+        self.refined(&start)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Chain;
+
+    #[test]
+    fn without_interference_relays_between_equal_ends_are_even() {
+        let chain = Chain {
+            distance_m: 1000.0,
+            powers_w: vec![1.0; 6],
+            altitude_m: 1e-3,
+            interferer: [1e-9, 0.0, 1e6],
+            loss: [1.0, 1.0],
+            noise_w: 1e-3,
+            reverse: 1.0,
+        };
+        let (value, x) = chain.best();
+        assert!((value / (1.0 / 40.0) - 1.0).abs() < 1e-4, "{value} {x:?}");
+    }
+}

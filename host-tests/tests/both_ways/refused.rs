@@ -1,0 +1,108 @@
+//! Missions with a way back, and what does not support one.
+
+use host_tests::fixtures::paper;
+use uav_relay::mission::MissionError;
+use uav_relay::{
+    Field, FieldPoint, Identity, Instant, Interference, Listen, Method, Mission, MissionConfig,
+    Relay, Settings, SetupError, Upload, UploadError,
+};
+
+fn both_ways() -> MissionConfig {
+    MissionConfig {
+        reverse: 1.0,
+        ..paper(3)
+    }
+}
+
+#[test]
+fn a_way_back_out_of_range_is_refused() {
+    let with = |reverse: f32, rx_power_w: f32| {
+        let config = MissionConfig {
+            reverse,
+            rx_power_w,
+            ..paper(3)
+        };
+        Mission::try_new(config).err()
+    };
+    for reverse in [0.0, f32::MIN_POSITIVE, 1.0] {
+        assert_eq!(with(reverse, 80.0), None, "{reverse}");
+    }
+    for reverse in [-1e-9, 1.0_f32.next_up(), f32::NAN, f32::INFINITY] {
+        assert_eq!(
+            with(reverse, 80.0),
+            Some(MissionError::Reverse),
+            "{reverse}"
+        );
+    }
+    for rx_power_w in [0.0, -1.0, 1e-6_f32.next_down(), 1e6_f32.next_up(), f32::NAN] {
+        for reverse in [0.0, 0.5] {
+            let error = with(reverse, rx_power_w);
+            assert_eq!(error, Some(MissionError::RxPower), "{rx_power_w}");
+        }
+    }
+    assert!(
+        MissionError::Reverse
+            .to_string()
+            .contains("reverse must be within 0 to 1")
+    );
+}
+
+#[test]
+fn a_field_and_an_unknown_interferer_have_no_way_back() {
+    let point = FieldPoint {
+        x_m: 0.0,
+        upsilon_per_w: 1e9,
+    };
+    let field = Field::try_new(vec![point].leak()).unwrap();
+    for interference in [Interference::Field(field), Interference::Unknown] {
+        let config = MissionConfig {
+            interference,
+            ..both_ways()
+        };
+        let error = Mission::try_new(config).err();
+        assert_eq!(error, Some(MissionError::ReverseInterference));
+        assert!(error.unwrap().to_string().contains("reverse"));
+    }
+}
+
+#[test]
+fn methods_for_one_direction_are_refused() {
+    let mission = Mission::try_new(both_ways()).unwrap();
+    let with = |settings: Settings| {
+        let identity = Identity {
+            network: 1,
+            index: 2,
+        };
+        Relay::new(mission, identity, settings, 1, Instant::ZERO).err()
+    };
+    assert_eq!(with(Settings::default()), None);
+    let refused = [
+        Settings {
+            method: Method::Joint,
+            ..Settings::default()
+        },
+        Settings {
+            method: Method::Adjust(uav_relay::Adjust::default()),
+            ..Settings::default()
+        },
+        Settings {
+            listen: Some(Listen::default()),
+            ..Settings::default()
+        },
+    ];
+    for settings in refused {
+        assert_eq!(with(settings), Some(SetupError::Reverse), "{settings:?}");
+    }
+    let line = SetupError::Reverse.to_string();
+    assert!(line.contains("reverse") && line.contains("Align"), "{line}");
+}
+
+#[test]
+fn uploads_have_one_direction() {
+    let one_way = Mission::try_new(paper(3)).unwrap();
+    let both = Mission::try_new(both_ways()).unwrap();
+    let refused = Some(UploadError::Reverse);
+    assert_eq!(Upload::new(&one_way, 1, both_ways()).err(), refused);
+    assert_eq!(Upload::new(&both, 1, paper(3)).err(), refused);
+    assert!(UploadError::Reverse.to_string().contains("reverse"));
+}

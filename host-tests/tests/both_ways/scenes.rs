@@ -1,0 +1,100 @@
+//! Scenes with a way back: those of the feature's specification, and ones that are hard.
+
+use rand::{Rng, RngExt};
+use uav_relay::channel::AirGround;
+use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+
+use super::judge::Chain;
+
+/// Path-loss factor of free space at 2 GHz.
+pub(crate) const LOS: f64 = 7_020.0;
+/// Path-loss factor on the ground, 20.9 dB more.
+pub(crate) const NLOS: f64 = 7_020.0 * 123.0;
+
+/// Powers of Tx and Rx, W.
+pub(crate) const ENDS: [[f64; 2]; 3] = [[80.0, 80.0], [1.0, 1.0], [80.0, 1.0]];
+
+/// Rounds a number to the f32 of relays.
+pub(crate) fn narrow(value: f64) -> f64 {
+    f64::from(value as f32)
+}
+
+/// Draws a number, uniform in its logarithm.
+pub(crate) fn log_uniform(rng: &mut impl Rng, least: f64, most: f64) -> f64 {
+    rng.random_range(least.ln()..=most.ln()).exp()
+}
+
+fn carrier_hz() -> f64 {
+    299_792_458.0 / (4.0 * std::f64::consts::PI)
+}
+
+/// Returns the mission of a chain.
+pub(crate) fn mission(chain: &Chain) -> Mission {
+    let [power_w, x_m, y_m] = chain.interferer.map(|value| value as f32);
+    Mission::try_new(MissionConfig {
+        relays: chain.relays() as u16,
+        distance_m: chain.distance_m as f32,
+        min_separation_m: 0.0,
+        tx_power_w: chain.powers_w[0] as f32,
+        common: Profile {
+            altitude_m: chain.altitude_m as f32,
+            power_w: chain.powers_w[1] as f32,
+        },
+        band: Band::at(chain.altitude_m as f32),
+        lateral: Band::NONE,
+        channel: Channel::new(carrier_hz(), chain.loss[0], chain.loss[1], AirGround::Los).unwrap(),
+        interference: Interference::Source(Interferer { power_w, x_m, y_m }),
+        noise_w: chain.noise_w as f32,
+        reverse: chain.reverse as f32,
+        rx_power_w: *chain.powers_w.last().unwrap() as f32,
+        tolerance: 1e-5,
+    })
+    .unwrap()
+}
+
+/// Draws a scene as in the specification of the feature.
+pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
+    let relays = log_uniform(rng, 1.0, 50.99) as usize;
+    let mut powers_w = vec![1.0; relays + 2];
+    (powers_w[0], powers_w[relays + 1]) = (ends[0], ends[1]);
+    Chain {
+        distance_m: 1000.0,
+        powers_w,
+        altitude_m: 20.0,
+        interferer: [
+            narrow(log_uniform(rng, 1.0, 100.0)),
+            narrow(rng.random_range(-200.0..=1200.0)),
+            narrow(rng.random_range(50.0..=800.0)),
+        ],
+        loss: [LOS, NLOS],
+        noise_w: 0.0,
+        reverse: narrow(reverse),
+    }
+}
+
+/// Draws a scene in which an interferer near the line is close to the last relays, or to be passed by a strong Tx.
+pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
+    let mut chain = usual(rng, ends, reverse);
+    let relays = rng.random_range(1..=6);
+    chain.powers_w.drain(1..chain.powers_w.len() - 1);
+    for _ in 0..relays {
+        chain.powers_w.insert(1, 1.0);
+    }
+    chain.interferer = [
+        narrow(log_uniform(rng, 0.3, 300.0)),
+        narrow(rng.random_range(100.0..=1100.0)),
+        narrow(log_uniform(rng, 1.0, 300.0)),
+    ];
+    chain
+}
+
+/// Adds noise of 1e-3 to 1e2 of the interference at a random position.
+pub(crate) fn in_noise(rng: &mut impl Rng, chain: Chain) -> Chain {
+    let place = rng.random_range(0.0..=chain.distance_m);
+    let [power_w, x, y] = chain.interferer;
+    let heard_w = power_w / LOS / ((place - x).powi(2) + y * y + 400.0);
+    Chain {
+        noise_w: narrow(heard_w * log_uniform(rng, 1e-3, 1e2)),
+        ..chain
+    }
+}
