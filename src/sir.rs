@@ -112,7 +112,7 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
-/// Returns the SIR at the ground transmitter on the way back, for a relay of `power_w` watts at `from`; 0 without a known interferer.
+/// Returns the SIR at Tx on the way back for a relay of `power_w` W at `from`; 0 without a source.
 pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let across = square(from.y_m) + square(from.altitude_m);
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)

@@ -119,7 +119,7 @@ impl Back {
         })
     }
 
-    /// Returns the squared length of a hop that has the target 1 on the way back, m^2, if it is received at `x_m`.
+    /// Returns the squared length, m^2, at which a hop received at `x_m` has the target 1 on the way back.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -149,7 +149,7 @@ impl Back {
         }
     }
 
-    /// Returns the distance from the interferer along x within which the receiver is too weak for a hop of `squared` m^2, m.
+    /// Returns the distance in x from the interferer, m, within which a hop of `squared` m^2 is too weak.
     /// `None` if it is too weak everywhere.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         let needed = target * squared / self.gain;
@@ -205,7 +205,7 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`] at which the last relay hears Rx, m; `None` if there is none. It does not at
+    /// Returns the largest x, `least_m` to `x_m`, m, at which the last relay hears Rx; `None` if none. It does not at
     /// `x_m`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
@@ -225,7 +225,7 @@ pub(super) fn before(x_m: f32, d: f32) -> f32 {
     }
 }
 
-/// Returns the smallest distance from `least` to `most` at which the receiver of `hop` meets the target, m; `None` if there is none.
+/// Returns the smallest distance, `least` to `most` m, at which `hop` meets the target; `None` if none.
 ///
 /// It does not meet it at `least`.
 pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {

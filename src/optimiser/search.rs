@@ -265,7 +265,7 @@ impl Search {
     }
 }
 
-/// Returns bounds of the target, lowered to those of the way back: the most that Tx receives, and that of relays gathered at Rx.
+/// Returns the bounds of the target, lowered to those of the way back: at Tx, and of relays at Rx.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..

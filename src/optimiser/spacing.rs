@@ -291,7 +291,7 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver for any position of its sender up to `from_m`; `place` for the sender there.
+    /// Returns the largest x of the receiver for a sender up to `from_m`; `place` for the sender there.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -321,7 +321,7 @@ impl Hop {
         low
     }
 
-    /// Returns the largest x up to `near` of the sender of a receiver at `place`, in both directions; `None` if there is none.
+    /// Returns the largest x up to `near` of the sender for a receiver at `place`, both ways; or `None`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;

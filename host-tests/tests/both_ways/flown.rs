@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::scenes::{ENDS, adversarial, in_noise, mission, usual};
 
-/// Checks that the agreement equals the positions computed without messages, to the bit, in one round trip.
+/// Checks that the agreement equals, to the bit, the positions computed without messages.
 #[test]
 fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     let mut rng = generator(3306);

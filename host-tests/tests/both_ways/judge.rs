@@ -43,7 +43,7 @@ impl Chain {
         power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
     }
 
-    /// Returns the smaller one of the forward SIR, and of the backward SIR over r, of the hop to `node` at `to` from the node before.
+    /// Returns the smaller of forward SIR and backward SIR / r of the hop to `node` at `to`.
     pub(crate) fn hop(&self, node: usize, from: f64, to: f64) -> f64 {
         let climb = if node == 1 || node > self.relays() {
             self.altitude_m
@@ -108,7 +108,7 @@ impl Chain {
         places.map(|(grid, &at)| grid[at]).collect()
     }
 
-    /// Returns the points of the first search: even ones, and ones that are dense about the interferer and at both ends.
+    /// Returns the points of the first search: even ones, and dense ones near the interferer and the ends.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
         let mut points: Vec<f64> = (0..=GRID).map(|i| d * i as f64 / GRID as f64).collect();
@@ -124,7 +124,7 @@ impl Chain {
         points
     }
 
-    /// Improves positions: searches windows about all of them at once, as long as that helps, and then smaller ones.
+    /// Improves positions: searches windows about all of them, smaller ones when that no longer helps.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let mut x = start.to_vec();
         let mut value = self.value(&x);

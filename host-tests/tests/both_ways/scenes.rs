@@ -72,7 +72,7 @@ pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     }
 }
 
-/// Draws a scene in which an interferer near the line is close to the last relays, or to be passed by a strong Tx.
+/// Draws a scene with an interferer near the line, close to the last relays or passed by a strong Tx.
 pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     let mut chain = usual(rng, ends, reverse);
     let relays = rng.random_range(1..=6);

@@ -36,9 +36,9 @@ pub struct Data {
 /// Direction of the traffic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Way {
-    /// From Tx to Rx
+    /// Packets from Tx to Rx
     Forward,
-    /// From Tx to Rx and from Rx to Tx
+    /// Packets from Tx to Rx and from Rx to Tx
     Both,
 }
 

@@ -103,7 +103,7 @@ impl Track {
 /// Source of the true SIRs.
 #[derive(Debug)]
 pub struct TrueHops {
-    /// All relays and interferers at time 0, and the velocity of the latter, m/s. `None` in a field or after uploads.
+    /// Relays and interferers at time 0, and the velocity of the latter, m/s. `None` in a field or after uploads.
     scene: Option<(Scene, [f64; 2])>,
     /// Missions by version, for runs without a scene.
     missions: Vec<(u16, Mission)>,
@@ -245,9 +245,9 @@ pub struct Hop {
 /// State of the chain that a [`Period`] has.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ChainState {
-    /// All relays of the view are at the positions of one agreement.
+    /// The relays of the view are at the positions of one agreement.
     Agreed,
-    /// All relays can send, but an agreement is pending, or drones are on their way.
+    /// The relays can send, but an agreement is pending, or drones are on their way.
     Pending,
     /// A relay of the view is silent, has no position, or has not accepted the view.
     Broken,

@@ -60,7 +60,7 @@ fn the_promised_rate_is_delivered() {
     );
 }
 
-/// All hops have the same SIR: fitted slots are equal slots, and channels carry nine times as much.
+/// The hops have the same SIR: fitted slots are equal slots, and channels carry nine times as much.
 #[test]
 fn access_of_the_scenario_decides() {
     let folder = tempfile::tempdir().unwrap();

@@ -218,7 +218,7 @@ impl From<Refusal> for NoPlan {
 }
 
 impl Plan {
-    /// Returns the SIR (linear) of the worst hop; in a plan for both directions the worse of both, the way back divided by r.
+    /// Returns the SIR (linear) of the worst hop; for both directions the way back counts divided by r.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
         self.back.map_or(there, |back| back.both(there))

@@ -229,7 +229,7 @@ pub struct PlanReport {
     /// `best_sir` in dB, if above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
-    /// SIR of the worst hop, linear; with `reverse` the worse of that of the way there, and of the way back divided by `reverse`.
+    /// SIR of the worst hop, linear; the way back counts divided by `reverse` if that is above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the worst hop, dB.
