@@ -1,4 +1,4 @@
-//! Packets on the [route](super::route) of the chain, with a queue at every node.
+//! Packets on the [route](mod@super::route) of the chain, with a queue at every node.
 //!
 //! | item | rule |
 //! | --- | --- |
