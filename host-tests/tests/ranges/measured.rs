@@ -4,7 +4,8 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use uav_relay::{
-    Duration, Instant, Interference, Listen, Mission, MissionConfig, Placement, Sample, Settings,
+    Auth, Duration, Ground, Instant, Interference, Key, Listen, MAX_FRAME, Mission, MissionConfig,
+    Placement, Sample, Settings, Side, Wiring,
 };
 
 use crate::draw::{mission, scaled, settings, signed};
@@ -161,4 +162,37 @@ fn one_power_everywhere_over_the_accepted_range() {
         }
         assert!(has_agreed(&line), "{power_w} W");
     });
+}
+
+/// Checks every kind of number as a measurement of a ground station: accepted exactly within 1e-30 to 1e6 W.
+#[test]
+fn a_ground_station_accepts_exactly_its_range() {
+    let auth = Auth {
+        key: Key::new([7; 32]),
+        epoch: 1,
+    };
+    let limits = [
+        0.0,
+        1e-30,
+        1e6,
+        f32::MIN_POSITIVE,
+        f32::MAX,
+        f32::INFINITY,
+        f32::NAN,
+    ];
+    let near = limits
+        .into_iter()
+        .flat_map(|limit| [limit, limit.next_down(), limit.next_up(), -limit]);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let any: Vec<f32> = (0..100_000).map(|_| f32::from_bits(rng.random())).collect();
+    for wiring in [Wiring::Pair, Wiring::Shared] {
+        let mut ground = Ground::new(&paper(4), Side::Downstream, 7, wiring, auth);
+        for power_w in near.clone().chain(any.iter().copied()) {
+            let is_level = (1e-30..=1e6).contains(&power_w);
+            assert_eq!(ground.measured(power_w), is_level, "{power_w:e}");
+            let mut frame = [0; MAX_FRAME];
+            let sent = (0..20).take_while(|_| ground.poll_transmit(&mut frame).is_some());
+            assert!(sent.count() <= 8, "{power_w:e}");
+        }
+    }
 }
