@@ -164,7 +164,7 @@ fn one_power_everywhere_over_the_accepted_range() {
     });
 }
 
-/// Checks every kind of number as a measurement of a ground station: accepted exactly within 1e-30 to 1e6 W.
+/// Checks any number as a ground station's measurement: accepted exactly within 1e-30 to 1e6 W.
 #[test]
 fn a_ground_station_accepts_exactly_its_range() {
     let auth = Auth {
