@@ -59,18 +59,23 @@ fn sound(relays: u16) -> Vec<f64> {
     (0..count(24)).into_par_iter().map(one).collect()
 }
 
+/// Returns the outcome with a wrong sensor at `node` from the start.
+fn with_wrong(wild: &RandomScene, node: u16, says: SensorReading) -> Outcome {
+    let mut wrong = setup(wild);
+    wrong.sky.as_mut().unwrap().broken = vec![Broken {
+        node,
+        says,
+        since: Instant::ZERO,
+    }];
+    run(wrong).unwrap()
+}
+
 /// Checks the cost of each kind of wrong sensor, and the nodes reported.
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {
         let one = |seed: usize| {
             let (wild, node) = (RandomScene::new(seed as u64, relays, 1), node(seed as u64));
-            let mut wrong = setup(&wild);
-            wrong.sky.as_mut().unwrap().broken = vec![Broken {
-                node,
-                says,
-                since: Instant::ZERO,
-            }];
-            let outcome = run(wrong).unwrap();
+            let outcome = with_wrong(&wild, node, says);
             let named = named(&outcome);
             let other = named.iter().any(|it| *it != node);
             let lost = 1.0 - share(&wild, &outcome) / sound[seed];
@@ -118,7 +123,7 @@ fn a_wrong_end_costs_next_to_nothing() {
     }
 }
 
-/// Checks that a short chain names no sensor but the wrong one; one or two relays report a misfit.
+/// Checks that one or two relays name no other sensor and report a misfit; more may, seldom.
 #[test]
 fn a_short_chain_seldom_names_another_sensor() {
     for relays in [1, 2, 3, 4] {
@@ -126,13 +131,7 @@ fn a_short_chain_seldom_names_another_sensor() {
             let one = |seed: usize| {
                 let wild = RandomScene::new(seed as u64, relays, 1);
                 let node = 1 + (seed % usize::from(relays)) as u16;
-                let mut wrong = setup(&wild);
-                wrong.sky.as_mut().unwrap().broken = vec![Broken {
-                    node,
-                    says,
-                    since: Instant::ZERO,
-                }];
-                let outcome = run(wrong).unwrap();
+                let outcome = with_wrong(&wild, node, says);
                 let other = named(&outcome).iter().any(|it| *it != node);
                 let is_unclear = |it: &Moment| it.what == TimelineEvent::InterfererUnclear;
                 (other, outcome.moments.iter().any(is_unclear))

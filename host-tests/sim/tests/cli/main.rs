@@ -429,6 +429,33 @@ fn no_command_hides_cargos_progress() {
     }
 }
 
+/// Returns the CPU time of the ended child processes, s, in user and in system mode.
+fn cpu_of_children() -> [f64; 2] {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let (_, after) = text.rsplit_once(')').unwrap();
+    let fields: Vec<&str> = after.split_whitespace().collect();
+    // Fields `cutime` and `cstime` of proc(5), in ticks of 10 ms.
+    [fields[13], fields[14]].map(|ticks| ticks.parse::<f64>().unwrap() / 100.0)
+}
+
+#[test]
+#[ignore = "builds the simulator anew, and measures CPU time, so that other work disturbs it"]
+fn the_first_command_takes_at_most_60_s_of_cpu_time() {
+    let empty = tempfile::tempdir().unwrap();
+    let before = cpu_of_children();
+    let output = Command::new(env!("CARGO"))
+        .current_dir(root())
+        .args(["chain", "--json"])
+        .env("CARGO_TARGET_DIR", empty.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let after = cpu_of_children();
+    let [user_s, system_s] = [after[0] - before[0], after[1] - before[1]];
+    println!("{user_s:.1} s of user and {system_s:.1} s of system time");
+    assert!(user_s + system_s <= 60.0);
+}
+
 #[test]
 fn the_simulator_builds_without_the_crates_of_other_tools() {
     let output = Command::new(env!("CARGO"))
