@@ -1,4 +1,7 @@
-//! Runs all checks one after the other; `cargo ci`. The last lines name the failed ones, with their output.
+//! Runs all checks; `cargo ci`. The last lines name the failed ones, with their output.
+//!
+//! Steps that share a target folder run one after the other. Those with a folder of their own run beside them, one after the other,
+//! at low priority: many tests wait for the wall clock.
 
 mod prepare;
 mod steps;
@@ -6,12 +9,14 @@ mod steps;
 use std::collections::VecDeque;
 use std::fmt::{Display, Formatter, Result as FormatResult};
 use std::io::{BufRead, Result, Write, stdout};
+use std::panic::resume_unwind;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
+use steps::Step;
 
-/// Runs all checks one after the other; the last lines name the failed ones, with their output.
+/// Runs all checks; the last lines name the failed ones, with their output.
 #[derive(Parser)]
 #[command(name = "cargo ci")]
 struct Options {
@@ -36,27 +41,29 @@ fn main() -> ExitCode {
         println!("ci: no step's name contains {only:?}");
         return ExitCode::FAILURE;
     }
-    let mut failed = Vec::new();
-    for (number, step) in (1..).zip(&steps) {
-        println!(
-            "\n== {number}/{} {}: {}",
-            steps.len(),
-            step.name,
-            step.command
-        );
-        let begun = Instant::now();
-        let result = step.run();
-        println!(
-            "== {} {} in {} s",
-            step.name,
-            if result.is_ok() { "passed" } else { "FAILED" },
-            begun.elapsed().as_secs()
-        );
-        if let Err(evidence) = result {
-            failed.push((&*step.name, evidence));
+    let all = steps.len();
+    let (beside, others): (Vec<_>, Vec<_>) =
+        (1..).zip(&steps).partition(|(_, step)| step.is_background);
+    let mut failed: Vec<(&str, Evidence)> = Vec::new();
+    std::thread::scope(|scope| {
+        let beside = scope.spawn(|| {
+            let run = |&(number, step)| {
+                let mut output = Vec::new();
+                let failure = run(number, all, step, &mut output);
+                // In one piece, so that these lines do not mix with those of the other steps.
+                _ = stdout().write_all(&output);
+                failure
+            };
+            beside.iter().filter_map(run).collect::<Vec<_>>()
+        });
+        let run = |&(number, step): &(usize, _)| run(number, all, step, &mut stdout());
+        failed.extend(others.iter().filter_map(run));
+        match beside.join() {
+            Ok(failures) => failed.extend(failures),
+            Err(panic) => resume_unwind(panic),
         }
-    }
-    let (all, seconds) = (steps.len(), started.elapsed().as_secs());
+    });
+    let seconds = started.elapsed().as_secs();
     if failed.is_empty() {
         println!("\nci: all {all} steps passed in {seconds} s");
         ExitCode::SUCCESS
@@ -72,6 +79,27 @@ fn main() -> ExitCode {
         );
         ExitCode::FAILURE
     }
+}
+
+/// Runs a step and writes its output and result to `out`. Returns its name and the evidence of its failure; `None` if it passed.
+fn run<'a>(
+    number: usize,
+    all: usize,
+    step: &'a Step,
+    out: &mut impl Write,
+) -> Option<(&'a str, Evidence)> {
+    let Step { name, command, .. } = step;
+    _ = writeln!(out, "\n== {number}/{all} {name}: {command}");
+    let begun = Instant::now();
+    let failure = step.run(out).err();
+    let result = if failure.is_none() {
+        "passed"
+    } else {
+        "FAILED"
+    };
+    let seconds = begun.elapsed().as_secs();
+    _ = writeln!(out, "== {name} {result} in {seconds} s");
+    failure.map(|evidence| (&**name, evidence))
 }
 
 /// Number of last lines kept of a step that runs no tests.
@@ -90,11 +118,11 @@ pub(crate) struct Evidence {
 }
 
 impl Evidence {
-    /// Copies `output` to the standard output, line by line, and keeps the lines about failures.
-    pub(crate) fn read(&mut self, mut output: impl BufRead) -> Result<()> {
+    /// Copies `output` to `out`, line by line, and keeps the lines about failures.
+    pub(crate) fn read(&mut self, mut output: impl BufRead, out: &mut impl Write) -> Result<()> {
         let mut line = Vec::new();
         while output.read_until(b'\n', &mut line)? > 0 {
-            stdout().write_all(&line)?;
+            out.write_all(&line)?;
             self.add(String::from_utf8_lossy(&line).trim_end());
             line.clear();
         }

@@ -1,7 +1,7 @@
 //! Steps of `cargo ci`, in order.
 
-use std::io::BufReader;
-use std::process::{Command, Stdio};
+use std::io::{BufReader, Error, PipeReader, Write, pipe};
+use std::process::{Child, Command};
 
 use uav_relay_xtask::FUZZ_TARGETS;
 
@@ -46,6 +46,8 @@ pub(crate) struct Step {
     pub(crate) name: String,
     pub(crate) command: String,
     environment: &'static [(&'static str, &'static str)],
+    /// True for a step with a target folder of its own, which runs at low priority beside the other steps.
+    pub(crate) is_background: bool,
 }
 
 /// Compiler of the fuzzer and of Miri, with a fixed date, so that a commit's result does not change.
@@ -63,23 +65,27 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
         name: name.into(),
         command: command.into(),
         environment: &[],
+        is_background: false,
     }
 }
 
+/// Moves steps to the background. They use idle time: many tests of the other steps wait for the wall clock.
+fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
+    let moved = |step| Step {
+        is_background: true,
+        ..step
+    };
+    steps.into_iter().map(moved)
+}
+
 impl Step {
-    /// Runs the command and forwards its output. `Err` holds the evidence of the failure.
-    pub(crate) fn run(&self) -> Result<(), Evidence> {
-        let mut words = self.command.split_whitespace();
-        let child = Command::new(words.next().unwrap_or("cargo"))
-            .args(words)
-            .envs(self.environment.iter().copied())
-            .stdout(Stdio::piped())
-            .spawn();
+    /// Runs the command and writes its output to `out`. `Err` holds the evidence of the failure.
+    ///
+    /// The messages of a foreground step go to the standard error output instead.
+    pub(crate) fn run(&self, out: &mut impl Write) -> Result<(), Evidence> {
         let mut evidence = Evidence::default();
-        let passed = child.and_then(|mut child| {
-            if let Some(output) = child.stdout.take() {
-                evidence.read(BufReader::new(output))?;
-            }
+        let passed = self.start().and_then(|(mut child, output)| {
+            evidence.read(BufReader::new(output), out)?;
             child.wait()
         });
         match passed {
@@ -90,6 +96,25 @@ impl Step {
                 Err(evidence)
             }
         }
+    }
+
+    /// Starts the command. Returns it with the reading end of its output.
+    fn start(&self) -> Result<(Child, PipeReader), Error> {
+        let (reader, writer) = pipe()?;
+        let priority = if self.is_background {
+            "nice -n 10 "
+        } else {
+            ""
+        };
+        let line = format!("{priority}{}", self.command);
+        let mut words = line.split_whitespace();
+        let mut command = Command::new(words.next().unwrap_or("cargo"));
+        command.args(words).envs(self.environment.iter().copied());
+        if self.is_background {
+            command.stderr(writer.try_clone()?);
+        }
+        let child = command.stdout(writer).spawn()?;
+        Ok((child, reader))
     }
 }
 
@@ -126,27 +151,27 @@ pub(crate) fn all() -> Vec<Step> {
         "cargo run --quiet --package uav-relay-xtask --bin items",
     ));
     steps.extend(firmware());
-    steps.extend(embassy());
+    steps.extend(in_background(embassy()));
     steps.push(step(
         "the slow commands of the pages",
         "cargo run --quiet --package uav-relay-xtask --bin pages -- --slow",
     ));
-    steps.push(step(
+    steps.push(step("cost, and no panic", "cargo cost"));
+    let mut apart = vec![step(
         "templates of a firmware, in empty folders",
         "cargo template --check",
-    ));
-    steps.push(step("cost, and no panic", "cargo cost"));
+    )];
     for (name, features) in [
         ("oldest compiler", "--features=defmt,async"),
         ("oldest compiler, no features", "--no-default-features"),
     ] {
         let check = "cargo check -p uav-relay --locked --target-dir target/oldest";
-        steps.push(step(
+        apart.push(step(
             name,
             format!("rustup run {OLDEST} {check} {features}"),
         ));
     }
-    steps.push(step(
+    apart.push(step(
         "the packaged crate, target",
         format!(
             "cargo package -p uav-relay --locked --allow-dirty --target {TARGET} --target-dir target/packaged"
@@ -156,7 +181,8 @@ pub(crate) fn all() -> Vec<Step> {
         "packages: licences, sources, duplicates, links",
         "cargo run --quiet --package uav-relay-xtask --bin packages",
     ));
-    steps.extend(nightly());
+    apart.extend(nightly());
+    steps.extend(in_background(apart));
     steps
 }
 
@@ -353,7 +379,29 @@ fn nightly() -> Vec<Step> {
 
 #[cfg(test)]
 mod tests {
-    use super::{WAITING_TEST, integration_tests};
+    use super::{Step, WAITING_TEST, all, integration_tests, quick, step};
+
+    #[test]
+    fn a_failed_step_in_the_background_is_reported_with_its_messages() {
+        let step = Step {
+            is_background: true,
+            ..step("list", "ls --no-such-option")
+        };
+        let mut out = Vec::new();
+        let evidence = step.run(&mut out).unwrap_err();
+        assert!(evidence.to_string().contains("no-such-option"));
+        assert!(String::from_utf8(out).unwrap().contains("no-such-option"));
+    }
+
+    #[test]
+    fn steps_in_the_background_have_a_target_folder_of_their_own() {
+        for step in all().iter().filter(|step| step.is_background) {
+            let command = &*step.command;
+            let is_apart = command.contains("--target-dir ") || command == "cargo template --check";
+            assert!(is_apart || command.contains(" fmt "), "{command}");
+        }
+        assert!(quick().iter().all(|step| !step.is_background));
+    }
 
     #[test]
     fn every_integration_test_is_listed_once() {
