@@ -32,7 +32,7 @@ enum Fault {
     Delay(u64),
 }
 
-/// One direction of a serial cable with faults. The order of bytes is kept.
+/// Direction of a serial cable with faults. It keeps the order of the bytes.
 struct Cable {
     /// Bytes in transit, with their times of arrival and of sending.
     waiting: VecDeque<(Instant, Instant, Vec<u8>)>,
