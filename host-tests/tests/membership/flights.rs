@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Returns a guarded flight of eight drones on one radio channel.
+/// Returns the setup of a flight of eight drones with guards on one radio channel.
 fn guarded(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = Setup::on_shared_channel(eight_apart(SEPARATION_M));
     guard(&mut setup, rng);
