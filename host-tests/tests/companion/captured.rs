@@ -114,7 +114,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
         .for_each(|relay| drop(relay.stopped()));
 }
 
-/// Checks a full disk at a ground station. It reports the end of its capture and still answers relays.
+/// Checks that a full disk ends a ground station's capture, but not its service to the relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     let chain = Chain::with_ground(1, QUIET);

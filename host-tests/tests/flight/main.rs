@@ -20,7 +20,7 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 const SEPARATION_M: f64 = 10.0;
 
-/// Position errors: constant bias, and noise of each report, m.
+/// Constant error of each drone's reported position, m. `NOISE_M` is the noise of each report.
 const BIAS_M: f64 = 0.5;
 const NOISE_M: f64 = 0.5;
 
@@ -49,7 +49,8 @@ fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }
 
-/// Returns the time when the last of eight relays accepted the final common view, if there is one.
+/// Returns the time when the last of eight relays accepted the view that all have in the end. Returns `None` if the
+/// relays differ.
 fn together(outcome: &Outcome) -> Option<Instant> {
     let view = outcome.relays[0].view;
     let all = outcome
