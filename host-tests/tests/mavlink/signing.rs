@@ -18,7 +18,7 @@ const OTHER: [u8; 32] = [0xA5; 32];
 const UNIX_S: u64 = 1_795_348_800;
 const STAMP: u64 = (UNIX_S - 1_420_070_400) * 100_000;
 
-/// One minute in MAVLink's time stamp unit of 10 µs.
+/// Number of MAVLink time stamp units of 10 µs in a minute.
 const MINUTE: u64 = 6_000_000;
 
 fn at(units: u64) -> Instant {

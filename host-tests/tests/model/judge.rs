@@ -4,16 +4,16 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
 
-/// Relative excess over the optimum that f32 rounding permits a target.
+/// Relative excess over the optimum that f32 rounding permits a target SIR.
 const ABOVE: f64 = 1e-4;
 
-/// Reference model of a mission's chain.
+/// Reference model of a mission's chain, in f64.
 #[derive(Debug)]
 pub(crate) enum Judge {
     /// Chain with an interferer at a known position.
     Source {
         link: Link,
-        /// Best target within the relays' altitudes.
+        /// Highest target SIR within the relays' altitude limits.
         optimum: f64,
     },
     /// Chain in a field of interference.
@@ -21,7 +21,7 @@ pub(crate) enum Judge {
 }
 
 impl Judge {
-    /// Returns the SIRs of the N + 1 hops; those of a relay without a position are meaningless.
+    /// Returns the SIRs of the N + 1 hops. Those at a relay without a position are meaningless.
     pub(crate) fn hops(&self, places: &[Option<Place>]) -> Vec<f64> {
         let x: Vec<f64> = places
             .iter()
@@ -44,7 +44,8 @@ impl Judge {
         }
     }
 
-    /// Returns the SIR at `x_m` over that with the measured Upsilon, 1/W; 1 for a known interferer.
+    /// Returns how much higher the SIR at `x_m` is with the measured Upsilon, 1/W, than with the true one. Returns 1
+    /// for a known interferer.
     pub(crate) fn louder(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,
@@ -52,7 +53,8 @@ impl Judge {
         }
     }
 
-    /// Returns true if a chain may meet `target`, when no measured Upsilon is above `measured_per_w`, 1/W.
+    /// Returns true if a chain can meet `target`, given the largest Upsilon that any relay has measured.
+    /// `measured_per_w` is that Upsilon in 1/W, or `None` without a measurement.
     pub(crate) fn may_meet(&self, target: f64, measured_per_w: Option<f64>) -> bool {
         match self {
             Self::Source { optimum, .. } => target <= optimum * (1.0 + ABOVE),
