@@ -101,7 +101,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// Returns the relative shortfall of a plan's SIR from the relays' agreement; -inf without an agreement.
+/// Returns by which fraction a plan's SIR is below the relays' agreement; -inf without an agreement.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
     1.0 - free(scenario, Number::Of(relays)).sir() / agreed(scenario, relays)
 }

@@ -120,7 +120,7 @@ fn ask(rng: &mut impl Rng) -> PlanRequest {
     }
 }
 
-/// Returns the reference link of `n` relays at the plan's altitude; `None` unless there is one interferer.
+/// Returns the reference link of `n` relays at the plan's altitude; `None` without a single interferer.
 fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
     let Interference::Sources(sources) = &scenario.interference else {
         return None;
