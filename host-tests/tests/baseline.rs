@@ -119,8 +119,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks a chain with one relay more than needed. It is placed above Rx, and all other hops are shortened in
-/// proportion.
+/// Checks a chain with a surplus relay, which is placed above Rx. All other hops are shortened in proportion.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);

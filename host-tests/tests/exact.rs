@@ -70,9 +70,9 @@ struct Tally {
     plain: usize,
     worst: f64,
     sweeps: u32,
-    /// Ratio of the computed upper bound to the optimum, of all scenes.
+    /// Ratios of the computed upper bound to the optimum, one for each scene.
     bounds: Vec<f64>,
-    /// Ratio of the upper bound to the optimum, of the scenes whose result is below the optimum.
+    /// Ratios of the upper bound to the optimum, for the scenes whose result is below the optimum.
     bounds_of_short: Vec<f64>,
 }
 
@@ -232,8 +232,8 @@ fn with_a_separation_that_binds() {
     assert!(tally.tight() >= 70.0);
 }
 
-/// Draws identical relays in an uneven field of interference. Upsilon has two to twelve points within a factor of up
-/// to 300.
+/// Draws identical relays in an uneven field of interference. The mean inverse interference, Upsilon, has two to
+/// twelve points within a factor of up to 300.
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));

@@ -93,8 +93,8 @@ fn the_algorithm_finds_what_the_reference_finds() {
     assert!(same > 400);
 }
 
-/// Checks a field of interference in which the first target SIR that can be met is not the best. Upsilon is 0.1, and
-/// 100 from x = 90 m on; the first such target is 0.00998.
+/// Checks a field of interference in which the first target SIR that can be met is not the best. Upsilon = E[1/I] is
+/// 0.1, and 100 from x = 90 m on; the first such target is 0.00998.
 #[test]
 fn the_first_target_that_is_met_is_not_the_best() {
     let steep = link(100.0, 10.0, 10.0, 1.0, vec![(89.99, 0.1), (90.0, 100.0)]);
@@ -106,8 +106,8 @@ fn the_first_target_that_is_met_is_not_the_best() {
     assert!((found.sir / 0.121_95 - 1.0).abs() < 0.02, "{found:?}");
 }
 
-/// Compares one relay in a constant field with a public reference. With Upsilon 4 and steps of 0.0001, the reference
-/// reaches an SIR of 0.0065 at x = 77.298 m.
+/// Compares one relay in a constant field with a public reference. With Upsilon = E[1/I] of 4 and steps of 0.0001,
+/// the reference reaches an SIR of 0.0065 at x = 77.298 m.
 #[test]
 fn a_constant_field_is_as_a_separate_program_has_it() {
     let even = link(100.0, 10.0, 10.0, 1.0, vec![(0.0, 4.0)]);

@@ -18,7 +18,8 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
     of_stochastic_link(link, min_separation_m).unwrap()
 }
 
-/// Draws a link of identical relays in a field. Upsilon has `points` points within a factor of `spread`.
+/// Draws a link of identical relays in a field of interference. The mean inverse interference, Upsilon, has `points`
+/// points within a factor of `spread`.
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -115,7 +116,7 @@ fn in_an_even_field_the_optimum_is_found() {
     println!("short by at most {short:.1e}, above by at most {above:.1e}; at most {most} sweeps");
 }
 
-/// Compares Algorithm 4 with the paper's fixed step with the reference, which takes the same steps.
+/// Checks that Algorithm 4 with the paper's fixed step takes the same steps as the reference.
 #[test]
 fn the_fixed_step_is_the_papers() {
     let mut rng = generator(63);

@@ -198,7 +198,7 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// Creates relay 1 of `relays` relays between two sites on earth, with a guard for its setpoints.
+/// Creates relay 1 of `relays` relays between two sites on earth, with a motion guard.
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;

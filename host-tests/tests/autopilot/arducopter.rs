@@ -82,7 +82,7 @@ fn back_in_its_mode_the_target_is_told_anew() {
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
 
-/// Checks that the last target of a flight has no velocity, at whatever time the flight began.
+/// Checks that the last target of a flight has no velocity, at whatever time the autopilot confirms it.
 #[test]
 fn the_last_target_stands_whenever_it_is_confirmed() {
     for late in 0..100_u16 {

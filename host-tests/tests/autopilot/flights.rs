@@ -19,7 +19,7 @@ const STEP: Duration = Duration::from_millis(20);
 /// Duration of a flight, s.
 const FLIGHT_S: u64 = 240;
 
-/// Longest time until the link knows the vehicle's mode: a heartbeat each second, at most 2 s late.
+/// Longest time until the autopilot link knows the vehicle's mode. A heartbeat comes each second, at most 2 s late.
 const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -285,7 +285,7 @@ impl Flight {
         }
     }
 
-    /// Polls the link. Returns true if the drone becomes engaged.
+    /// Polls the autopilot link. Returns true if the drone comes under setpoint control.
     fn poll(&mut self, link: &mut Autopilot) -> bool {
         let now = self.now;
         let before = link.state();
@@ -314,7 +314,8 @@ impl Flight {
         engages
     }
 
-    /// Runs the asynchronous runner with its relay's setpoint. Returns true if the drone becomes engaged.
+    /// Runs the asynchronous runner with its relay's setpoint. Returns true if the drone comes under setpoint
+    /// control.
     fn run(&mut self, runner: &mut Runner) -> bool {
         let before = runner.is_flown();
         let mut engages = false;
@@ -363,8 +364,8 @@ impl Flight {
     }
 }
 
-/// Simulates a random flight. Returns its violations, its number of engagements, and true if the asynchronous runner
-/// flew it.
+/// Simulates a random flight. Returns its violations, how often setpoint control was engaged, and true if the
+/// asynchronous runner flew it.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

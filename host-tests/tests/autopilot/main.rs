@@ -303,7 +303,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     assert!(vehicle.targets_since(from).len() > 20, "it stays engaged");
 }
 
-/// Checks that a new view or mission is reported to the operator once, and only by drones in flight.
+/// Checks that a new membership view or mission is reported to the operator once. Only drones in flight report it.
 #[test]
 fn the_operator_reads_of_a_view_and_a_mission_once() {
     use uav_relay::Event;

@@ -173,7 +173,7 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     }
 }
 
-/// Checks that a drone flies on by less than 0.5 m after the stopping time that the guard assumes.
+/// Checks that a drone flies on by less than 0.5 m after the stopping time that its guard assumes.
 #[test]
 fn a_drone_has_stopped_after_the_stopping_time() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -236,7 +236,7 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
     }
 }
 
-/// Checks a GPS outage of 30 s: the PX4 lands and does not resume.
+/// Checks a GPS outage of 30 s: the PX4 lands, and does not return to OFFBOARD afterwards.
 #[test]
 fn a_px4_whose_gps_is_back_resumes_nothing() {
     let mut rig = Rig::new(Kind::Px4);
@@ -252,7 +252,8 @@ fn a_px4_whose_gps_is_back_resumes_nothing() {
     assert!(rig.events.iter().any(failsafe), "{:?}", rig.events);
 }
 
-/// Checks that an autopilot clock that is 1 % slow or loses 1.5 s blinds the link for seconds at most.
+/// Checks an autopilot clock that is 1 % slow or loses 1.5 s. The autopilot link has no valid position then, but for
+/// seconds at most.
 #[test]
 fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -402,7 +403,7 @@ fn late_positions_do_no_harm_to_the_flight() {
     }
 }
 
-/// Checks a drone that drifts while the link is blind: it is led on from its new position.
+/// Checks a drone that drifts while the autopilot link has no position. It is led on from its new position.
 #[test]
 fn a_drone_that_drifts_while_blind_is_led_from_where_it_is() {
     let mut rig = Rig::new(Kind::ArduCopter);

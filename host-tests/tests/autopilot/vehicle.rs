@@ -241,7 +241,7 @@ impl Vehicle {
         }
     }
 
-    /// Receives the link's frames and events.
+    /// Receives the frames and events of the autopilot link.
     pub(crate) fn answer(&mut self) {
         while let Some(frame) = self.link.poll_transmit(self.now) {
             self.hear(&frame);

@@ -28,7 +28,7 @@ fn carrier_hz() -> f64 {
     299_792_458.0 / (4.0 * std::f64::consts::PI)
 }
 
-/// Returns the mission of a chain.
+/// Returns the mission that describes a reference chain.
 pub(crate) fn mission(chain: &Chain) -> Mission {
     let [power_w, x_m, y_m] = chain.interferer.map(|value| value as f32);
     Mission::try_new(MissionConfig {
@@ -89,7 +89,7 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
     chain
 }
 
-/// Adds noise of 1e-3 to 1e2 of the interference at a random position.
+/// Adds receiver noise to a scene: 1e-3 to 1e2 of the interference at a random position on the line.
 pub(crate) fn in_noise(rng: &mut impl Rng, chain: Chain) -> Chain {
     let place = rng.random_range(0.0..=chain.distance_m);
     let [power_w, x, y] = chain.interferer;

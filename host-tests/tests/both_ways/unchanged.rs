@@ -6,7 +6,7 @@ use host_tests::placing::{generator, places, solve};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, in_noise};
 
-/// Number of scenarios.
+/// Number of random scenarios whose results are hashed.
 const SCENARIOS: u32 = 1_000;
 
 /// FNV-1a hash of the targets, sweeps and positions of all scenarios with one direction.

@@ -11,7 +11,7 @@ use crate::process::Relay;
 /// New site of the receiver, about 200 m beyond the old one and to the right, on higher ground.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
-/// Time of observation, shorter than the guard waits for the drone to stop.
+/// Time of observation, shorter than the motion guard waits for the drone to stop.
 const STANDS: Duration = Duration::from_millis(2_500);
 
 #[test]

@@ -8,7 +8,7 @@ use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay, bits};
 
 /// Checks relays that receive their drones' positions. Their first setpoints are these positions, and the last ones
-/// are those of an unguarded chain.
+/// are those of a chain without motion guards.
 #[test]
 fn two_that_know_where_they_are_make_room_for_each_other() {
     let mut free = Chain::start(2, "");

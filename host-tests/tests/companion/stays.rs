@@ -184,7 +184,7 @@ fn seconds_from_now(text: &str) -> u64 {
     now.abs_diff(then.trim().parse().unwrap())
 }
 
-/// Prevents the growth of any file of that process, as on a full disk, or permits it again.
+/// Keeps all files of process `relay` from growing, as on a full disk, or permits it again.
 pub(crate) fn fill_disk(relay: Pid, full: bool) {
     let limit = Rlimit {
         current: full.then_some(0),

@@ -103,16 +103,16 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
 }
 
-/// State of a wire that a relay's decision on a view may cut.
+/// State of a wire that a relay's decision on a membership view may cut.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Wire {
     Open,
-    /// State of the wire: the next decision on a view cuts it, and is lost.
+    /// State of the wire: the next decision on a membership view cuts it, and is lost.
     Armed,
     Cut,
 }
 
-/// Creates a wire that a decision on a view cuts, as `state` says. The relay that decides has tty 1.
+/// Creates a wire that a decision on a membership view cuts, as `state` says. The relay that decides has tty 1.
 fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     let state = Arc::clone(state);
     let mut deframer = Deframer::new();
@@ -131,8 +131,8 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     })
 }
 
-/// Checks that the ground station reports one relay on the new mission until all fly it. The chain is cut behind
-/// relay 3 as soon as this relay has decided on the view with the mission.
+/// Checks that the ground station reports one relay on the new mission until all fly it. The wire between relays 2
+/// and 3 is cut as soon as relay 3 has decided on the view with the mission.
 #[test]
 fn the_ground_tells_of_one_relay_that_flies_it_until_all_do() {
     let state = Arc::new(Mutex::new(Wire::Open));
@@ -248,7 +248,7 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
     assert!(line.ends_with("; 0 frames refused"), "{line}");
 }
 
-/// Checks that guarded relays refuse an altitude outside their geofence and name the permitted range.
+/// Checks that relays with a geofence refuse an altitude outside it, and name the permitted range.
 #[test]
 fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
     for (band, altitude, range) in [

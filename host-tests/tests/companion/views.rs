@@ -44,7 +44,8 @@ fn stored(chain: &Chain, index: usize) -> Option<ViewRecord> {
 
 const STANDS_BY: &str = "restored: this relay's earlier votes on views were read from --view-file; remove that file before another flight";
 
-/// Checks that relays killed in a view of two and restarted form a chain of three. No view number is used twice.
+/// Checks that relays killed in a view (membership) of two and restarted form a chain of three. No view number is
+/// used twice.
 #[test]
 fn three_that_are_started_again_stand_by_what_they_said() {
     let expected = simulated(&Scenario::default(), 3);
@@ -86,8 +87,8 @@ fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
     assert!(unit.lines().any(|line| line == setting), "{unit}");
 }
 
-/// Checks that two of three relays do not fly if their stored view does not include them. Without that view they
-/// would have a quorum.
+/// Checks that two of three relays do not fly if their stored membership view does not include them. Without that
+/// view they would have a quorum.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly() {
     let mut chain = channel();

@@ -13,7 +13,7 @@ const SEEDS: u64 = 100;
 
 const I_MAX_W: f32 = 3.476_175_5e-7;
 
-/// Statistics of the estimates of Upsilon for one pair of Beta shapes.
+/// Statistics of the estimates of Upsilon, the mean inverse interference, for one pair of Beta shapes.
 #[derive(Default, Debug)]
 struct Found {
     /// Number of estimates that could be made.

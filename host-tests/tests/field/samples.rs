@@ -81,7 +81,8 @@ fn no_estimate_without_enough_samples_or_spread() {
     assert_eq!(scaled(0.8e-12), None);
 }
 
-/// Returns the estimate of Upsilon from powers around `mean_w`, with `I_max` 1e-6 W.
+/// Returns the estimate of Upsilon = E[1/I] from powers around `mean_w`. The largest permitted power, `I_max`, is
+/// 1e-6 W.
 fn scaled(mean_w: f32) -> Option<Estimate> {
     let mut estimator = Estimator::new(1e-6);
     for k in 0..1_000_u16 {

@@ -26,7 +26,7 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// Position error configured in the guard, m.
+/// Position error configured in the motion guard, m.
 const ERROR_M: f64 = 2.0;
 const NOISE_M: f64 = 0.3;
 

@@ -5,7 +5,7 @@ use uav_relay_sim::simulator::chain::run;
 
 use super::*;
 
-/// Longest time from the last repair of the chain until all relays are in one view, s.
+/// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
 /// Returns all pairs of cuts of the chain. A cut is the number of the relay behind which the chain is separated, and
@@ -16,8 +16,8 @@ fn pairs() -> impl Iterator<Item = (u16, u16)> {
         .filter(|(first, second)| first != second)
 }
 
-/// Checks that all relays are in one view soon after two overlapping cuts of the chain. Times are start, end, start,
-/// end, s; in the last set the cuts heal a second apart.
+/// Checks that all relays are in one membership view soon after two overlapping cuts of the chain. Times are start,
+/// end, start, end, s; in the last set the cuts heal a second apart.
 #[test]
 fn all_are_in_one_view_soon_after_two_cuts() {
     let all = [

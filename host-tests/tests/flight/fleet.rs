@@ -15,7 +15,7 @@ const NOISE_M: f64 = 0.3;
 /// Largest standard deviation of gusts, m/s.
 const GUST_MPS: f64 = 0.3;
 
-/// Position error configured in the guard, m: noise, gusts and overshoot.
+/// Position error configured in the motion guard, m: noise, gusts and overshoot.
 const HOVER_M: f64 = 1.5;
 
 /// Permitted shortfall of the least separation, m: bias and hovering error of both drones.

@@ -12,7 +12,7 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
 };
 
 /// Returns all relays' lateral offsets and altitudes while relays 1 to 3 are cut off, and after that. With `room`,
-/// the guard permits the offsets of relays that leave the line.
+/// the motion guard permits the offsets of relays that leave the line.
 fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
     [seconds(110), seconds(300)].map(|end| {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));

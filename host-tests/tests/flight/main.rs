@@ -44,12 +44,12 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
 
 /// Returns the smallest permitted distance of drones that were each started at most `starts` times, m.
 ///
-/// The guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
+/// The motion guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }
 
-/// Returns the time when the last of eight relays accepted the view that all have in the end. Returns `None` if the
+/// Returns the time when the last of eight relays accepted their final common membership view. Returns `None` if the
 /// relays differ.
 fn together(outcome: &Outcome) -> Option<Instant> {
     let view = outcome.relays[0].view;

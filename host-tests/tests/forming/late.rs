@@ -42,7 +42,7 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     }
 }
 
-/// Checks that a view request delayed beyond a newer view has no effect.
+/// Checks that a request for a membership view has no effect if it is delayed beyond a newer view.
 #[test]
 fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
@@ -73,7 +73,8 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(chain.bench.setpoints(), before);
 }
 
-/// Checks that a relay requests a view when a neighbour that refuses its frames reports a newer one.
+/// Checks that a relay requests a membership view when a neighbour reports a newer one. That neighbour refuses the
+/// relay's frames.
 #[test]
 fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());

@@ -33,7 +33,8 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
     }
 }
 
-/// Checks that a relay that reboots during the leader's second pass gets a position by a new view.
+/// Checks that a relay that reboots during the leader's second pass gets a position by a new view. The view is a new
+/// agreement on the members of the chain.
 #[test]
 fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
     let settings = Settings {
@@ -58,8 +59,8 @@ fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
     }
 }
 
-/// Checks that a relay that reboots in a settled chain gets a position by a new view. It requests the view at the
-/// first lease renewal that it does not know, or on its own.
+/// Checks that a relay that reboots in a settled chain gets a position by a new membership view. It requests the view
+/// at the first lease renewal that it does not know, or on its own.
 #[test]
 fn a_relay_rebooted_later_gets_a_place_by_a_new_view() {
     for rebooted in 1..4 {

@@ -145,7 +145,8 @@ fn offer(side: u8) -> Vec<u8> {
     [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// Returns an input: the second of four relays with a key receives a mission, and adopts it in a view.
+/// Returns an input: the second of four relays with a key receives a mission, and adopts it. The chain adopts it by a
+/// new membership view.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
     let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
@@ -178,7 +179,8 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns an input: the last of four guarded relays receives views, a fence and late frames. It has a position, too.
+/// Returns an input: the last of four relays receives membership views, a fence and late frames. It has a motion
+/// guard and a position.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];

@@ -58,7 +58,7 @@ pub(crate) struct Drone {
     /// Range of x that both neighbours keep clear, since they know that the pilot flies this drone.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
-    /// Association numbers in the last messages to the neighbours toward Tx and Rx.
+    /// Numbers of the associations with the neighbours toward Tx and Rx, in the last messages to them.
     pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,

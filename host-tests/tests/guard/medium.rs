@@ -23,7 +23,7 @@ pub(crate) struct Letter {
     /// Side of the receiver on which the sender of the message is.
     pub(crate) side: Side,
     pub(crate) fence: Fence,
-    /// Number of the line in whose coordinates the message's positions are.
+    /// Number of the line from Tx to Rx in whose coordinates the message's positions are.
     pub(crate) line: u32,
 }
 

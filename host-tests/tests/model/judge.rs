@@ -10,13 +10,13 @@ const ABOVE: f64 = 1e-4;
 /// Reference model of a mission's chain, in f64.
 #[derive(Debug)]
 pub(crate) enum Judge {
-    /// Chain with an interferer at a known position.
+    /// Reference model of a chain with an interferer at a known position.
     Source {
         link: Link,
         /// Highest target SIR within the relays' altitude limits.
         optimum: f64,
     },
-    /// Chain in a field of interference.
+    /// Reference model of a chain in a field of interference.
     Field(StochasticLink),
 }
 
@@ -44,8 +44,8 @@ impl Judge {
         }
     }
 
-    /// Returns how much higher the SIR at `x_m` is with the measured Upsilon, 1/W, than with the true one. Returns 1
-    /// for a known interferer.
+    /// Returns the ratio of the SIR at `x_m` with the measured Upsilon = E[1/I] to that with the true one.
+    /// `measured_per_w` is the measured value in 1/W. Returns 1 for a known interferer.
     pub(crate) fn louder(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,
@@ -53,7 +53,7 @@ impl Judge {
         }
     }
 
-    /// Returns true if a chain can meet `target`, given the largest Upsilon that any relay has measured.
+    /// Returns true if a chain can meet `target`, given the largest Upsilon = E[1/I] that a relay measured.
     /// `measured_per_w` is that Upsilon in 1/W, or `None` without a measurement.
     pub(crate) fn may_meet(&self, target: f64, measured_per_w: Option<f64>) -> bool {
         match self {

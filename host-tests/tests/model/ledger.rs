@@ -38,7 +38,7 @@ pub(crate) struct Ledger {
     pub(crate) pass: Option<u16>,
     /// Numbers of the last passes in which the relay took part before its reboots.
     pub(crate) passes_before: Vec<u16>,
-    /// Largest Upsilon that the relay has measured, also before its reboots, 1/W.
+    /// Largest Upsilon = E[1/I] that the relay has measured, also before its reboots, 1/W.
     pub(crate) measured_per_w: Option<f64>,
     /// Epoch of the relay since its last start: at least 1, increasing, different for all relays.
     pub(crate) epoch: u32,
@@ -66,7 +66,7 @@ pub(crate) struct Turn<'a> {
     pub(crate) relay: &'a Relay,
     pub(crate) sent: u32,
     pub(crate) events: &'a [Event],
-    /// Largest Upsilon that any relay has measured, 1/W.
+    /// Largest Upsilon = E[1/I] that any relay has measured, 1/W.
     pub(crate) measured_per_w: Option<f64>,
 }
 
@@ -175,7 +175,7 @@ impl Ledger {
         Ok(before != (self.place, self.target, self.holding))
     }
 
-    /// Checks that every view of the relay has all relays of the mission, and that new views are reported.
+    /// Checks that every membership view of the relay has all relays of the mission. New views must be reported.
     fn form(&self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let own = at as u16 + 1;

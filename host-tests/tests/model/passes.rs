@@ -14,14 +14,15 @@ use super::ledger::Ledger;
 use super::scenario::Scenario;
 use super::wires::Pass;
 
-/// Divisor of the numbers of first passes, those after a leader's start or of a new view. Other passes have no
-/// multiple of it.
+/// Divisor of the number of a leader's first pass after its start or in a new membership view. A pass is a message
+/// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
 /// Number of passes before the last one that count as over. A restarted leader may also skip so many.
 const NEAR: u16 = 32;
 
-/// Returns a view's contribution to the digest in its passes: lower half plus byte-swapped upper half.
+/// Returns what a membership view adds to the digest in its passes. It is the lower half plus the byte-swapped upper
+/// half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
@@ -33,19 +34,19 @@ const fn next(last: u16) -> u16 {
     next.wrapping_add(next.is_multiple_of(FIRST) as u16)
 }
 
-/// Classification of a pass that a relay has received.
+/// Classification of a received pass, a message that travels along the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Met {
     TakenUp,
     Again,
-    /// Late pass: it is over already.
+    /// Classification: a late pass, which is over already.
     Late,
-    /// Pass of another view, from before the leader's reboot, or after one that the relay has missed.
+    /// Classification: a pass of another view, from before the leader's reboot, or after a missed pass.
     Foreign,
 }
 
 impl Ledger {
-    /// Checks that a relay's view never goes back. A new view begins without a pass.
+    /// Checks that a relay's membership view never goes back. A new view begins without a pass.
     pub(crate) fn look_up(&mut self, relay: &Relay) -> Checked {
         let view = relay.view();
         prop_assert!(view >= self.view, "{view:?} after {:?}", self.view);
@@ -104,7 +105,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay takes part in the first pass of its view again, after a reboot.
+    /// Returns true if the relay takes part in the first pass of its membership view again, after a reboot.
     pub(crate) fn begins_anew(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))

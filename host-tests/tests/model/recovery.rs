@@ -10,7 +10,7 @@ use super::scenario::{Calm, Kind};
 /// Longest time to an agreement of a chain without faults, ms of virtual time.
 const LONGEST_MS: u64 = 20_000;
 
-/// Largest number of further views after an agreement.
+/// Largest number of further membership views after an agreement.
 const MOST_VIEWS: u32 = 2;
 
 /// Time of observation after the agreement, ms, in which no relay may be lost or move.
@@ -67,8 +67,8 @@ impl World<'_> {
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
-    /// Returns the longest time that a view request takes to the leader. Each relay may wait for `probe_after` before
-    /// it forwards the request.
+    /// Returns the longest time that a request for a new view takes to the leader. Each relay may wait for
+    /// `probe_after` before it forwards the request.
     fn a_call(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
@@ -91,7 +91,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// Waits for views that were requested before the agreement. The chain agrees again after each.
+    /// Waits for membership views that were requested before the agreement. The chain agrees again after each.
     fn settle(&mut self, at_most: Duration) -> Checked {
         for _ in 0..MOST_VIEWS {
             let views: Vec<ViewId> = self.relays.iter().map(Relay::view).collect();

@@ -55,7 +55,7 @@ pub(crate) struct Wires {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
-    /// Digest of the mission plus the view's contribution.
+    /// Digest of the mission, plus what the membership view adds to it.
     pub(crate) digest: u16,
     /// True if Algorithm 2 moves relays by this pass.
     pub(crate) moves: bool,

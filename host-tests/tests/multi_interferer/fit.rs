@@ -35,8 +35,8 @@ fn count(case: &Case, name: &str) -> u32 {
     case.args[name].as_u64().unwrap().try_into().unwrap()
 }
 
-/// Compares the fit with values of a separate program. That program integrates errors by the midpoint rule on nx x nh
-/// cells.
+/// Compares the single interferer fitted to several ones with values of a separate program. That program integrates
+/// errors by the midpoint rule on nx x nh cells.
 #[test]
 fn the_cases_of_a_separate_program_are_met() {
     let cases = cases::of("hyp_msi").unwrap();
@@ -100,7 +100,7 @@ fn equal_sources_at_one_place_are_one_of_their_common_power() {
     }
 }
 
-/// Checks that the fit and its stated error change little with many more points. Prints the time.
+/// Checks that a fitted interferer and its stated error change little with many more points. Prints the time.
 #[test]
 fn the_rasters_are_fine_enough() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(74));
@@ -125,7 +125,7 @@ fn the_rasters_are_fine_enough() {
     assert!(search < 1e-3 && report < 3e-5);
 }
 
-/// Checks that scenarios at the limits of the permitted ranges have a finite fit.
+/// Checks that an interferer can be fitted in scenarios at the limits of the permitted ranges.
 #[test]
 fn extreme_scenes_have_a_finite_fit() {
     let of = |d: f64, h: (f64, f64), sources: &[(f64, f64, f64)]| {

@@ -29,8 +29,8 @@ fn reaches_in_noise_agree_with_the_reference() {
     );
 }
 
-/// Checks that a hop's reach falls as the target SIR rises, and rises with the hop's start. The tolerance is two f32
-/// steps.
+/// Checks that the reach of a hop falls with the target SIR, and rises with the hop's start. The reach is the
+/// farthest position that meets the target; the tolerance is two f32 steps.
 #[test]
 fn the_reach_in_noise_is_monotonic() {
     let mut rng = generator(1112);

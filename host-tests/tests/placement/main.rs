@@ -29,8 +29,8 @@ fn hop_sirs_agree_with_the_reference() {
     });
 }
 
-/// Compares the reach of a hop with the reference. A third of the target SIRs are near the hop's gain, where the
-/// printed formulas lose their digits.
+/// Compares the reach of a hop, the farthest position that meets a target SIR, with the reference. A third of the
+/// targets are near the hop's gain, where the printed formulas lose their digits.
 #[test]
 fn reaches_agree_with_the_reference() {
     let seen = reaches_agree(&mut generator(12), 20_000, false, |rng, of| {

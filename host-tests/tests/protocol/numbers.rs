@@ -27,7 +27,7 @@ fn again(tail: &mut Relay, sweep: &[u8], now: Instant, off: u16) {
     tail.handle_bytes(now, Port::Upstream, &encode(1, 2, &Message::Sweep(sweep)));
 }
 
-/// Returns true if the relay requests a new view, at once or a millisecond later.
+/// Returns true if the relay requests a new membership view, at once or a millisecond later.
 fn calls(relay: &mut Relay, now: Instant) -> bool {
     let mut said = drain(relay, now);
     let later = now + Duration::from_millis(1);

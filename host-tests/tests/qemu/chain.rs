@@ -102,7 +102,7 @@ fn five_settle_there_through_a_bad_day() {
     }
 }
 
-/// Checks that the smallest firmware image, with no feature but the log, gives the same positions.
+/// Checks that the smallest firmware image agrees as the simulated chain does. It has no feature but the log.
 #[test]
 fn five_of_the_smallest_image_settle_there_too() {
     let flight = paper(5);
@@ -118,7 +118,7 @@ fn five_of_the_smallest_image_settle_there_too() {
     }
 }
 
-/// Checks that the firmware image with the runner of `uav_relay::asynch` gives the same positions.
+/// Checks that the image with the runner of `uav_relay::asynch` agrees as the simulated chain does.
 #[test]
 fn five_on_asynchronous_ports_settle_there_too() {
     let flight = paper(5);

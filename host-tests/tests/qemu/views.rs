@@ -37,7 +37,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
 
 const HOLDS: &str = "votes on views restored from flash";
 
-/// Checks that drones with stored votes up to view 40 fly in a later view.
+/// Checks that drones with stored votes up to membership view 40 fly in a later view.
 #[test]
 fn three_that_were_switched_off_stand_by_what_they_said() {
     let flight = paper(3);
@@ -53,8 +53,8 @@ fn three_that_were_switched_off_stand_by_what_they_said() {
     }
 }
 
-/// Checks that two of three drones do not fly if their stored view does not include them. Without that view they
-/// would have a quorum.
+/// Checks that two of three drones do not fly if their stored membership view does not include them. Without that
+/// view they would have a quorum.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly_it() {
     let flight = paper(3);

@@ -228,7 +228,7 @@ pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the settings of one relay, from the shared ones. `guarded` gives it a guard.
+/// Draws the settings of one relay, from the shared ones. `guarded` gives it a motion guard.
 pub(crate) fn own(
     rng: &mut impl Rng,
     mission: &Mission,

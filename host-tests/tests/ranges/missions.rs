@@ -9,7 +9,7 @@ use crate::draw::{mission, own, settings, slow_settings};
 use crate::each;
 use crate::line::{check, has_agreed, is_infeasible, line};
 
-/// Longest time to an agreement, besides the chain's hop times and probing periods.
+/// Longest permitted time to an agreement of a random chain.
 const PATIENCE: Duration = Duration::from_millis(600_000);
 
 /// Result of a chain with random mission and settings.

@@ -121,7 +121,7 @@ fn going_farthest_is_not_best_at_different_altitudes() {
     assert!(link.chain_sir(&link.placement(best).unwrap()) >= best * (1.0 - 1e-14));
 }
 
-/// Checks the fixed step with an interferer behind Tx, where its first target SIR must be higher.
+/// Checks the paper's fixed-step search with an interferer behind Tx. It must start at a higher target SIR there.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Station {

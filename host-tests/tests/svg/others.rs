@@ -37,7 +37,8 @@ fn the_interferer_of_the_previous_mission_is_faint() {
     }
 }
 
-/// Checks that another interferer is not drawn at the present one's position, far away or at no number.
+/// Checks that another interferer is not drawn if it would disturb. It is at the present one's position, far away, or
+/// at an undefined position.
 #[test]
 fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
     let same = level(8).interferers;

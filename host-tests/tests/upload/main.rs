@@ -58,8 +58,8 @@ fn upload(
 
 /// Checks a run with uploads. Returns the first fault as an error.
 ///
-/// Members of a view must fly the same mission, which a quorum has held. Setpoints must be within limits. A settled
-/// chain must fly `version`, in the positions of a new chain with `config`.
+/// Members of a membership view must fly the same mission, which a quorum has held. Setpoints must be within limits.
+/// A settled chain must fly `version`, in the positions of a new chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,

@@ -119,7 +119,7 @@ fn at_120(relays: u16, band: Band) -> Mission {
     .unwrap()
 }
 
-/// Gives guarded relays the positions of their drones, which they need.
+/// Gives relays with a motion guard the positions of their drones, which they need.
 fn tell_places(wires: &mut Wires, base: &Mission) {
     let distance = base.config().distance_m;
     let step = distance / f32::from(base.relays() + 1);

@@ -28,7 +28,7 @@ const AUTH: Auth = Auth {
 pub(crate) struct Wires {
     pub(crate) bench: Bench,
     loss: Rc<Cell<f64>>,
-    /// Positions of the guarded relays' drones.
+    /// Positions of the drones of relays with a motion guard.
     places: Vec<Placement>,
 }
 

@@ -123,7 +123,7 @@ pub(crate) struct Air {
     /// Largest number of groups that flew different agreements at once. The next field is the time of that, µs.
     pub(crate) groups: usize,
     pub(crate) groups_us: u64,
-    /// Time since which the chain has been whole, µs; `None` while it is not.
+    /// Time since which all relays have held positions in one view, µs; `None` while they do not.
     pub(crate) whole_since_us: Option<u64>,
     /// Number of relays that need not fly the common agreement. The next fields are the time flown by the others, the
     /// first such time, and the longest interruption, µs.
@@ -476,7 +476,8 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest group that flies one agreement with all members of its view.
+    /// Returns the size of the largest group that flies one agreement with all members of its view. A view is the
+    /// agreed membership of the chain.
     fn flying(&self) -> usize {
         let holds = |seen: &&Seen| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding
@@ -490,7 +491,7 @@ impl Air {
         holding.iter().filter_map(of).max().unwrap_or(0)
     }
 
-    /// Returns true if all relays are on and hold positions in one view of all relays.
+    /// Returns true if all relays are on and hold positions in one membership view of all relays.
     fn is_whole(&self) -> bool {
         let all = usize::from(self.kind.mission.relays());
         let is_on = |at: &usize| self.seen[*at].is_on;

@@ -113,7 +113,7 @@ fn a_relay_that_is_left_out_draws_no_other_away() {
 /// before the other, and the link is lost again soon.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
-/// Checks chains with any flapping link whose period is 5 s to 300 s.
+/// Checks that one flapping link costs at most a tenth of the flight time, for periods of 5 s to 300 s.
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));

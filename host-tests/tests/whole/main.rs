@@ -15,7 +15,7 @@ use host_tests::fixtures::voted;
 use rand::{RngExt, SeedableRng};
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
-/// Longest permitted time from the last fault until the chain is whole, s.
+/// Longest permitted time from the last fault until all relays hold positions in one view, s.
 const WHOLE_S: u64 = 120;
 
 /// Returns the environment variable `name` as a number, or `usual`.
@@ -27,7 +27,8 @@ fn number(name: &str, usual: u64) -> u64 {
 #[derive(Clone, Debug)]
 struct Found {
     seed: u64,
-    /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes.
+    /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes. In a whole chain,
+    /// all relays hold positions in one membership view.
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
@@ -228,7 +229,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Checks that a chain becomes whole if one relay's stored vote has a far later view number. The vote is from an
+/// Checks that a chain recovers if one relay has a stored vote with a far later view number. The vote is from an
 /// earlier flight.
 #[test]
 fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {

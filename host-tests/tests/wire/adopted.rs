@@ -13,7 +13,8 @@ use super::said::Said;
 use super::signed::{Met, NOW, settings};
 use super::votes::*;
 
-/// Returns relay 4, which has adopted an upload of version 2 in view 1 of all eight relays. The upload comes with it.
+/// Returns relay 4, which has adopted an upload of version 2 in membership view 1 of all eight relays. The upload
+/// comes with it.
 fn adopted() -> (Met, Said) {
     let mut met = Met::fourth();
     let newer = upload(2, met.base);
@@ -21,7 +22,7 @@ fn adopted() -> (Met, Said) {
     (met, newer)
 }
 
-/// Makes relay 4 receive the upload `newer` and adopt it in view 1 of all eight relays.
+/// Makes relay 4 receive the upload `newer`, and adopt it in membership view 1 of all eight relays.
 pub(crate) fn adopts(met: &mut Met, newer: &Said) {
     let of = mission_id(newer);
     met.hears(0, newer);

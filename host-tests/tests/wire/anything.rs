@@ -141,7 +141,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 /// State of a test in which a relay receives random messages.
 struct Flight {
     bench: Bench,
-    /// One message of each tag, in the order of the tags.
+    /// Messages of the test, one of each tag, in the order of the tags.
     kinds: Vec<Said>,
     ports: (Port, Port),
     /// True once the relay may have accepted a pass. The next fields are the number of the pass sent, and of the last

@@ -8,7 +8,7 @@ use super::kinds::{FIRST, beat, one_of_each};
 use super::votes::*;
 
 /// Checks a relay in the middle of a group without a quorum. It forwards the refusing decision, has no setpoint, and
-/// requests no further view.
+/// requests no further membership view.
 #[test]
 fn a_part_without_quorum_stops_requesting_views() {
     let mut bench = Bench::new(4, 8, Wiring::Pair);

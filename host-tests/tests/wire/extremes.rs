@@ -9,7 +9,7 @@ use uav_relay_decode::{range, walk};
 use super::golden::vectors;
 use super::said::FORMAT;
 
-/// Values of each field that the vectors have, as text. The key is the message's name and the field's.
+/// Values of each field that the test vectors have, as text. The key is the message's name and the field's.
 type Seen = BTreeMap<String, BTreeSet<String>>;
 
 /// Returns the name under which a message's fields are collected. Messages with the same fields share a name.

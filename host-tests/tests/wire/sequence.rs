@@ -127,7 +127,8 @@ fn a_token_is_forwarded_and_its_result_returned() {
 }
 
 /// Checks that messages that the relay does not await are stale. These are answers to another pass or of another
-/// kind, and passes that are over. Tokens are stale without a position, in a field, or beyond Rx.
+/// kind, and passes that are over. Tokens (messages of Algorithm 2) are stale without a position, in a field, or
+/// beyond Rx.
 #[test]
 fn what_is_not_awaited_or_does_not_fit_is_stale() {
     for config in missions() {

@@ -125,7 +125,7 @@ fn the_sites_are_those_of_the_mission_that_is_flown() {
     }
 }
 
-/// Returns relay 4 of eight with a guard and a large geofence.
+/// Returns relay 4 of eight with a motion guard and a large geofence.
 fn guarded() -> Met {
     let mission = Mission::try_new(paper(8)).unwrap();
     // The geofence has room for all offers here.
