@@ -109,7 +109,7 @@ fn random_links_settle_at_their_optimum() {
     assert!(hopeless > 0);
 }
 
-/// Checks the number of sweeps and the last target SIR with the paper's fixed step of 0.1.
+/// Checks the number of sweeps (along the chain) and the last target SIR with the paper's step of 0.1.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [

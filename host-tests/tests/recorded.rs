@@ -171,7 +171,7 @@ fn the_numbered_scenarios_are_of_many_kinds() {
 }
 
 /// Checks that no random move of one or all relays improves a recorded optimum. Scenes are in the plane, with lateral
-/// room, with held altitudes, and in noise.
+/// offsets, with held altitudes, and in noise.
 #[test]
 fn no_move_is_better() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(35));

@@ -209,7 +209,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     assert!(format!("{first:?}") == format!("{expected:?}"));
 }
 
-/// Checks that a drone on the wrong side of its neighbour cannot be engaged.
+/// Checks that a drone on the wrong side of its neighbour cannot come under setpoint control.
 #[test]
 fn a_drone_out_of_order_cannot_be_engaged() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));

@@ -199,7 +199,7 @@ fn a_drone_has_stopped_after_the_stopping_time() {
     }
 }
 
-/// Checks that a restarted companion engages no drone that it finds in OFFBOARD, GUIDED or a failsafe. The pilot must
+/// Checks that a restarted companion takes over no drone that is in OFFBOARD, GUIDED or a failsafe. The pilot must
 /// choose another mode first.
 #[test]
 fn a_restarted_companion_engages_nothing_that_it_finds() {
@@ -295,7 +295,7 @@ fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     }
 }
 
-/// Checks that a drone stays engaged if its simulator pauses for 1.5 s and loses that time for good.
+/// Checks that setpoint control continues if the simulator pauses for 1.5 s and loses that time.
 #[test]
 fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
     for echoes in [true, false] {
@@ -361,7 +361,7 @@ fn a_fence_that_a_moving_target_leaves_is_named() {
     assert_eq!(rig.says("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks that a drone whose pilot hands over at full speed overshoots, stops, and is led from there.
+/// Checks a drone whose pilot hands over at full speed: it overshoots, stops, and flies on from there.
 #[test]
 fn a_drone_that_is_given_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -403,7 +403,8 @@ fn late_positions_do_no_harm_to_the_flight() {
     }
 }
 
-/// Checks a drone that drifts while the autopilot link has no position. It is led on from its new position.
+/// Checks a drone that drifts while the autopilot link has no position. The next targets begin at the drone's new
+/// position.
 #[test]
 fn a_drone_that_drifts_while_blind_is_led_from_where_it_is() {
     let mut rig = Rig::new(Kind::ArduCopter);

@@ -167,7 +167,7 @@ fn a_clock_that_goes_back_is_told_of_and_not_believed() {
     assert_eq!(vehicle.link.state(), State::Silent);
 }
 
-/// Checks that frames recorded in flight and replayed on the ground do not engage the drone.
+/// Checks that frames recorded in flight and replayed on the ground do not start setpoint control.
 #[test]
 fn what_was_recorded_is_refused() {
     let mut vehicle = keyed(Kind::ArduCopter, Some(OURS), Some(OURS));

@@ -9,7 +9,7 @@ use uav_relay_oracle::random::{self, Chain, Style, in_noise};
 /// Number of random scenarios whose results are hashed.
 const SCENARIOS: u32 = 1_000;
 
-/// FNV-1a hash of the targets, sweeps and positions of all scenarios with one direction.
+/// FNV-1a hash of the target SIRs, numbers of sweeps and positions of all scenarios with one direction.
 const RECORDED: u64 = 0x12dc_53fc_8c0c_d073;
 
 fn add(hash: &mut u64, bits: u32) {

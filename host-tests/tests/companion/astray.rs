@@ -133,7 +133,7 @@ fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
     assert_eq!(apart.position()["sites_look_swapped"], false);
 }
 
-/// Checks that a drone outside the geofence but near the line is reported, and may be engaged.
+/// Checks that a drone outside the geofence but near the line is reported, and may be controlled.
 #[test]
 fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
     // 380 m along a line that starts 500 m farther on.

@@ -30,7 +30,8 @@ fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
     assert_eq!(found(&mut start), Some(voted(7, 5, 1_000, true)));
 }
 
-/// Checks a power failure while a vote is recorded. The record before stays valid, as the new vote was not sent.
+/// Checks a power failure while a vote is recorded. The previous record stays valid, because the new vote was not
+/// sent.
 #[test]
 fn of_a_record_that_is_torn_the_one_before_holds() {
     for written in 1..WORDS + AROUND {

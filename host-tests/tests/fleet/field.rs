@@ -196,7 +196,8 @@ fn the_best_of_equals_in_a_field() {
     assert!(above > 5);
 }
 
-/// Checks that the number of unlike relays in a field is found by Algorithm 4 and not called proven.
+/// Checks that the number of relays with different powers in a field is not called proven. It is found by Algorithm
+/// 4.
 #[test]
 fn what_differs_in_a_field_is_not_proven() {
     let link = field(1000.0, 20.0, vec![(0.0, 3e6), (1000.0, 5e6)]);

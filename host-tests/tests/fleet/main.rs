@@ -7,8 +7,8 @@ mod known;
 use host_tests::placing::xs;
 use uav_relay::{Mission, Placement, Profile};
 
-/// Relative loss of a target SIR by positions in f32. Half a rounding step of x is 6e-8 D, over an altitude of 0.002
-/// D.
+/// Relative loss of a target SIR because positions are rounded to f32. Half a rounding step of x is 6e-8 D, compared
+/// with an altitude of 0.002 D.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 pub(crate) fn round(value: f64) -> f64 {

@@ -168,7 +168,7 @@ impl World {
     }
 
     /// Moves drone `k` along the line, clear of its neighbours, as its pilot does. Returns false if a neighbour does
-    /// not know of the pilot yet, or if there is no room.
+    /// not know of the pilot yet, or if there is no space between the neighbours.
     pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;

@@ -216,7 +216,7 @@ fn who_fails_while_all_solve_is_missed() {
 }
 
 /// Prints the results. Returns the number within 0.1 % of the optimum, the worst and the best ratio, and the sum of
-/// sweeps.
+/// sweeps along the chain.
 fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     results.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
     for result in results.iter().take_while(|result| result.ratio < 0.999) {

@@ -63,8 +63,8 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     Some((drawn, setup))
 }
 
-/// Checks that chains of unlike relays come near the joint optimum. Their SIR is never below that at the configured
-/// altitudes.
+/// Checks that chains with different powers or held altitudes come near the joint optimum. Their SIR is never below
+/// that at the configured altitudes.
 #[test]
 fn relays_that_differ_come_near_the_joint_optimum() {
     let count = count(200);
@@ -141,10 +141,10 @@ fn a_relay_may_hold_its_altitude() {
     );
 }
 
-/// Checks the number of round trips with unlike relays. One sweep computes, further ones each collect the data of up
-/// to eight unlike relays, and one computes again.
+/// Checks the number of round trips if some relays have a power or altitude of their own. One round trip computes,
+/// further ones each collect the data of up to eight such relays, and one computes again.
 ///
-/// If the leader is one of the unlike relays, the first sweep is omitted.
+/// If the leader is one of these relays, the first round trip is omitted.
 #[test]
 fn relays_that_differ_take_three_round_trips_or_more() {
     for (relays, own, trips) in [
@@ -214,7 +214,8 @@ fn a_band_of_one_altitude_is_algorithm_1() {
     assert_eq!(outcome.bits(), settle(align).bits());
 }
 
-/// Checks that message faults do not change the positions, for both joint methods and unlike relays.
+/// Checks that message faults do not change the positions, for both joint methods. Some relays have powers or
+/// altitudes of their own.
 #[test]
 fn faults_change_nothing_on_random_links() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(44));

@@ -16,8 +16,8 @@ pub(crate) enum Operation {
     Drop(u8),
     /// Operation: the next frame of a line arrives twice.
     Twice(u8),
-    /// Operation: a frame of a line overtakes the frames before it. The fields are the line and the number of these
-    /// frames.
+    /// Operation: a frame of a line overtakes frames before it. The fields are the line, and a number that selects
+    /// one to four frames to overtake.
     Overtake(u8, u8),
     /// Operation: several frames of a line arrive in one read. The fields are the line and their number.
     Burst(u8, u8),

@@ -32,8 +32,8 @@ const SCENES: u64 = 400;
 pub(crate) enum Kind {
     /// Kind of mission: Algorithm 1, where the leader predicts the target SIR.
     Predicted,
-    /// Kind of mission: Algorithm 1 without prediction, where the leader tries target SIRs by sweeps. Relays may have
-    /// their own altitudes and powers.
+    /// Kind of mission: Algorithm 1 without prediction, where the leader tries target SIRs by messages. Relays may
+    /// have their own altitudes and powers.
     Tried,
     /// Kind of mission: Algorithm 1 with free altitudes.
     Altitude,

@@ -179,8 +179,8 @@ fn extreme_scenes_have_a_finite_fit() {
     assert_eq!(hypothetical(&nobody), None);
 }
 
-/// Checks that the fitted interferer is on the true ones' side if the relays have lateral room. Without that room,
-/// the side is always positive.
+/// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
+/// offsets, its side is always positive.
 #[test]
 fn with_room_beside_the_line_the_side_is_known() {
     let source = |x_m: f64, y_m: f64| Source {

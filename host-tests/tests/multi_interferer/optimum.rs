@@ -119,7 +119,8 @@ fn what_has_no_best_chain_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// Checks chains of as many relays as the separation permits, one more, and a thousand unlike relays.
+/// Checks chains of as many relays as the separation permits, of one more, and of a thousand. The thousand relays
+/// have different powers.
 #[test]
 fn crowded_and_long_chains_are_placed() {
     let crowd = |n, apart| Scene {

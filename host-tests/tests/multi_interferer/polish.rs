@@ -125,7 +125,7 @@ fn with_several_sources_in_a_band_the_rules_are_kept() {
     assert!(gained >= 20, "{gained}");
 }
 
-/// Checks that polishing with lateral room never lowers the SIR, and stays within the room.
+/// Checks that polishing with lateral offsets never lowers the SIR, and keeps to their permitted range.
 #[test]
 fn with_room_to_the_side_it_gains() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(83));

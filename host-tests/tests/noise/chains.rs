@@ -67,7 +67,7 @@ fn the_optimum_is_found_in_noise() {
     );
 }
 
-/// Checks that unlike relays in noise meet their agreed target SIR, which is never above the optimum.
+/// Checks that different relays in noise meet their agreed target SIR. It is never above the optimum.
 #[test]
 fn mixed_chains_in_noise_meet_what_they_agree_on() {
     let mut rng = generator(1103);

@@ -113,7 +113,8 @@ fn the_optimum_is_found_on_random_links() {
     }
 }
 
-/// Checks that unlike relays meet their agreed target SIR. It may be below the optimum, but not above.
+/// Checks that relays of different altitudes and powers meet their agreed target SIR. It may be below the optimum,
+/// but not above.
 #[test]
 fn mixed_chains_meet_what_they_agree_on() {
     let mut all = Mixed::default();

@@ -254,7 +254,7 @@ fn places(plan: &Plan) -> impl Iterator<Item = Place> + '_ {
     plan.places.iter().map(|(place, _)| reference(*place))
 }
 
-/// Checks that plans with lateral room have the stated SIR, and come near the recorded optimum.
+/// Checks that plans with lateral offsets have the stated SIR, and come near the recorded optimum.
 #[test]
 fn plans_beside_the_line_are_worth_what_they_say() {
     let mut rng = ChaCha8Rng::seed_from_u64(702);

@@ -12,7 +12,7 @@ fn sweep_in(bytes: &[u8]) -> Sweep {
     }
 }
 
-/// Returns the last relay after it received `sweep` twice. The second copy has its number raised by `off`.
+/// Returns the last relay after it received a sweep message twice. The second copy has its number raised by `off`.
 fn after_two(sweep: &[u8], now: Instant, off: u16) -> Relay {
     let mut tail = relay(mission(2), 2);
     tail.handle_bytes(now, Port::Upstream, sweep);

@@ -203,7 +203,7 @@ impl Fleet {
         }
     }
 
-    /// Starts every drone of `flight`, at the emulator's full speed.
+    /// Starts every drone of `flight`, with clocks 10.5 times as fast as real time.
     pub(crate) fn of(which: Image, flight: &Flight, faults: Faults, seed: u64) -> Self {
         Self::start(which, &blocks(flight), faults, seed)
     }

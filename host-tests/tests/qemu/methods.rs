@@ -115,7 +115,7 @@ fn five_choose_the_altitudes_of_the_simulated_chain() {
     settles(&flight);
 }
 
-/// Checks that drones with lateral room move to the side away from the interferer.
+/// Checks that drones that may have lateral offsets move to the side away from the interferer.
 #[test]
 fn five_go_to_the_side_as_the_simulated_chain_does() {
     let flight = past(150.0, 280.0, None, Method::Joint);

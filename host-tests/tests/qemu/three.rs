@@ -19,7 +19,8 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of refused engagements that MAVSDK's pilot has handled. `chooses` is true while OFFBOARD is due again.
+    /// Number of times that MAVSDK's pilot has reacted to refused setpoint control. `chooses` is true while OFFBOARD
+    /// is due again.
     found: usize,
     chooses: bool,
 }
@@ -46,8 +47,8 @@ impl Three {
         }
     }
 
-    /// Chooses another mode, and then OFFBOARD again, when the first drone was refused engagement. The relay refuses
-    /// a mode that was chosen before it started.
+    /// Chooses another mode, and then OFFBOARD again, if the first drone's relay refused setpoint control. The relay
+    /// refuses a mode that was chosen before it started.
     fn choose_again(&mut self) {
         let count = |text: &str| {
             self.fleet

@@ -51,7 +51,7 @@ pub(crate) struct Vehicle {
     socket: UnixStream,
     axis: Axis,
     began: Instant,
-    /// Speed of the drone's clock: real or as fast as possible.
+    /// Speed of the drone's clock: real time, or 10.5 times as fast.
     life: Life,
     moved_at: u64,
     said_at: [u64; PERIODS.len()],

@@ -92,7 +92,7 @@ const CASES: [&str; 8] = [
 
 type Draw = fn(&mut ChaCha8Rng) -> Roomy;
 
-/// Checks a relay at a given altitude with lateral room, and that all cases occur but those of `but`.
+/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `but`.
 fn at_its_altitude(seed: u64, draw: Draw, but: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -105,7 +105,7 @@ fn at_its_altitude(seed: u64, draw: Draw, but: &[&str]) {
     }
 }
 
-/// Checks a relay with lateral room at any altitude, and that all cases of `cases` occur.
+/// Checks a relay with lateral offsets at any altitude, and that all cases of `cases` occur.
 fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -174,7 +174,8 @@ fn one_relay_aside_has_the_recorded_optimum() {
     );
 }
 
-/// Checks that the solution without lateral room is that of Theorems 1 and 3. Room never makes it worse.
+/// Checks that the solution without lateral offsets is that of Theorems 1 and 3. Permitted offsets never make it
+/// worse.
 #[test]
 fn without_room_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));

@@ -32,14 +32,14 @@ impl Roomy {
         }
     }
 
-    /// Draws a scene with lateral room and receiver noise.
+    /// Draws a scene with a range of lateral offsets and with receiver noise.
     pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
         let silent = Self::random(rng);
         let link = random::in_noise(rng, &silent.scene.link);
         Self::new(Scene::new(&link, silent.scene.band), silent.lateral)
     }
 
-    /// Draws a scene with lateral room on both sides, on one side, or on none. Some interferers are on the line or at
+    /// Draws a scene with lateral offsets to both sides, to one side, or none. Some interferers are on the line or at
     /// one of its ends.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let mut scene = Scene::random(rng);

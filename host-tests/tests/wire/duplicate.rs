@@ -24,8 +24,8 @@ fn hears(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, Said)> {
     bench.sends_with_claims()
 }
 
-/// Returns relay 4 of 8, a sweep in its name, and the number of its index claim. The relay answered that sweep by a
-/// claim, as another node may have its index.
+/// Returns relay 4 of 8, a sweep message in its name, and the number of its index claim. The relay answered that
+/// message by a claim, as another node may have its index.
 fn relay_4(wiring: Wiring, port: Port) -> (Bench, Said, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;

@@ -22,7 +22,7 @@ pub(crate) const WEAK: Field = Field::new(&[at(0.0, 1e32)]);
 /// Field of interference from the weakest to the strongest that the format permits.
 pub(crate) const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Number of the first pass after a leader's start. `SECOND` is the number of the next one.
+/// Number of a leader's first pass in the tests. `SECOND` is the number of the next pass.
 pub(crate) const FIRST: u16 = 64;
 pub(crate) const SECOND: u16 = 65;
 

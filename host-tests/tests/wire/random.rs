@@ -179,7 +179,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
     }
 }
 
-/// Checks that a sweep with a joint solution is encoded as an `Aside` message, without measured values.
+/// Checks that a sweep message with a joint solution is encoded as `Aside`, without measured values.
 #[test]
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {

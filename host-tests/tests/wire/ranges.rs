@@ -55,7 +55,7 @@ fn an_offer_needs_room_for_its_relays() {
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
 }
 
-/// Returns a mission whose numbers all differ from those of the paper's.
+/// Returns a mission of eight relays whose other numbers differ from those of the paper's.
 fn other(channel: Channel) -> MissionConfig {
     MissionConfig {
         relays: 8,

@@ -12,7 +12,7 @@ fn missions() -> [MissionConfig; 2] {
     [source(), mission(Interference::Field(FIELD))]
 }
 
-/// Asserts that the relay counts a message as stale, and that nothing else changes.
+/// Asserts that the relay counts a message as stale and ignores it, so that nothing else changes.
 fn is_stale(bench: &Bench, port: Port, said: &Said) {
     let mut after = bench.clone();
     let before = bench.stats().stale;

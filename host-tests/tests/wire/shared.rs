@@ -9,7 +9,7 @@ use super::votes::{ASKS, FORMS, FRESH, a_hello, id, near};
 
 const AIR: Port = Port::Shared;
 
-/// Returns relay 6 of 12 on a shared channel, and a sweep for it.
+/// Returns relay 6 of 12 on a shared channel, and a sweep message for it.
 fn sixth() -> (Bench, Said) {
     let bench = Bench::new(6, 12, Wiring::Shared);
     let sweep = one_of_each(FIRST, bench.mission)[0].clone();
