@@ -98,7 +98,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
     }
 }
 
-/// Checks that the second of two commands that arrive at once is ignored until it is repeated. A cable or a router
+/// Checks that of two commands that arrive at once, the second is ignored until it is repeated. A cable or a router
 /// can deliver two commands together.
 #[test]
 fn two_commands_at_once_are_obeyed_one_after_the_other() {
@@ -141,7 +141,7 @@ fn two_commands_at_once_are_obeyed_one_after_the_other() {
     assert_eq!(vehicle.link.poll_cleared(), Some(side));
 }
 
-/// Checks that a link with a key obeys a clearance command only if signed with that key, and only once.
+/// Checks that a link with a key obeys a command to clear a relay only if signed, and only once.
 #[test]
 fn with_a_key_only_a_signed_command_clears_a_relay() {
     let side = Side::Downstream;

@@ -148,7 +148,7 @@ fn noise_is_told_from_silence() {
     assert!(!unanswered.relay.has_said("no answer"), "bytes came");
 }
 
-/// Checks the report on frames of a ground station, radio or plane, none of which grants control.
+/// Checks the report on frames of a ground station, a radio or a plane. The companion can control none of them.
 #[test]
 fn others_are_told_from_an_autopilot() {
     let ports = Ports::apart(1_000);

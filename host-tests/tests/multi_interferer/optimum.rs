@@ -60,8 +60,8 @@ fn of_one_source_it_is_the_optimum_of_the_reference() {
     assert!(worst < 1e-9, "{worst}");
 }
 
-/// Compares the optimum of one to four relays with brute force. A third of the scenes have own powers, half a least
-/// separation.
+/// Compares the optimum of one to four relays with brute force. In a third of the scenes the relays have different
+/// powers; half of the scenes have a least separation.
 #[test]
 fn brute_force_finds_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(77));
